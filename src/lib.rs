@@ -45,7 +45,7 @@ pub mod constants;
 pub mod cpu;
 pub mod engine;
 pub mod error;
-#[expect(unsafe_code, reason = "Vulkan's functions are unsafe; nothing outside this module is")]
+#[expect(unsafe_code, reason = "Vulkan's functions are unsafe, and so are mapped files; nothing outside this module is")]
 pub mod gpu;
 #[cfg(doc)]
 pub mod guide;

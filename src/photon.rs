@@ -47,6 +47,22 @@ pub struct MapPhoton {
     pub wi: u32,
 }
 
+impl MapPhoton {
+    /// Towards where it came from, to a ten-thousandth of a radian. Twin of `unpack_direction` in `glsl/math/directions.glsl`.
+    pub fn came_from(&self) -> Vec3 {
+        let coordinate = |code: u32| ((code & 0x7fff) as f32 - 16383.0) / 16383.0;
+        let (x, y) = (coordinate(self.wi), coordinate(self.wi >> 15));
+        let z = 1.0 - x.abs() - y.abs();
+        let (x, y) = if z >= 0.0 { (x, y) } else { ((1.0 - y.abs()) * 1f32.copysign(x), (1.0 - x.abs()) * 1f32.copysign(y)) };
+        Vec3::new(x, y, z).normalize()
+    }
+
+    /// Mask of the way in which its light arrived, one of `ARRIVED_...`.
+    pub fn arrival(&self) -> u32 {
+        1 << (self.wi >> 30)
+    }
+}
+
 impl Photon {
     /// Of a photon in its wall's plane to the bit, as any that was traced is.
     pub fn stored(&self) -> StoredPhoton {

@@ -85,14 +85,20 @@ fn short(arguments: &[&str]) -> Vec<String> {
         return arguments.iter().map(ToString::to_string).collect();
     }
     // What is kept has two blocks of rounds, one for each of two shards, and it takes two to know an error.
-    let has_blocks = ["--checkpoint", "--resume", "--shard", "--error-image", "--judge"].iter().any(|option| arguments.contains(option));
-    let of_run = [("--photons", "500"), ("--rounds", if has_blocks { "8" } else { "2" })];
+    let is_map = |word: &str| ["map", "--map"].contains(&word);
+    let has_blocks = arguments.iter().any(|word| is_map(word))
+        || ["--checkpoint", "--resume", "--shard", "--error-image", "--judge"].iter().any(|option| arguments.contains(option));
+    // Photons of a file are as many as they are.
+    let photons = [("--photons", "500")].into_iter().filter(|_| !arguments.contains(&"--map"));
+    let of_run: Vec<_> = photons.chain([("--rounds", if has_blocks { "8" } else { "2" })]).collect();
     let only_if_there = [("--error", "60%"), ("--samples", "2"), ("--counters", "2")];
     let there: Vec<_> = only_if_there.into_iter().filter(|(option, _)| arguments.contains(option)).collect();
     let more: &[(&str, &str)] = match arguments.first() {
         Some(&"render") => &[("--size", "16x12")],
         Some(&"bake") => &[("--texels-per-metre", "2")],
         Some(&"probe") => &[],
+        Some(&"map") if matches!(arguments[1], "info" | "export") => return arguments.iter().map(ToString::to_string).collect(),
+        Some(&"map") => &[],
         Some(&"plan" | &"info" | &"compare" | &"devices" | &"merge") => return arguments.iter().map(ToString::to_string).collect(),
         _ => &[("--mesh", "8")],
     };

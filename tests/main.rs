@@ -38,6 +38,7 @@ mod lights;
 mod limits;
 mod lobe_sampling;
 mod lobes;
+mod map;
 mod materials;
 mod media;
 mod memory;

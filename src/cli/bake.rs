@@ -56,7 +56,8 @@ pub(super) struct BakeArgs {
 }
 
 pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
-    let settings = args.transport.settings();
+    let map = args.transport.map()?;
+    let settings = args.transport.settings(map.as_ref());
     settings.validate()?;
     let folder = Folder::open("-o", &args.output)?;
     let reports = args.report.open()?;
@@ -100,7 +101,16 @@ pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
     let phases: Vec<Vec<Receiver>> =
         (0..PHASE_COUNT.min(settings.rounds as usize)).map(|phase| receivers(&layout, phase, &geometry)).collect();
     let sensor = Sensor::Receivers { count: layout.texel_count() as u32 };
-    let job = Job { scene: &scene, geometry: &geometry, settings: &settings, sensor, camera: None, phases: &phases, point: "texel" };
+    let job = Job {
+        scene: &scene,
+        geometry: &geometry,
+        settings: &settings,
+        sensor,
+        camera: None,
+        phases: &phases,
+        map: map.as_ref(),
+        point: "texel",
+    };
     let gpu = args.device.open(&reporter)?;
     let lit = job.run(&gpu, &args.transport.stop, &mut keeper, &reporter, cancelled)?;
 

@@ -64,6 +64,17 @@ Examples:
   photonmill merge one.pms two.pms -o picture.exr
       A run in two parts, which two machines may do";
 
+pub(super) const MAP: &str = "\
+Examples:
+  photonmill map scene.glb -o map.pm --rounds 64
+      The photons of 64 independent rounds
+  photonmill render scene.glb --map map.pm --camera Camera.001 -o picture.png
+      A picture from them, with another camera
+  photonmill map info map.pm
+      What the file holds
+  photonmill map export map.pm -o photons.ply --rounds 1
+      The photons of its first round for Blender, MeshLab or Open3D";
+
 pub(super) const PLAN: &str = "\
 Examples:
   photonmill plan scene.glb

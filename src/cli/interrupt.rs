@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
 
 use super::complain;
+use crate::output::destination::remove_staged;
 
 /// Whether what is under way looks at the flag; a scene that is being read does not.
 static IS_INTERRUPTIBLE: AtomicBool = AtomicBool::new(false);
@@ -27,13 +28,14 @@ pub(super) fn exit_code() -> u8 {
 }
 
 /// The flag that the first Ctrl-C (SIGTERM, SIGHUP) sets; the run then ends early and writes what it has. The second ends
-/// the program at once, as does the first where nothing looks at the flag. No temporary file exists before the end.
+/// the program at once, as does the first where nothing looks at the flag. What is half-written goes.
 pub(super) fn cancel_on_signal() -> Arc<AtomicBool> {
     let cancelled = Arc::new(AtomicBool::new(false));
     let flag = cancelled.clone();
     let handle = move |signal: i32| {
         let is_first = SIGNAL.compare_exchange(0, signal, Ordering::Relaxed, Ordering::Relaxed).is_ok();
         if !is_first || !IS_INTERRUPTIBLE.load(Ordering::Relaxed) {
+            remove_staged();
             std::process::exit(i32::from(exit_code()));
         }
         flag.store(true, Ordering::Relaxed);

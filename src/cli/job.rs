@@ -10,6 +10,7 @@ use super::keep::Keeper;
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::stop::{StopArgs, bias_before, check_bias, goals, rounds_after, up_to};
 use crate::engine::Control;
+use crate::engine::scene::map_file::MapFile;
 use crate::engine::scene::{self, RunResult, View};
 use crate::error::Result;
 use crate::gpu::Gpu;
@@ -42,6 +43,8 @@ pub(super) struct Job<'a> {
     pub(super) sensor: Sensor,
     pub(super) camera: Option<&'a Camera>,
     pub(super) phases: &'a [Vec<Receiver>],
+    /// Photons that need not be traced.
+    pub(super) map: Option<&'a MapFile>,
     /// What results are of: pixel, texel or point.
     pub(super) point: &'static str,
 }
@@ -62,9 +65,10 @@ impl Job<'_> {
             (maps.join(" and "), format!("; first radius {}", radii.join(", ")))
         };
         reporter.note(&format!(
-            "plan: {}, {what}; {} of {maps}{radius}; {:.1} MiB on the device{}",
+            "plan: {}, {what}; {} of {maps}{}{radius}; {:.1} MiB on the device{}",
             self.scene.name,
             up_to(&plan.settings.stop, plan.settings.rounds),
+            if self.map.is_some() { " from the file" } else { "" },
             plan.bytes as f64 / f64::from(1 << 20),
             goals(&plan.settings.stop)
         ));
@@ -80,15 +84,20 @@ impl Job<'_> {
         reporter: &ProgressReporter,
         cancelled: &AtomicBool,
     ) -> Result<RunResult> {
-        let Job { scene, geometry, sensor, camera, phases, point, .. } = *self;
+        let Job { scene, geometry, sensor, camera, phases, map, point, .. } = *self;
         let is_picture = matches!(sensor, Sensor::Picture { .. });
-        let settings = &self.settings.in_whole_blocks(is_picture);
+        let mut settings = self.settings.in_whole_blocks(is_picture);
+        if let Some(most) = map.map(MapFile::rounds).filter(|most| settings.rounds > *most) {
+            settings.rounds = most - most % settings.rounds_per_block(is_picture);
+        }
+        let settings = &settings;
         if settings.rounds != self.settings.rounds {
             let block = settings.rounds_per_block(is_picture);
             reporter.note(&format!("--rounds {} is taken as {}: whole blocks of {block}", self.settings.rounds, settings.rounds));
         }
         let view = View { geometry, camera, phases };
-        let mut plan = scene::trial::plan(gpu, scene, &view, settings, sensor)?;
+        let plan = scene::trial::plan(gpu, scene, &view, settings, sensor)?;
+        let mut plan = map.into_iter().try_fold(plan, |plan, map| map.plan(plan, geometry))?;
         if let Some(warning) = scene_report::radius_warning(&plan, geometry, point) {
             complain(&format!("warning: {warning}"));
         }
@@ -106,7 +115,7 @@ impl Job<'_> {
         reporter.status("making the pipelines");
         let keep = keeper.keep(&scene.name);
         let mut control = Control { cancelled, progress: &mut |progress| reporter.report(progress, "round"), keep };
-        let mut lit = interruptible(|| scene::light(gpu, &view, plan, &mut control))?;
+        let mut lit = interruptible(|| scene::light_from(gpu, &view, plan, map, &mut control))?;
         if lit.is_cancelled() {
             complain(&format!("ended early: the results are of {} of {}", counted(lit.film.rounds, "round"), settings.rounds));
             return Ok(lit);

@@ -9,6 +9,7 @@ mod info;
 mod interrupt;
 mod job;
 mod keep;
+mod map;
 mod merge;
 mod options;
 mod paper;
@@ -66,6 +67,9 @@ enum Command {
     /// Add the parts of a run that --shard or --checkpoint left, to the bits of one run
     #[command(after_help = help::MERGE)]
     Merge(merge::MergeArgs),
+    /// Write the photons of a scene into a file, for `render --map`; print or export what such a file holds
+    #[command(after_help = help::MAP)]
+    Map(map::MapArgs),
     /// Print which effects a scene needs, and why
     #[command(after_help = help::PLAN)]
     Plan(plan::PlanArgs),
@@ -208,6 +212,7 @@ pub fn main() -> u8 {
         Some(Command::Render(args)) => render::run(&args, &cancelled),
         Some(Command::Bake(args)) => bake::run(&args, &cancelled),
         Some(Command::Probe(args)) => probe::run(&args, &cancelled),
+        Some(Command::Map(args)) => map::run(&args, &cancelled),
         Some(Command::Merge(args)) => merge::run(&args).map(|()| End::Finished),
         Some(Command::Plan(args)) => plan::run(&args).map(|()| End::Finished),
         Some(Command::Info(args)) => info::run(&args).map(|()| End::Finished),

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::progress::ProgressReporter;
-use super::values::{MathArg, SwitchArg, parse_integer, parse_within};
+use super::values::{MathArg, parse_integer, parse_within};
 use super::{DeviceArgs, JsonArg, TimingArgs, optional_file};
 use crate::engine::run::RunResult;
 use crate::error::Result;
@@ -19,9 +19,6 @@ pub(super) struct CommonArgs {
     /// Seed of the random numbers [default: 1]
     #[arg(long, value_name = "N", value_parser = parse_within(0..=u64::MAX), allow_hyphen_values = true, help_heading = "Photons")]
     pub(super) seed: Option<u64>,
-    /// Divide by the part of the search disc that lies on the surface, not by the whole disc [default: on]
-    #[arg(long, value_enum, value_name = "SWITCH", help_heading = "Density estimate")]
-    pub(super) edge_correction: Option<SwitchArg>,
     /// Rounding of the arithmetic [default: fast]
     #[arg(long, value_enum, value_name = "ROUNDING", help_heading = "Implementation")]
     pub(super) math: Option<MathArg>,

@@ -29,7 +29,8 @@ pub(super) struct PlanArgs {
 }
 
 pub(super) fn run(args: &PlanArgs) -> Result<()> {
-    let settings = args.picture.settings();
+    let map = args.picture.transport.map()?;
+    let settings = args.picture.settings(map.as_ref());
     settings.validate()?;
     let json = optional_file("--json", args.json.json.as_ref())?;
     let reporter = ProgressReporter::new(&args.progress);
@@ -41,6 +42,7 @@ pub(super) fn run(args: &PlanArgs) -> Result<()> {
         Err(_) => Limits::of_host(),
     };
     let plan = ScenePlan::new(&subject.scene, &subject.geometry, &settings, subject.sensor(), &limits)?;
+    let plan = map.iter().try_fold(plan, |plan, map| map.plan(plan, &subject.geometry))?;
     reporter.finish();
     if let Some(json) = json {
         return write_all([(json, [scene_report::plan_json(&plan), b"\n".to_vec()].concat())]);

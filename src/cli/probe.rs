@@ -12,6 +12,7 @@ use super::options::{ReportArgs, TimedDeviceArgs};
 use super::progress::ProgressReporter;
 use super::scene::{SceneArgs, TransportArgs, geometry};
 use super::{End, complain, say_beside};
+use crate::engine::scene::map_file::MapFile;
 use crate::engine::scene::{RunResult, Target};
 use crate::error::{Error, Result};
 use crate::output::destination::{Destination, check_distinct, write_all};
@@ -43,13 +44,14 @@ pub(super) struct ProbeArgs {
 }
 
 impl ProbeArgs {
-    pub(super) fn settings(&self) -> SceneSettings {
-        self.transport.settings()
+    pub(super) fn settings(&self, map: Option<&MapFile>) -> SceneSettings {
+        self.transport.settings(map)
     }
 }
 
 pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
-    let settings = args.settings();
+    let map = args.transport.map()?;
+    let settings = args.settings(map.as_ref());
     settings.validate()?;
     let output = Destination::open("-o", &args.output)?;
     let reports = args.report.open()?;
@@ -72,7 +74,16 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
     let geometry = geometry(&scene, &settings, &reporter)?;
     let phases = Target::Points(&points).phases(&geometry);
     let sensor = Sensor::Receivers { count: points.len() as u32 };
-    let job = Job { scene: &scene, geometry: &geometry, settings: &settings, sensor, camera: None, phases: &phases, point: "point" };
+    let job = Job {
+        scene: &scene,
+        geometry: &geometry,
+        settings: &settings,
+        sensor,
+        camera: None,
+        phases: &phases,
+        map: map.as_ref(),
+        point: "point",
+    };
     let gpu = args.device.open(&reporter)?;
     let lit = job.run(&gpu, &args.transport.stop, &mut keeper, &reporter, cancelled)?;
     reporter.finish();

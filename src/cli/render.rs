@@ -16,6 +16,7 @@ use super::{End, optional_file, say, say_beside};
 use crate::engine;
 use crate::engine::replay::PhotonName;
 use crate::engine::saved::{SavedFilm, SavedRun};
+use crate::engine::scene::map_file::MapFile;
 use crate::engine::scene::{RunResult, replay};
 use crate::error::{Result, require};
 use crate::output::colour::{Format, Tone};
@@ -63,7 +64,7 @@ pub(super) struct RenderArgs {
     /// Trace a single photon of this run, print its path, and exit; rounds and photons count from 0, and `:caustic` at the
     /// end takes a photon of the caustic map
     #[arg(long, value_name = "ROUND:PHOTON", value_parser = parse_photon_name, help_heading = "Checks",
-        conflicts_with_all = ["output", "error_image", "exposure", "tone", "judge", "explain", "json", "trace", "time_dispatches"])]
+        conflicts_with_all = ["output", "error_image", "exposure", "tone", "judge", "explain", "json", "trace", "time_dispatches", "map"])]
     replay: Option<PhotonName>,
     #[command(flatten)]
     messages: MessageArgs,
@@ -72,14 +73,15 @@ pub(super) struct RenderArgs {
 }
 
 impl RenderArgs {
-    pub(super) fn settings(&self) -> SceneSettings {
-        let usual = self.picture.settings();
+    pub(super) fn settings(&self, map: Option<&MapFile>) -> SceneSettings {
+        let usual = self.picture.settings(map);
         SceneSettings { filter: self.filter.map_or(usual.filter, Filter::from), samples: self.samples.unwrap_or(usual.samples), ..usual }
     }
 }
 
 pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
-    let settings = args.settings();
+    let map = args.picture.transport.map()?;
+    let settings = args.settings(map.as_ref());
     settings.validate()?;
     if let Some(name) = args.replay {
         return show_photon(args, &settings, name);
@@ -116,7 +118,16 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     let reporter = ProgressReporter::new(&args.messages.progress);
     let subject = args.picture.open(&settings, &reporter)?;
     let Subject { scene, camera, width, height, geometry } = &subject;
-    let job = Job { scene, geometry, settings: &settings, sensor: subject.sensor(), camera: Some(camera), phases: &[], point: "pixel" };
+    let job = Job {
+        scene,
+        geometry,
+        settings: &settings,
+        sensor: subject.sensor(),
+        camera: Some(camera),
+        phases: &[],
+        map: map.as_ref(),
+        point: "pixel",
+    };
     let gpu = args.device.open(&reporter)?;
     let size = (*width, *height);
     let show = Show { size, exposure: args.exposure, tone: args.tone.map_or(Tone::default(), Tone::from) };

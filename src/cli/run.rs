@@ -38,7 +38,6 @@ use crate::text::counted;
 use crate::timings::{Clock, Span};
 
 #[derive(Args)]
-#[command(mut_arg("edge_correction", |argument| argument.help(EDGE_CORRECTION)))]
 pub(super) struct RunArgs {
     /// Picture of the box: a .png shows illumination from 0 to 1, an .exr keeps it unclamped
     #[arg(short, long, alias = "out", value_name = "FILE", default_value = "open-box.png", help_heading = "Output")]
@@ -110,6 +109,10 @@ pub(super) struct RunArgs {
     /// [default: all within the radius]
     #[arg(long, value_name = "K", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Density estimate")]
     nearest: Option<u32>,
+    /// Divide by the part of the search disc that lies on the wall, not by the whole disc, for irradiance and radiosity; the paper's
+    /// illumination stays uncorrected [default: on]
+    #[arg(long, value_enum, value_name = "SWITCH", help_heading = "Density estimate")]
+    edge_correction: Option<SwitchArg>,
     /// Texels along each side of a wall [default: 64]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Density estimate")]
     mesh: Option<u32>,
@@ -184,15 +187,11 @@ value_enum!(SumsArg => Sums {
 value_enum!(EmissionArg => EmissionLaw { Uniform, Cosine });
 value_enum!(PhongDirectionArg => PhongDirection { Mirror, Sampled });
 
-/// The paper's illumination is of this world alone.
-const EDGE_CORRECTION: &str = "Divide by the part of the search disc that lies on the wall, not by the whole disc, for irradiance and \
-     radiosity; the paper's illumination stays uncorrected [default: on]";
-
 impl RunArgs {
     pub(super) fn settings(&self) -> RoomSettings {
         let preset = RoomSettings::preset(self.preset.map_or(Preset::Modified, Preset::from));
         let photons = self.photons.unwrap_or(preset.photons);
-        let CommonArgs { seed, edge_correction, math, chunk, group_size, paranoid } = self.common;
+        let CommonArgs { seed, math, chunk, group_size, paranoid } = self.common;
         let settings = RoomSettings {
             builder: self.variant.flatten().unwrap_or(preset.builder),
             photons,
@@ -214,7 +213,7 @@ impl RunArgs {
             light_power: self.light_power.unwrap_or(preset.light_power),
             reflectance: self.reflectance.unwrap_or(preset.reflectance),
             mesh: self.mesh.unwrap_or(preset.mesh),
-            edge_correction: edge_correction.map_or(preset.edge_correction, |switch| switch == SwitchArg::On),
+            edge_correction: self.edge_correction.map_or(preset.edge_correction, |switch| switch == SwitchArg::On),
             threads: self.threads.unwrap_or(preset.threads),
             paranoid,
             group_size: group_size.unwrap_or(preset.group_size),

@@ -13,6 +13,7 @@ use super::progress::ProgressReporter;
 use super::stop::StopArgs;
 use super::values::{BuilderArg, SwitchArg, builder_parser, effect_parser, parse_colour, parse_integer, parse_number, value_enum};
 use super::{complain, help};
+use crate::engine::scene::map_file::MapFile;
 use crate::error::{Error, Result, require};
 use crate::output::colour::Tone;
 use crate::plan::sensor::Sensor;
@@ -79,27 +80,15 @@ fn parse_environment(text: &str) -> std::result::Result<EnvironmentArg, String> 
     }
 }
 
+/// Which photons are traced, through what.
 #[derive(Args)]
-pub(super) struct TransportArgs {
-    #[command(flatten)]
-    pub(super) stop: StopArgs,
-    #[command(flatten)]
-    pub(super) keep: KeepArgs,
-
+pub(super) struct PhotonArgs {
     /// Photons of the global map, per round [default: 131072]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
     photons: Option<u32>,
     /// Photons of the caustic map, per round [default: the same as --photons]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
     caustic_photons: Option<u32>,
-    /// Number of independent rounds, of which the result is the mean [default: 16; with --error or --time up to 65536, with
-    /// --total-photons as many as needed]
-    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
-    rounds: Option<u32>,
-    /// Rounds of a block, a power of two. Samples are even over a block, and errors come from the spread of blocks; --rounds is
-    /// rounded up to whole blocks [default: 4, less with more --samples]
-    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
-    block: Option<u32>,
     /// Cut photons off after this many bounces [default: none; Russian roulette ends paths]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
     bounces: Option<u32>,
@@ -110,18 +99,40 @@ pub(super) struct TransportArgs {
     /// Source of direct light and caustics [default: split]
     #[arg(long, value_enum, value_name = "METHOD", help_heading = "Light transport")]
     illumination: Option<IlluminationArg>,
-    /// Shadow rays per visible point and round [default: 4]
-    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Light transport")]
-    shadow_rays: Option<u32>,
-    /// Final gathering: take indirect light from one ray to the next surface, not from the map at the visible point
-    #[arg(long, help_heading = "Light transport")]
-    final_gather: bool,
     /// Simulate an effect even if the scene does not need it; `photonmill plan` lists them
     #[arg(long, value_name = "EFFECT", value_parser = effect_parser(), value_delimiter = ',', help_heading = "Light transport")]
     with: Vec<Effect>,
     /// Leave an effect out even if the scene needs it
     #[arg(long, value_name = "EFFECT", value_parser = effect_parser(), value_delimiter = ',', help_heading = "Light transport")]
     without: Vec<Effect>,
+}
+
+#[derive(Args)]
+pub(super) struct TransportArgs {
+    #[command(flatten)]
+    pub(super) stop: StopArgs,
+    #[command(flatten)]
+    pub(super) keep: KeepArgs,
+
+    #[command(flatten)]
+    light: PhotonArgs,
+    /// Take the photons from a file of `photonmill map` instead of tracing them: the same light for another camera, radius or kernel
+    #[arg(long, value_name = "FILE", help_heading = "Photons", conflicts_with_all = ["photons", "caustic_photons", "bounces", "aim", "illumination"])]
+    map: Option<PathBuf>,
+    /// Number of independent rounds, of which the result is the mean [default: 16; with --error or --time up to 65536, with
+    /// --total-photons as many as needed]
+    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
+    rounds: Option<u32>,
+    /// Rounds of a block, a power of two. Samples are even over a block, and errors come from the spread of blocks; --rounds is
+    /// rounded up to whole blocks [default: 4, less with more --samples]
+    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
+    block: Option<u32>,
+    /// Shadow rays per visible point and round [default: 4]
+    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Light transport")]
+    shadow_rays: Option<u32>,
+    /// Final gathering: take indirect light from one ray to the next surface, not from the map at the visible point
+    #[arg(long, help_heading = "Light transport")]
+    final_gather: bool,
 
     /// Radius of the density estimate of the global map in the first round, metres [default: from a trial round,
     /// so that about 24 photons of a round lie within it at the median pixel, texel or point]
@@ -140,6 +151,10 @@ pub(super) struct TransportArgs {
     /// Kernel of the density estimate: weight of a photon by its distance [default: box]
     #[arg(long, value_enum, value_name = "KERNEL", help_heading = "Density estimate")]
     kernel: Option<KernelArg>,
+
+    /// Divide by the part of the search disc that lies on the surface, not by the whole disc [default: on]
+    #[arg(long, value_enum, value_name = "SWITCH", help_heading = "Density estimate")]
+    edge_correction: Option<SwitchArg>,
 
     /// Builder of the photon maps; all give bit-identical results [default: auto]
     #[arg(long, value_name = "BUILDER", help_heading = "Implementation", value_parser = builder_parser(Builder::ON_GPU,
@@ -312,45 +327,72 @@ impl SceneArgs {
     }
 }
 
-impl TransportArgs {
-    pub(super) fn settings(&self) -> SceneSettings {
+impl PhotonArgs {
+    /// Settings that are usual, but for these.
+    pub(super) fn settings(&self, common: &CommonArgs) -> SceneSettings {
         let usual = SceneSettings::default();
         let photons = self.photons.unwrap_or(usual.photons);
-        let caustic_photons = self.caustic_photons.unwrap_or(photons);
-        let stop = self.stop.stop();
-        let CommonArgs { seed, edge_correction, math, chunk, group_size, paranoid } = self.common;
+        let &CommonArgs { seed, math, chunk, group_size, paranoid } = common;
         SceneSettings {
             photons,
-            caustic_photons,
-            block: self.block.or(usual.block),
-            rounds: self.rounds.unwrap_or_else(|| most_rounds(&stop, photons.min(caustic_photons)).unwrap_or(usual.rounds)),
-            stop,
+            caustic_photons: self.caustic_photons.unwrap_or(photons),
             bounces: self.bounces.unwrap_or(usual.bounces),
+            aim: self.aim.map_or(usual.aim, |switch| switch == SwitchArg::On),
+            illumination: self.illumination.map_or(usual.illumination, Illumination::from),
+            with: self.with.clone(),
+            without: self.without.clone(),
             seed: seed.unwrap_or(usual.seed),
+            math: math.map_or(usual.math, Math::from),
+            chunk,
+            group_size: group_size.unwrap_or(usual.group_size),
+            paranoid,
+            ..usual
+        }
+    }
+}
+
+impl TransportArgs {
+    /// The file that photons are taken from.
+    pub(super) fn map(&self) -> Result<Option<MapFile>> {
+        let Some(map) = self.map.as_ref().map(|path| MapFile::open("--map", path)).transpose()? else { return Ok(None) };
+        if let Some(rounds) = self.rounds.filter(|rounds| *rounds > map.rounds()) {
+            return Err(Error::setting(
+                "--rounds",
+                rounds,
+                format!("must be at most {}, the rounds that the file of --map holds", map.rounds()),
+            ));
+        }
+        Ok(Some(map))
+    }
+
+    pub(super) fn settings(&self, map: Option<&MapFile>) -> SceneSettings {
+        let usual = self.light.settings(&self.common);
+        let usual = map.map_or_else(|| usual.clone(), |map| map.settings(&usual));
+        let stop = self.stop.stop();
+        let most = || match map {
+            Some(map) => map.rounds(),
+            None => most_rounds(&stop, usual.photons.min(usual.caustic_photons)).unwrap_or(usual.rounds),
+        };
+        SceneSettings {
+            block: self.block.or(usual.block),
+            rounds: self.rounds.unwrap_or_else(most),
+            stop,
             radius: self.radius,
             caustic_radius: self.caustic_radius,
             alpha: if self.fixed_radius { 1.0 } else { self.alpha.unwrap_or(usual.alpha) },
             kernel: self.kernel.map_or(usual.kernel, Kernel::from),
-            edge_correction: edge_correction.map_or(usual.edge_correction, |switch| switch == SwitchArg::On),
+            edge_correction: self.edge_correction.map_or(usual.edge_correction, |switch| switch == SwitchArg::On),
             shadow_rays: self.shadow_rays.unwrap_or(usual.shadow_rays),
             final_gather: self.final_gather,
-            aim: self.aim.map_or(usual.aim, |switch| switch == SwitchArg::On),
-            illumination: self.illumination.map_or(usual.illumination, Illumination::from),
             builder: self.variant.unwrap_or(usual.builder),
-            math: math.map_or(usual.math, Math::from),
-            paranoid,
-            group_size: group_size.unwrap_or(usual.group_size),
-            chunk,
-            with: self.with.clone(),
-            without: self.without.clone(),
             ..usual
         }
     }
 }
 
 impl PictureArgs {
-    pub(super) fn settings(&self) -> SceneSettings {
-        let usual = self.transport.settings();
+    pub(super) fn settings(&self, map: Option<&MapFile>) -> SceneSettings {
+        let usual = self.transport.settings(map);
         SceneSettings { part: self.part.map_or(usual.part, Part::from), ..usual }
     }
 
@@ -425,7 +467,7 @@ pub(super) fn stages<'a>(what: &'a str, reporter: &'a ProgressReporter) -> impl 
 }
 
 /// The camera by name, else the scene's first, else one that sees all of it.
-fn camera(scene: &Scene, name: Option<&str>) -> Result<Camera> {
+pub(super) fn camera(scene: &Scene, name: Option<&str>) -> Result<Camera> {
     match name {
         Some(name) => scene.cameras.iter().find(|camera| camera.name == name).cloned().ok_or_else(|| {
             let names: Vec<&str> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();

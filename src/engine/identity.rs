@@ -49,7 +49,7 @@ impl Identity {
             }
         }
         if self.content != other.content {
-            return Some(format!("is of another scene or view ({})", other.scene));
+            return Some(format!("is of another scene, view or photon map ({})", other.scene));
         }
         if self.device != other.device {
             let name = |identity: &Identity| identity.device.clone().unwrap_or_default();
@@ -75,7 +75,7 @@ impl Hash {
         self.add(text.as_bytes());
     }
 
-    fn finish(self) -> String {
+    pub fn finish(self) -> String {
         self.0.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
     }
 }

@@ -7,6 +7,7 @@ pub mod clock;
 pub mod commands;
 pub mod device;
 pub mod kernel;
+mod mapped_file;
 mod reconvergence;
 mod specialize;
 pub mod timestamps;
@@ -24,6 +25,7 @@ pub use buffer::{AnyBuffer, Buffer, HeldMemory, Memory};
 pub use commands::{Commands, Extent, Interrupt};
 pub use device::{DeviceFacts, Reconvergence};
 pub use kernel::{Constants, Kernel, Module};
+pub use mapped_file::MappedFile;
 
 use crate::error::{Error, Result};
 use clock::Idleness;

@@ -4,8 +4,10 @@
 //! folder. `-` is standard output.
 
 use std::collections::HashMap;
+use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use tempfile::NamedTempFile;
 
@@ -49,6 +51,18 @@ impl Destination {
         check_name(&target).map_err(|error| destination.refuse(error.kind()))?;
         temporary_in(folder).map_err(|error| destination.refuse(error.kind()))?;
         Ok(destination)
+    }
+
+    /// Begins a file that is written piece by piece, and appears once it is whole.
+    pub fn stage(&self) -> Result<Staged> {
+        let file = temporary_in(parent(&self.target())).map_err(|error| self.refuse(error.kind()))?;
+        *STAGED.lock().unwrap_or_else(PoisonError::into_inner) = Some(file.path().to_owned());
+        Ok(Staged { destination: self.clone(), file })
+    }
+
+    /// Why it could not be written.
+    pub fn failed(&self, error: &std::io::Error) -> Error {
+        self.refuse(error.kind())
     }
 
     pub fn is_standard_output(&self) -> bool {
@@ -139,16 +153,46 @@ pub fn check_not_read<'a>(destinations: &[Destination], inputs: impl IntoIterato
 /// Writes a file that must survive whatever happens next: under another name first, and on the disk before it takes the place of the
 /// one before it.
 pub fn write_synced(destination: &Destination, content: &[u8]) -> Result<()> {
-    let write = || -> std::io::Result<()> {
+    let mut staged = destination.stage()?;
+    staged.file().write_all(content).map_err(|error| destination.failed(&error))?;
+    staged.finish()
+}
+
+/// A file under another name.
+pub struct Staged {
+    destination: Destination,
+    file: NamedTempFile,
+}
+
+/// The latest of them, for a program that ends at once.
+static STAGED: Mutex<Option<PathBuf>> = Mutex::new(None);
+
+/// Removes what is half-written, before the program ends at once.
+pub fn remove_staged() {
+    if let Some(path) = STAGED.lock().unwrap_or_else(PoisonError::into_inner).take() {
+        let _ = std::fs::remove_file(path);
+    }
+}
+
+impl Staged {
+    pub fn file(&mut self) -> &mut File {
+        self.file.as_file_mut()
+    }
+
+    /// On the disk, and then by its own name.
+    pub fn finish(self) -> Result<()> {
+        let Staged { destination, file } = self;
         let target = destination.target();
-        let mut file = temporary_in(parent(&target))?;
-        file.write_all(content)?;
-        file.as_file().sync_all()?;
-        file.persist(&target).map_err(|refused| refused.error)?;
-        // The new name too.
-        std::fs::File::open(parent(&target))?.sync_all()
-    };
-    write().map_err(|error| destination.refuse(error.kind()))
+        let finish = || -> std::io::Result<()> {
+            file.as_file().sync_all()?;
+            file.persist(&target).map_err(|refused| refused.error)?;
+            // The new name too.
+            File::open(parent(&target))?.sync_all()
+        };
+        let finished = finish().map_err(|error| destination.refuse(error.kind()));
+        STAGED.lock().unwrap_or_else(PoisonError::into_inner).take();
+        finished
+    }
 }
 
 /// Writes every file, or none: all are there under temporary names before the first gets its own. If one cannot be

@@ -8,6 +8,7 @@ pub mod image;
 pub mod lightmap;
 pub mod merge_report;
 pub mod page;
+pub mod photon_map;
 mod report;
 pub mod room_report;
 pub mod scene_report;

@@ -1,6 +1,6 @@
 //! What lighting a scene of triangles is asked to do.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 pub use super::stop::Stop;
 use super::{Builder, MAX_PHOTONS, Math, check_common};
@@ -8,7 +8,7 @@ use crate::constants::{self, MAX_BOUNCES};
 use crate::error::{Error, Result, require, within};
 
 /// Where direct light and caustics come from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Illumination {
     /// Direct light by shadow rays, caustics from a map of their own, the rest from the global map

@@ -9,14 +9,14 @@ use crate::scene::geometry::Geometry;
 /// Specialization constants that change no bit of a block.
 const WITHOUT_EFFECT: [&str; 3] = ["HAS_SLOTS", "CHAIN_STEPS", "PARANOID"];
 
-pub fn identity(scene: &str, view: &View, plan: &ScenePlan, facts: &DeviceFacts) -> Identity {
-    Identity::new(scene, content(view, plan), &plan.settings, found(plan), Some(facts), plan.settings.math)
+pub fn identity(scene: &str, view: &View, plan: &ScenePlan, map: Option<&str>, facts: &DeviceFacts) -> Identity {
+    Identity::new(scene, content(view, plan, map), &plan.settings, found(plan), Some(facts), plan.settings.math)
 }
 
-fn content(view: &View, plan: &ScenePlan) -> Hash {
-    let Geometry { centre, unit, nodes, triangles, planes, normals, uvs, colours, materials, .. } = view.geometry;
-    let Geometry { layered_materials, triangle_layers, textures, texels, emitters, flux_unit, power, .. } = view.geometry;
-    let mut hash = Hash::default();
+/// Of a scene as the kernels read it.
+fn add_scene(hash: &mut Hash, geometry: &Geometry) {
+    let Geometry { centre, unit, nodes, triangles, planes, normals, uvs, colours, materials, .. } = geometry;
+    let Geometry { layered_materials, triangle_layers, textures, texels, emitters, flux_unit, power, .. } = geometry;
     hash.add_text(&format!("{centre:?} {unit:?} {flux_unit:?} {power:?}"));
     hash.add(nodes);
     hash.add(triangles);
@@ -30,7 +30,19 @@ fn content(view: &View, plan: &ScenePlan) -> Hash {
     hash.add(textures);
     hash.add(texels);
     hash.add(emitters);
+}
+
+pub fn scene_hash(geometry: &Geometry) -> String {
+    let mut hash = Hash::default();
+    add_scene(&mut hash, geometry);
+    hash.finish()
+}
+
+fn content(view: &View, plan: &ScenePlan, map: Option<&str>) -> Hash {
+    let mut hash = Hash::default();
+    add_scene(&mut hash, view.geometry);
     hash.add_text(&format!("{:?} {:?}", plan.sensor, view.camera));
+    map.iter().for_each(|map| hash.add_text(map));
     view.phases.iter().for_each(|phase| hash.add(phase));
     hash
 }

@@ -15,11 +15,13 @@
 
 pub mod bias;
 pub mod estimate;
+pub mod fill_map;
 pub mod film;
 mod identity;
 pub mod index;
 mod light_trial;
 pub mod losses;
+pub mod map_file;
 mod on_gpu;
 pub mod points;
 pub mod radius_class;
@@ -32,7 +34,7 @@ mod trial_rays;
 use glam::DVec3;
 
 pub use film::SceneFilm;
-pub use on_gpu::{constants, light, modules};
+pub use on_gpu::{constants, light, light_from, modules};
 
 use crate::engine::error_bound::FilmError;
 use crate::engine::{Control, run};

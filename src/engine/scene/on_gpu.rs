@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use super::film::SceneFilm;
 use super::identity::identity;
 use super::losses::losses;
+use super::map_file::MapFile;
 use super::resources::{PhotonBuffers, SceneResources};
 use super::{Round, RunResult, View, estimate, index, points, radius_class, trace};
 use crate::constants::{HIT_CAUSTIC_PHOTON, HIT_GLOBAL_PHOTON, HIT_KINDS, KEPT_BLOCKS, PART_COUNT, RADIUS_CLASSES, TALLY_COPIES};
@@ -33,6 +34,12 @@ use crate::timings::{Clock, Span};
 /// Kernels that the plan needs, and no others. `go_on` is not among them: few camera paths outlast a dispatch, so its pipeline is
 /// made at its first use.
 pub fn modules(plan: &ScenePlan, facts: &DeviceFacts) -> Vec<Module> {
+    let traces = if plan.maps().next().is_some() { trace::modules(plan) } else { Vec::new() };
+    [of_film(plan, facts), traces].concat()
+}
+
+/// The same without those that trace photons.
+fn of_film(plan: &ScenePlan, facts: &DeviceFacts) -> Vec<Module> {
     let mut modules = vec![Resolve::MODULE];
     modules.push(match plan.sensor {
         Sensor::Picture { .. } => crate::gpu::kernels::View::MODULE,
@@ -40,7 +47,7 @@ pub fn modules(plan: &ScenePlan, facts: &DeviceFacts) -> Vec<Module> {
     });
     if plan.maps().next().is_some() {
         modules.extend([CrowdSize::MODULE, FluxToRadiance::MODULE]);
-        modules.extend([trace::modules(plan), index::modules()].concat());
+        modules.extend(index::modules());
         modules.push(if facts.int64_atomics { GatherVisiblePointsU64::MODULE } else { GatherVisiblePointsTwoWords::MODULE });
         if plan.film.bias == BiasPlan::Blocks {
             modules.push(EndDifference::MODULE);
@@ -71,13 +78,28 @@ struct SceneOnGpu<'a> {
     /// Grids that the points of the global and of the caustic map need, each by the classes of radii that it serves.
     /// `None` until they are known.
     grids: Option<[Vec<Range<u32>>; 2]>,
+    /// Photons that are not traced but read; `None` where they are traced.
+    stored: Option<StoredPhotons<'a>>,
     cancelled: &'a AtomicBool,
+}
+
+/// A file, and the fates of its photons in rounds that nobody has counted yet: of each map, and those of whole blocks among them.
+struct StoredPhotons<'a> {
+    file: &'a MapFile,
+    open: [Fates; 2],
+    open_of_blocks: [Fates; 2],
 }
 
 /// Runs all rounds of a plan; progress is reported in rounds.
 pub fn light(gpu: &Gpu, view: &View, plan: ScenePlan, control: &mut Control) -> Result<RunResult> {
+    light_from(gpu, view, plan, None, control)
+}
+
+/// The same with photons from a file, for which the plan must be made ([`MapFile::plan`]).
+pub fn light_from(gpu: &Gpu, view: &View, plan: ScenePlan, map: Option<&MapFile>, control: &mut Control) -> Result<RunResult> {
     let started = Instant::now();
-    let (mut commands, pipelines_before) = run::commands(gpu, &modules(&plan, gpu.facts()), constants(&plan), plan.settings.math, started)?;
+    let modules = if map.is_some() { of_film(&plan, gpu.facts()) } else { modules(&plan, gpu.facts()) };
+    let (mut commands, pipelines_before) = run::commands(gpu, &modules, constants(&plan), plan.settings.math, started)?;
     let trial = plan.trial.as_ref().map(|trial| ("trial", Duration::from_secs_f64(trial.seconds)));
     for (name, duration) in [("plan", plan.planned_in)].into_iter().chain(trial) {
         commands.timings().count(name);
@@ -86,7 +108,7 @@ pub fn light(gpu: &Gpu, view: &View, plan: ScenePlan, control: &mut Control) -> 
     let resources = commands.scope("set-up", |commands| SceneResources::new(gpu, commands, view.geometry, &plan, view.phases))?;
     commands.warm_up()?;
     commands.submit()?;
-    let identity = control.keep.identity(|name| identity(name, view, &plan, gpu.facts()))?;
+    let identity = control.keep.identity(|name| identity(name, view, &plan, map.map(|map| map.hash.as_str()), gpu.facts()))?;
     let photons_per_round = plan.maps().map(|map| u64::from(map.photons)).sum();
     let task = Task {
         device: Some((gpu, pipelines_before)),
@@ -104,7 +126,9 @@ pub fn light(gpu: &Gpu, view: &View, plan: ScenePlan, control: &mut Control) -> 
         // Of the global map and of the caustic map.
         fates: vec![Fates::of_scene(plan.settings.bounces); 2],
     };
-    let mut world = SceneOnGpu { view, plan: &plan, resources, grids: None, cancelled: control.cancelled };
+    let none = || [Fates::of_scene(plan.settings.bounces), Fates::of_scene(plan.settings.bounces)];
+    let stored = map.map(|file| StoredPhotons { file, open: none(), open_of_blocks: none() });
+    let mut world = SceneOnGpu { view, plan: &plan, resources, grids: None, stored, cancelled: control.cancelled };
     if !plan.has_classes() {
         world.grids = Some([radius_class::one_grid(), radius_class::one_grid()]);
     } else if control.keep.begins_later() {
@@ -136,6 +160,9 @@ impl<'a> World for SceneOnGpu<'a> {
     }
 
     fn end_block(&mut self, commands: &mut Commands<'a>, _: &RunState) -> Result<()> {
+        if let Some(StoredPhotons { open, open_of_blocks, .. }) = &mut self.stored {
+            open_of_blocks.clone_from(open);
+        }
         let SceneResources { one_hits, part_totals, anomalies, of_blocks, photons, .. } = &self.resources;
         commands.copy(one_hits, &of_blocks.one_hits, one_hits.count());
         commands.copy(part_totals, &of_blocks.part_totals, PART_COUNT.into());
@@ -150,6 +177,15 @@ impl<'a> World for SceneOnGpu<'a> {
 
     fn collect(&mut self, commands: &mut Commands<'a>, state: &mut RunState) -> Result<()> {
         let Some(photons) = &self.resources.photons else { return commands.submit() };
+        if let Some(StoredPhotons { open, open_of_blocks, .. }) = &mut self.stored {
+            commands.submit()?;
+            let none = Fates::of_scene(self.plan.settings.bounces);
+            for which in self.plan.maps().map(|map| usize::from(map.caustic_only)) {
+                let all = std::mem::replace(&mut open[which], none.clone());
+                state.count(which, all, std::mem::replace(&mut open_of_blocks[which], none.clone()));
+            }
+            return Ok(());
+        }
         let copies = (self.plan.tally_rows() * TALLY_COPIES) as usize;
         let mut read_backs = Vec::new();
         for which in self.plan.maps().map(|map| usize::from(map.caustic_only)) {
@@ -288,7 +324,7 @@ impl SceneOnGpu<'_> {
 
     /// One round. When its time is up, it takes no further chunk of photons.
     fn one_round(&mut self, commands: &mut Commands, deadline: Option<Instant>, state: &mut RunState) -> Result<()> {
-        let SceneOnGpu { view, plan, resources, grids, .. } = self;
+        let SceneOnGpu { view, plan, resources, grids, stored, .. } = self;
         let round = Round { resources, geometry: view.geometry, plan, number: state.round() };
         commands.scope("visible points", |commands| points::see(commands, round, view.camera))?;
         if let Some(photons) = &resources.photons {
@@ -304,7 +340,10 @@ impl SceneOnGpu<'_> {
             let mut traced = [0; 2];
             for map in plan.maps() {
                 let in_round = MapInRound { photons, map, grids: &grids[usize::from(map.caustic_only)] };
-                let of_map = commands.scope(map.name, |commands| one_map(commands, round, &in_round, deadline, state))?;
+                let of_map = commands.scope(map.name, |commands| match stored {
+                    Some(stored) => one_stored_map(commands, round, &in_round, stored, state),
+                    None => one_map(commands, round, &in_round, deadline, state),
+                })?;
                 traced[usize::from(map.caustic_only)] = of_map;
             }
             commands.scope("flux to radiance", |commands| estimate::flux_to_radiance(commands, round, traced))?;
@@ -324,11 +363,40 @@ impl SceneOnGpu<'_> {
 const FIRST_TIMED_CHUNK: u32 = 1 << 12;
 const TIMED_CHUNK: Duration = Duration::from_millis(40);
 
+/// Photons of a file that are uploaded together.
+const STORED_AT_ONCE: u32 = 1 << 22;
+
 /// A map, and the grids that its points need.
 struct MapInRound<'a> {
     photons: &'a PhotonBuffers,
     map: &'a MapPlan,
     grids: &'a [Range<u32>],
+}
+
+/// The photons of a map that a file holds; says how many were emitted for them.
+fn one_stored_map(
+    commands: &mut Commands,
+    round: Round,
+    in_round: &MapInRound,
+    stored: &mut StoredPhotons,
+    state: &mut RunState,
+) -> Result<u32> {
+    let MapInRound { photons, map, .. } = in_round;
+    if round.plan.cuts_discs() {
+        commands.scope("cuts", |commands| estimate::cut_discs(commands, round, map))?;
+    }
+    let which = usize::from(map.caustic_only);
+    state.hand_out(which, map.photons);
+    stored.open[which].add(&Fates { emitted: 0, ..stored.file.fates(round.number, map.name).clone() });
+    let most = map.capacity.min(STORED_AT_ONCE) as usize;
+    stored.file.photons(round.number, map.name, most, round.geometry.planes.len(), &mut |of_file| {
+        commands.upload(&photons.map, of_file)?;
+        commands.fill(&photons.counters, 0, 1, of_file.len() as u32);
+        gather_in_grids(commands, round, in_round)?;
+        // What was staged goes.
+        commands.submit()
+    })?;
+    Ok(map.photons)
 }
 
 /// The photons of a map; says how many. Where the time may be up, chunks grow only as long as they take little of it.
@@ -358,17 +426,20 @@ fn one_map(commands: &mut Commands, round: Round, in_round: &MapInRound, deadlin
 
 /// Points of radii that differ much look photons up in grids of their own.
 fn one_chunk(commands: &mut Commands, round: Round, map: &MapInRound, chunk: (u32, u32)) -> Result<()> {
+    trace::trace(commands, round, map.photons, map.map, chunk, &mut |commands| gather_in_grids(commands, round, map))
+}
+
+/// Adds the photons that are in the map to the estimates of all points.
+fn gather_in_grids(commands: &mut Commands, round: Round, map: &MapInRound) -> Result<()> {
     let MapInRound { photons, map, grids } = *map;
-    trace::trace(commands, round, photons, map, chunk, &mut |commands| {
-        for (grid, classes) in grids.iter().enumerate() {
-            if commands.timestamps_left() < TIMESTAMPS_PER_GRID || commands.work() >= commands.paced(round.plan.work_per_submission) {
-                commands.submit()?;
-            }
-            let radius = radius_class::radius_of_class(round.plan.widest_radius(map, round.number), classes.start);
-            let cells = CellPush { counts_stored: u32::from(grid == 0), ..index::cells(round, map, radius) };
-            commands.scope("index", |commands| index::build(commands, round, photons, map, &cells))?;
-            commands.scope("gather", |commands| estimate::gather(commands, round, photons, map, classes.clone(), cells))?;
+    for (grid, classes) in grids.iter().enumerate() {
+        if commands.timestamps_left() < TIMESTAMPS_PER_GRID || commands.work() >= commands.paced(round.plan.work_per_submission) {
+            commands.submit()?;
         }
-        Ok(())
-    })
+        let radius = radius_class::radius_of_class(round.plan.widest_radius(map, round.number), classes.start);
+        let cells = CellPush { counts_stored: u32::from(grid == 0), ..index::cells(round, map, radius) };
+        commands.scope("index", |commands| index::build(commands, round, photons, map, &cells))?;
+        commands.scope("gather", |commands| estimate::gather(commands, round, photons, map, classes.clone(), cells))?;
+    }
+    Ok(())
 }
