@@ -1,6 +1,6 @@
 //! `photonmill map`: the photons of a scene as a file, what such a file holds, and its photons for other programs.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use clap::{ArgMatches, Args, Command, FromArgMatches, Subcommand};
@@ -172,7 +172,7 @@ fn make(args: &MakeArgs, cancelled: &AtomicBool) -> Result<End> {
 }
 
 /// A file that is written piece by piece.
-fn a_file(path: &PathBuf) -> Result<Destination> {
+fn a_file(path: &Path) -> Result<Destination> {
     let output = Destination::open("-o", path)?;
     require(!output.is_standard_output(), "-o", "-", "must be a file: its beginning is known at its end")?;
     Ok(output)

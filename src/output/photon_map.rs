@@ -151,7 +151,7 @@ fn put(bytes: &mut Vec<u8>, header: &Header, photon: &MapPhoton, round: u32, map
     let flux = (photon.flux.as_dvec3() * header.maps[map].watts).as_vec3();
     header.position(photon).to_array().iter().for_each(|value| bytes.extend(value.to_le_bytes()));
     bytes.extend((photon.flux / largest * 255.0).to_array().map(|value| value.round() as u8));
-    [flux, photon.came_from()].iter().flat_map(|vector| vector.to_array()).for_each(|value| bytes.extend(value.to_le_bytes()));
+    [flux, photon.came_from()].iter().flat_map(glam::Vec3::to_array).for_each(|value| bytes.extend(value.to_le_bytes()));
     bytes.extend((photon.plane / 2).to_le_bytes());
     bytes.extend([(photon.plane % 2) as u8, photon.arrival() as u8, map as u8]);
     bytes.extend(round.to_le_bytes());
