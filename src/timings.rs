@@ -95,6 +95,18 @@ impl Timings {
         }
     }
 
+    /// Adds those of another device, which ran at the same time; its spans are left out of the trace.
+    pub fn join(&mut self, other: &Timings) {
+        for row in &other.rows {
+            let own = self.row_mut(&row.name);
+            own.count += row.count;
+            for (sum, time) in [(&mut own.gpu_ms, row.gpu_ms), (&mut own.wall_ms, row.wall_ms)] {
+                *sum = time.map(|time| sum.unwrap_or(0.0) + time).or(*sum);
+            }
+        }
+        self.spans_left_out += other.spans.len() as u64 + other.spans_left_out;
+    }
+
     /// Milliseconds of a scope on the device, else on the host's clock.
     pub fn best_ms(&self, name: &str) -> Option<f64> {
         self.row(name).and_then(|row| row.gpu_ms.or(row.wall_ms))

@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use clap::Args;
 
 use super::job::{Job, MessageArgs};
-use super::options::{ReportArgs, TimedDeviceArgs};
+use super::options::{DevicesOfRunArgs, ReportArgs};
 use super::progress::ProgressReporter;
 use super::scene::{SceneArgs, TransportArgs, geometry};
 use super::values::{parse_number, parse_stops};
@@ -52,7 +52,7 @@ pub(super) struct BakeArgs {
     #[command(flatten)]
     messages: MessageArgs,
     #[command(flatten)]
-    device: TimedDeviceArgs,
+    device: DevicesOfRunArgs,
 }
 
 pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
@@ -111,8 +111,8 @@ pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
         map: map.as_ref(),
         point: "texel",
     };
-    let gpu = args.device.open(&reporter)?;
-    let lit = job.run(&gpu, &args.transport.stop, &mut keeper, &reporter, cancelled)?;
+    let mut gpus = args.device.open(&reporter)?;
+    let lit = job.run(&mut gpus, &args.transport.stop, &mut keeper, &reporter, cancelled)?;
 
     let estimates = estimates(&lit);
     let stops = args.exposure.unwrap_or_else(|| usual_exposure(&estimates));

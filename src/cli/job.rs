@@ -10,10 +10,14 @@ use super::keep::Keeper;
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::stop::{StopArgs, bias_before, check_bias, goals, rounds_after, up_to};
 use crate::engine::Control;
+use crate::engine::saved::SavedFilm;
+use crate::engine::scene::losses::losses;
 use crate::engine::scene::map_file::MapFile;
-use crate::engine::scene::{self, RunResult, View};
-use crate::error::Result;
+use crate::engine::scene::{self, RunResult, SceneFilm, View};
+use crate::engine::several_devices;
+use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::ledger::Fates;
 use crate::output::scene_report;
 use crate::plan::film::BiasPlan;
 use crate::plan::radius::mean_squared_radius;
@@ -23,6 +27,7 @@ use crate::records::Receiver;
 use crate::scene::geometry::Geometry;
 use crate::scene::{Camera, Scene};
 use crate::settings::scene::SceneSettings;
+use crate::settings::stop::Stop;
 use crate::text::counted;
 
 /// What a run prints.
@@ -78,13 +83,14 @@ impl Job<'_> {
     /// too.
     pub(super) fn run(
         &self,
-        gpu: &Gpu,
+        gpus: &mut Vec<Gpu>,
         stop: &StopArgs,
         keeper: &mut Keeper,
         reporter: &ProgressReporter,
         cancelled: &AtomicBool,
     ) -> Result<RunResult> {
         let Job { scene, geometry, sensor, camera, phases, map, point, .. } = *self;
+        let gpu = &gpus[0];
         let is_picture = matches!(sensor, Sensor::Picture { .. });
         let mut settings = self.settings.in_whole_blocks(is_picture);
         if let Some(most) = map.map(MapFile::rounds).filter(|most| settings.rounds > *most) {
@@ -102,20 +108,24 @@ impl Job<'_> {
             complain(&format!("warning: {warning}"));
         }
         self.announce(&plan, reporter);
-        let measure = |plan: &ScenePlan, factor_and_rounds| {
+        let measure = |gpu: &Gpu, plan: &ScenePlan, factor_and_rounds| {
             interruptible(|| scene::bias::measure(gpu, scene, &view, plan, factor_and_rounds, cancelled))
         };
         let alpha = settings.alpha;
         check_bias(&settings.stop, plan.film.bias)?;
         // The error asked for is noise and bias together, so what blocks do not tell must be known beforehand.
         let takes_extra_runs = stop.bias && plan.film.bias == BiasPlan::ExtraRuns;
-        let before = bias_before(&settings.stop, takes_extra_runs, alpha < 1.0, reporter, |rounds| measure(&plan, (1.0, rounds)))?;
+        let before = bias_before(&settings.stop, takes_extra_runs, alpha < 1.0, reporter, |rounds| measure(gpu, &plan, (1.0, rounds)))?;
         plan.settings.stop.bias = before.map(|bias| bias.upper);
 
         reporter.status("making the pipelines");
         let keep = keeper.keep(&scene.name);
         let mut control = Control { cancelled, progress: &mut |progress| reporter.report(progress, "round"), keep };
-        let mut lit = interruptible(|| scene::light_from(gpu, &view, plan, map, &mut control))?;
+        let mut lit = if gpus.len() == 1 {
+            interruptible(|| scene::light_from(gpu, &view, plan, map, &mut control))?
+        } else {
+            interruptible(|| self.share(gpus, &view, &plan, &mut control))?
+        };
         if lit.is_cancelled() {
             complain(&format!("ended early: the results are of {} of {}", counted(lit.film.rounds, "round"), settings.rounds));
             return Ok(lit);
@@ -126,11 +136,51 @@ impl Job<'_> {
             // At the radius whose square is the mean of the rounds' squares.
             None if takes_extra_runs => {
                 reporter.status("measuring the bias");
-                measure(&lit.plan, (shrunk.sqrt(), rounds_after(lit.film.rounds)))?
+                measure(&gpus[0], &lit.plan, (shrunk.sqrt(), rounds_after(lit.film.rounds)))?
             }
             None => None,
         };
         reporter.status("writing the results");
         Ok(lit)
+    }
+
+    /// Runs on several devices, for the first of which the plan was made.
+    fn share(&self, gpus: &mut Vec<Gpu>, view: &View, plan: &ScenePlan, control: &mut Control) -> Result<RunResult> {
+        let Job { scene, geometry, map, .. } = *self;
+        let facts = gpus[0].facts();
+        let first = (facts.name.clone(), facts.driver.clone());
+        let run = |gpu: &Gpu, stop: Stop, control: &mut Control| {
+            let is_alike = (&gpu.facts().name, &gpu.facts().driver) == (&first.0, &first.1);
+            let mut plan = if is_alike {
+                plan.clone()
+            } else {
+                let plan = scene::trial::plan(gpu, scene, view, &plan.settings, plan.sensor)?;
+                map.into_iter().try_fold(plan, |plan, map| map.plan(plan, geometry))?
+            };
+            plan.settings.stop = stop;
+            scene::light_from(gpu, view, plan, map, control)
+        };
+        let photons_per_round = plan.maps().map(|map| u64::from(map.photons)).sum();
+        let job = several_devices::Job {
+            run: &run,
+            film: |film| match film {
+                SavedFilm::Scene(film) => *film,
+                SavedFilm::Room(_) => unreachable!("a scene was lit"),
+            },
+            error: &|film: &SceneFilm| film.error(plan.film.confidence),
+            losses: &|film: &SceneFilm, fates: &[Fates]| losses(geometry, plan, fates, film),
+            given_up: &|gpu: &Gpu, error: &Error| {
+                complain(&format!("warning: {} is given up, and the others go on: {error}", gpu.facts().label()));
+            },
+            stop: plan.settings.stop,
+            alpha: plan.settings.alpha,
+            rounds: plan.settings.rounds,
+            rounds_per_block: plan.film.rounds_per_block,
+            bounces: plan.settings.bounces,
+            photons_per_round,
+        };
+        let lit = several_devices::run_on(gpus, &job, control)?;
+        // With its goals, which no device had.
+        Ok(RunResult { plan: plan.clone(), ..lit })
     }
 }

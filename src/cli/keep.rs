@@ -93,7 +93,7 @@ impl<'a> Keeper<'a> {
         let intervals = [self.checkpoint.as_ref().map(|_| self.every), self.snapshot.as_ref().map(|snapshot| snapshot.every)];
         let every = intervals.into_iter().flatten().min();
         let (share, resume) = (self.share, self.resume.take());
-        Keep { scene, share, resume, every: every.unwrap_or_default(), save: every.map(|_| self as &mut dyn SaveRun) }
+        Keep { scene, share, resume, every: every.unwrap_or_default(), save: every.map(|_| self as &mut dyn SaveRun), dealt: None }
     }
 
     /// Fails where the last checkpoint is not there.

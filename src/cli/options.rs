@@ -8,8 +8,8 @@ use super::progress::ProgressReporter;
 use super::values::{MathArg, parse_integer, parse_within};
 use super::{DeviceArgs, JsonArg, TimingArgs, optional_file};
 use crate::engine::run::RunResult;
-use crate::error::Result;
-use crate::gpu::{Gpu, Options};
+use crate::error::{Result, require};
+use crate::gpu::{DeviceFacts, Gpu, Options};
 use crate::output::destination::Destination;
 use crate::output::trace_file;
 
@@ -91,5 +91,58 @@ impl TimedDeviceArgs {
         let gpu = Gpu::open(&self.options())?;
         reporter.device(Some(&gpu));
         Ok(gpu)
+    }
+}
+
+/// The devices of a run that may have several.
+#[derive(Args)]
+pub(super) struct DevicesOfRunArgs {
+    #[command(flatten)]
+    pub(super) one: TimedDeviceArgs,
+    /// Share the run among several devices: `all` GPUs, or numbers as `photonmill devices` lists them. The result is that of one device,
+    /// to the bit; devices of different makes need --math strict
+    #[arg(long, value_name = "all|N,N,...", value_parser = parse_devices, allow_hyphen_values = true, conflicts_with = "device", help_heading = "Device")]
+    devices: Option<DeviceNumbers>,
+}
+
+#[derive(Debug, Clone)]
+enum DeviceNumbers {
+    All,
+    These(Vec<usize>),
+}
+
+fn parse_devices(text: &str) -> std::result::Result<DeviceNumbers, String> {
+    if text == "all" {
+        return Ok(DeviceNumbers::All);
+    }
+    let numbers: Option<Vec<usize>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
+    numbers
+        .map(DeviceNumbers::These)
+        .ok_or_else(|| "must be `all`, or numbers with commas between them, as `photonmill devices` lists them".into())
+}
+
+impl DevicesOfRunArgs {
+    /// The devices, the one that others join first.
+    pub(super) fn open(&self, reporter: &ProgressReporter) -> Result<Vec<Gpu>> {
+        let numbers = match &self.devices {
+            None => return self.one.open(reporter).map(|gpu| vec![gpu]),
+            Some(DeviceNumbers::These(numbers)) => numbers.clone(),
+            Some(DeviceNumbers::All) => {
+                let all = Gpu::list()?;
+                let usable = |facts: &&DeviceFacts| facts.lacks.is_empty();
+                let gpus = all.iter().filter(usable).filter(|facts| facts.kind != "cpu").map(|facts| facts.index).collect::<Vec<_>>();
+                // Where there is no GPU, what there is.
+                if gpus.is_empty() { all.iter().filter(usable).map(|facts| facts.index).take(1).collect() } else { gpus }
+            }
+        };
+        let options = |number: &usize| Options { device: Some(number.to_string()), ..self.one.options() };
+        let opened: Vec<Result<Gpu>> = std::thread::scope(|scope| {
+            let threads: Vec<_> = numbers.iter().map(|number| scope.spawn(move || Gpu::open(&options(number)))).collect();
+            threads.into_iter().map(|thread| thread.join().expect("opening a device does not panic")).collect()
+        });
+        let gpus = opened.into_iter().collect::<Result<Vec<Gpu>>>()?;
+        gpus.iter().for_each(|gpu| reporter.device(Some(gpu)));
+        require(!gpus.is_empty(), "--devices", "all", "names no device: there is none; see `photonmill devices`")?;
+        Ok(gpus)
     }
 }

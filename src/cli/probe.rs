@@ -8,7 +8,7 @@ use clap::Args;
 use glam::DVec3;
 
 use super::job::{Job, MessageArgs};
-use super::options::{ReportArgs, TimedDeviceArgs};
+use super::options::{DevicesOfRunArgs, ReportArgs};
 use super::progress::ProgressReporter;
 use super::scene::{SceneArgs, TransportArgs, geometry};
 use super::{End, complain, say_beside};
@@ -40,7 +40,7 @@ pub(super) struct ProbeArgs {
     #[command(flatten)]
     messages: MessageArgs,
     #[command(flatten)]
-    device: TimedDeviceArgs,
+    device: DevicesOfRunArgs,
 }
 
 impl ProbeArgs {
@@ -84,8 +84,8 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
         map: map.as_ref(),
         point: "point",
     };
-    let gpu = args.device.open(&reporter)?;
-    let lit = job.run(&gpu, &args.transport.stop, &mut keeper, &reporter, cancelled)?;
+    let mut gpus = args.device.open(&reporter)?;
+    let lit = job.run(&mut gpus, &args.transport.stop, &mut keeper, &reporter, cancelled)?;
     reporter.finish();
 
     let text = scene_report::text(&scene.name, &lit, job.point, args.messages.explain);

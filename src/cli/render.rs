@@ -8,7 +8,7 @@ use clap::Args;
 
 use super::job::{Job, MessageArgs};
 use super::keep::Snapshot;
-use super::options::{ReportArgs, TimedDeviceArgs};
+use super::options::{DevicesOfRunArgs, ReportArgs};
 use super::progress::ProgressReporter;
 use super::scene::{FilterArg, PictureArgs, Subject, ToneArg};
 use super::values::{parse_integer, parse_photon_name, parse_seconds, parse_stops};
@@ -64,12 +64,12 @@ pub(super) struct RenderArgs {
     /// Trace a single photon of this run, print its path, and exit; rounds and photons count from 0, and `:caustic` at the
     /// end takes a photon of the caustic map
     #[arg(long, value_name = "ROUND:PHOTON", value_parser = parse_photon_name, help_heading = "Checks",
-        conflicts_with_all = ["output", "error_image", "exposure", "tone", "judge", "explain", "json", "trace", "time_dispatches", "map"])]
+        conflicts_with_all = ["output", "error_image", "exposure", "tone", "judge", "explain", "json", "trace", "time_dispatches", "map", "devices"])]
     replay: Option<PhotonName>,
     #[command(flatten)]
     messages: MessageArgs,
     #[command(flatten)]
-    device: TimedDeviceArgs,
+    device: DevicesOfRunArgs,
 }
 
 impl RenderArgs {
@@ -128,7 +128,7 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
         map: map.as_ref(),
         point: "pixel",
     };
-    let gpu = args.device.open(&reporter)?;
+    let mut gpus = args.device.open(&reporter)?;
     let size = (*width, *height);
     let show = Show { size, exposure: args.exposure, tone: args.tone.map_or(Tone::default(), Tone::from) };
     let mut snapshot = |run: &SavedRun| match (&run.film, &picture, format) {
@@ -139,7 +139,7 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
         require((0.001..=1e6).contains(&seconds), "--snapshot", seconds, "must be from 1ms to 1000000s")?;
         keeper.set_snapshot(Some(Snapshot { every: Duration::from_secs_f64(seconds), write: &mut snapshot }));
     }
-    let lit = job.run(&gpu, stop, &mut keeper, &reporter, cancelled)?;
+    let lit = job.run(&mut gpus, stop, &mut keeper, &reporter, cancelled)?;
 
     let text = scene_report::text(&scene.name, &lit, job.point, args.messages.explain);
     let mut files = Vec::new();
@@ -175,7 +175,7 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
 fn show_photon(args: &RenderArgs, settings: &SceneSettings, name: PhotonName) -> Result<End> {
     let reporter = ProgressReporter::new(&args.messages.progress);
     let subject = args.picture.open(settings, &reporter)?;
-    let gpu = args.device.open(&reporter)?;
+    let gpu = args.device.one.open(&reporter)?;
     // A photon's path does not depend on the radius.
     let plan = ScenePlan::new(&subject.scene, &subject.geometry, settings, subject.sensor(), &engine::limits(gpu.facts()))?;
     let path = replay::replay(&gpu, &subject.geometry, &plan, name)?;

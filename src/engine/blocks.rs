@@ -1,6 +1,7 @@
 //! Which blocks of a run are done, and which of them are whose to do.
 
 use std::ops::Range;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use serde::{Deserialize, Serialize};
 
@@ -102,9 +103,87 @@ impl Blocks {
     }
 }
 
+/// Deals the blocks of a run to several devices: the next one to whichever asks.
+#[derive(Debug)]
+pub struct Dealer(Mutex<Dealing>);
+
+#[derive(Debug)]
+struct Dealing {
+    blocks: Vec<u32>,
+    dealt: u32,
+    /// Before so many blocks are passed, in this order, a device hands over what it has done.
+    looks: Vec<u32>,
+    /// Of each device, how many of these it has come past.
+    behind: Vec<usize>,
+}
+
+impl Dealer {
+    /// `looks` come after so many of the blocks, in rising order.
+    pub fn new(blocks: Vec<u32>, devices: usize, looks: impl Iterator<Item = u32>) -> Dealer {
+        let count = blocks.len() as u32;
+        Dealer(Mutex::new(Dealing { blocks, dealt: 0, looks: looks.take_while(|look| *look < count).collect(), behind: vec![0; devices] }))
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Dealing> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// A block for a device, and whether it must hand over before that what it has done.
+    pub fn next(&self, device: usize) -> Option<(u32, bool)> {
+        let mut dealing = self.lock();
+        let Dealing { blocks, dealt, looks, behind } = &mut *dealing;
+        let block = *blocks.get(*dealt as usize)?;
+        let passed = looks.partition_point(|look| *look <= *dealt);
+        let hands_over = passed > behind[device];
+        behind[device] = passed;
+        *dealt += 1;
+        Some((block, hands_over))
+    }
+
+    /// Looks that a device has come past.
+    pub fn looks_behind(&self, device: usize) -> usize {
+        self.lock().behind[device]
+    }
+
+    /// Looks before which all blocks are dealt.
+    pub fn looks_dealt(&self) -> usize {
+        let dealing = self.lock();
+        dealing.looks.partition_point(|look| *look <= dealing.dealt)
+    }
+
+    /// Has all devices hand over before the next block that each takes.
+    pub fn look_now(&self) {
+        let mut dealing = self.lock();
+        let (dealt, place) = (dealing.dealt, dealing.looks.partition_point(|look| *look <= dealing.dealt));
+        dealing.looks.insert(place, dealt);
+    }
+
+    /// Deals no more.
+    pub fn close(&self) {
+        let mut dealing = self.lock();
+        let dealt = dealing.dealt as usize;
+        dealing.blocks.truncate(dealt);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Between two looks devices may take what they will; each hands over before its first block behind a look.
+    #[test]
+    fn devices_hand_over_before_they_pass_a_look() {
+        let dealer = Dealer::new((10..20).collect(), 3, [2, 5, 40].into_iter());
+        assert_eq!([0, 0, 1].map(|device| dealer.next(device)), [Some((10, false)), Some((11, false)), Some((12, true))]);
+        assert_eq!((dealer.looks_behind(0), dealer.looks_behind(1), dealer.looks_dealt()), (0, 1, 1));
+        assert_eq!([1, 0].map(|device| dealer.next(device)), [Some((13, false)), Some((14, true))]);
+        // Two looks at once, for one that took long; and one that was not foreseen.
+        assert_eq!((dealer.next(2), dealer.looks_behind(2)), (Some((15, true)), 2));
+        dealer.look_now();
+        assert_eq!([2, 2, 0].map(|device| dealer.next(device)), [Some((16, true)), Some((17, false)), Some((18, true))]);
+        dealer.close();
+        assert_eq!((dealer.next(0), dealer.looks_behind(0), dealer.looks_behind(1)), (None, 3, 1));
+    }
 
     fn blocks(numbers: impl IntoIterator<Item = u32>) -> Blocks {
         let mut blocks = Blocks::default();

@@ -19,6 +19,7 @@ pub mod room;
 pub mod run;
 pub mod saved;
 pub mod scene;
+pub mod several_devices;
 pub mod tallies;
 pub mod totals;
 pub mod unknown;

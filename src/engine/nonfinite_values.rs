@@ -42,6 +42,14 @@ impl NonfiniteValues {
         if paranoid { NonfiniteValues::read(commands, buffer).map(Some) } else { Ok(None) }
     }
 
+    /// Of two devices that shared a run.
+    pub fn both(one: Option<NonfiniteValues>, other: Option<NonfiniteValues>) -> Option<NonfiniteValues> {
+        let (Some(mut one), Some(other)) = (one, other) else { return None };
+        one.count = one.count.saturating_add(other.count);
+        one.first.extend(other.first);
+        Some(one)
+    }
+
     fn read(commands: &mut Commands, buffer: &Buffer<u32>) -> Result<NonfiniteValues> {
         let words = commands.read(buffer, buffer.count() as usize)?;
         let mut nonfinite_values = NonfiniteValues::default();

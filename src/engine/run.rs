@@ -1,11 +1,12 @@
 //! The one loop over rounds, of every run: until something ends it, with the fate of every photon.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use super::bias::Bias;
-use super::blocks::{Blocks, Share};
+use super::blocks::{Blocks, Dealer, Share};
 use super::error_bound::FilmError;
 use super::identity::Identity;
 use super::nonfinite_values::NonfiniteValues;
@@ -32,6 +33,8 @@ pub struct RunResult<Plan, Film> {
     pub timings: Timings,
     /// `None` for the CPU builder.
     pub device: Option<DeviceFacts>,
+    /// Those that shared the run with it.
+    pub more_devices: Vec<DeviceFacts>,
     pub end: End,
     /// The bias of the radius from extra runs; `None` without these.
     pub bias: Option<Bias>,
@@ -149,6 +152,9 @@ pub struct RunState<'a> {
     /// Of the blocks of which the film keeps more, the latest number by its place.
     pub kept: BTreeMap<u32, u32>,
     share: Share,
+    /// Where blocks come from that several devices share, and whether what is done must be handed over before the next one.
+    dealt: Option<(Arc<Dealer>, usize)>,
+    hands_over: bool,
     /// When the run was saved last.
     saved: Instant,
     /// Submissions at the latest look.
@@ -165,6 +171,10 @@ pub fn run<W: World, Plan: Clone>(
     control: &mut Control,
 ) -> Result<RunResult<Plan, W::Film>> {
     let mut state = RunState::new(task, &recorder, control)?;
+    // What was saved may be enough, or have to be handed over.
+    if state.end.is_none() && (state.hands_over || state.watch.may_end(state.blocks(), state.emitted)) {
+        state.pause(&mut world, &mut recorder, control)?;
+    }
     while state.end.is_none() {
         let mut is_cut = false;
         let round = recorder.round(|recorder| {
@@ -206,6 +216,7 @@ pub fn run<W: World, Plan: Clone>(
         left_out: if state.blocks() > 0 { state.emitted - state.emitted_of_blocks } else { 0 },
         fates: state.fates().to_vec(),
         device: device.map(|(gpu, _)| gpu.facts().clone()),
+        more_devices: Vec::new(),
         end: state.end.expect("the run has ended"),
         bias: None,
         dispatches,
@@ -256,6 +267,8 @@ impl<'a> RunState<'a> {
             rounds_of_block: 0,
             kept: BTreeMap::new(),
             share,
+            dealt: control.keep.dealt.take(),
+            hands_over: false,
             saved: Instant::now(),
             submissions: recorder.counts()[1],
             end: None,
@@ -288,8 +301,12 @@ impl<'a> RunState<'a> {
     fn begin_block(&mut self) {
         self.rounds_of_block = 0;
         let from = if self.done.contains(self.block) { self.block } else { 0 };
-        match self.share.next(from, &self.done, self.wanted()) {
-            Some(block) => self.block = block,
+        let next = match &self.dealt {
+            Some((dealer, device)) => dealer.next(*device),
+            None => self.share.next(from, &self.done, self.wanted()).map(|block| (block, false)),
+        };
+        match next {
+            Some((block, hands_over)) => (self.block, self.hands_over) = (block, hands_over),
             None => self.end = Some(self.end_of_rounds()),
         }
     }
@@ -405,13 +422,14 @@ impl<'a> RunState<'a> {
 
     /// Runs what is recorded where that is due, looks at it, and says whether the run ends.
     fn pause<W: World>(&mut self, world: &mut W, recorder: &mut W::Recorder, control: &mut Control) -> Result<bool> {
-        let saves = control.keep.save.is_some() && self.is_between_blocks() && self.saved.elapsed() >= control.keep.every;
+        let is_due = self.hands_over || self.saved.elapsed() >= control.keep.every;
+        let saves = control.keep.save.is_some() && self.is_between_blocks() && is_due;
         if !saves && !self.is_due(world, recorder) {
             return Ok(self.end.is_some());
         }
         self.collect(world, recorder, false)?;
         let whole = self.is_between_blocks();
-        if whole && self.watch.is_due(self.blocks()) {
+        if whole && self.dealt.is_none() && self.watch.is_due(self.blocks()) {
             let film = world.film(recorder, self)?;
             self.watch.look(&world.error(&film), world.losses(&film, self.fates()).relative);
             self.watch.check_error(self.task.bounces)?;
@@ -420,6 +438,7 @@ impl<'a> RunState<'a> {
             let film = world.film(recorder, self)?;
             control.keep.save.iter_mut().try_for_each(|save| save.save(&self.saved_run(film.clone().into()), false))?;
             self.saved = Instant::now();
+            self.hands_over = false;
         }
         self.submissions = recorder.counts()[1];
         (control.progress)(&self.progress());

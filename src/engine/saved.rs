@@ -80,6 +80,11 @@ impl SavedRun {
         Ok(())
     }
 
+    /// Photons of its blocks, of all maps.
+    pub fn emitted(&self) -> u64 {
+        self.fates.iter().map(|fates| fates.emitted).sum()
+    }
+
     /// Blocks that it should have and does not.
     pub fn missing(&self) -> u32 {
         self.share.missing(&self.done, self.wanted)

@@ -1,10 +1,11 @@
 //! When a run ends before its last round: at an error (`--error`), at a time, or at a number of photons, whichever comes first.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
-use super::blocks::Share;
+use super::blocks::{Dealer, Share};
 use super::error_bound::{FilmError, bound_of_both, error_bound};
 use super::identity::Identity;
 use super::saved::SavedRun;
@@ -25,6 +26,9 @@ pub struct Control<'a> {
 
 /// Takes a run as far as whole blocks are done.
 pub trait SaveRun {
+    /// Told once what the run computes, before its first block.
+    fn begins(&mut self, _: &Identity) {}
+
     /// `is_last`: the run has ended. An error ends it.
     fn save(&mut self, run: &SavedRun, is_last: bool) -> Result<()>;
 }
@@ -41,6 +45,8 @@ pub struct Keep<'a> {
     /// Between two calls of `save`, which is also called at the end.
     pub every: Duration,
     pub save: Option<&'a mut dyn SaveRun>,
+    /// Where blocks come from that several devices share, and the number of this one.
+    pub dealt: Option<(Arc<Dealer>, usize)>,
 }
 
 impl<'a> Control<'a> {
@@ -59,16 +65,19 @@ impl Keep<'_> {
 
     /// Whether the first block to be done may be another than block 0.
     pub fn begins_later(&self) -> bool {
-        self.share.number > 0 || self.resume.is_some()
+        self.share.number > 0 || self.resume.is_some() || self.dealt.is_some()
     }
 
     /// The identity of the run, which takes a while to find out, where anybody asks. Fails where the file that it is to go on with is
     /// of another one.
-    pub fn identity(&self, of_run: impl FnOnce(&str) -> Identity) -> Result<Option<Identity>> {
+    pub fn identity(&mut self, of_run: impl FnOnce(&str) -> Identity) -> Result<Option<Identity>> {
         if self.save.is_none() && self.resume.is_none() {
             return Ok(None);
         }
         let identity = of_run(self.scene);
+        if let Some(save) = &mut self.save {
+            save.begins(&identity);
+        }
         if let Some((path, saved)) = &self.resume {
             if let Some(difference) = identity.differs_from(&saved.identity) {
                 return Err(Error::setting("--resume", path.display(), difference));
@@ -121,6 +130,15 @@ pub enum End {
 /// quarter, as each is one more chance to stop too early; they are the same in every run.
 const FIRST_LOOK: u32 = 16;
 
+fn next_look(look: u32) -> u32 {
+    look + (look / 4).max(1)
+}
+
+/// Numbers of blocks after which the error is looked at, from so many on.
+pub fn looks(blocks: u32) -> impl Iterator<Item = u32> {
+    std::iter::successors(Some(FIRST_LOOK), |look| Some(next_look(*look))).skip_while(move |look| *look < blocks)
+}
+
 /// Watches a run: how long it has taken, and how large its error still is.
 pub struct Watch {
     stop: Stop,
@@ -157,9 +175,7 @@ impl Watch {
 
     /// Looks at no film of fewer blocks: those that were done before have been looked at.
     pub fn go_on(&mut self, blocks: u32) {
-        while self.next_look < blocks {
-            self.next_look += (self.next_look / 4).max(1);
-        }
+        self.next_look = looks(blocks).next().expect("looks have no end");
     }
 
     /// Whether the film should be read after so many blocks.
@@ -183,7 +199,7 @@ impl Watch {
         let noise = [noise, error_bound(noise, freedom, self.stop.confidence)];
         let bias = error.bias.map_or([0.0; 3], |bias| [bias.lower, bias.relative, bias.upper]);
         self.seen = Some(Look { rounds, noise, unknown: unknown.relative, unseen, bias, lost });
-        self.next_look = blocks + (blocks / 4).max(1);
+        self.next_look = next_look(blocks);
     }
 
     /// Noise, bias, what is unknown and what is unseen together at the latest look.

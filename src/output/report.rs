@@ -25,6 +25,8 @@ pub(super) struct Common<'a, Settings> {
     /// Device name; `cpu` for the CPU builder.
     device: &'a str,
     driver: &'a str,
+    /// Those that shared the run with it.
+    more_devices: Vec<&'a str>,
     settings: &'a Settings,
     /// Why it ended, and rounds that the result holds.
     end: End,
@@ -80,6 +82,7 @@ pub(super) fn common<'a, Plan, Film, Settings>(
         photonmill: env!("CARGO_PKG_VERSION"),
         device: run.device_name(),
         driver: run.device.as_ref().map_or(driver, |facts| &facts.driver),
+        more_devices: run.more_devices.iter().map(|facts| facts.name.as_str()).collect(),
         settings,
         end: run.end,
         rounds: error.rounds,

@@ -9,7 +9,6 @@ use super::report::{Common, common, end_in_words, ending, ledger, losses};
 use crate::constants::MAX_BOUNCES;
 use crate::engine::End;
 use crate::engine::scene::RunResult;
-use crate::gpu::DeviceFacts;
 use crate::ledger::Ledger;
 use crate::plan::evidence::EffectDecision;
 use crate::plan::radius::{RadiusFrom, Trial};
@@ -205,7 +204,7 @@ pub fn json(scene: &str, lit: &RunResult) -> Vec<u8> {
 pub fn text(scene: &str, lit: &RunResult, point: &str, explain: bool) -> String {
     let mut text = String::new();
     let settings = &lit.plan.settings;
-    writeln!(text, "{}", lit.device.as_ref().map_or_else(String::new, DeviceFacts::label)).unwrap();
+    lit.device.iter().chain(&lit.more_devices).for_each(|facts| writeln!(text, "{}", facts.label()).unwrap());
     let maps: Vec<String> = lit.plan.maps().map(|map| counted(map.photons, &format!("{} photon", map.name))).collect();
     let maps = if maps.is_empty() { "no photons".to_owned() } else { maps.join(" and ") };
     let capped = if settings.bounces < MAX_BOUNCES { format!(", at most {}", counted(settings.bounces, "bounce")) } else { String::new() };

@@ -63,7 +63,7 @@ fn task<'a>(plan: &RoomPlan, device: Option<(&'a Gpu, usize)>, identity: Option<
 }
 
 /// What a run of the box computes, where it is kept.
-fn identity(keep: &Keep, scene: &RoomScene, plan: &RoomPlan, device: Option<&DeviceFacts>) -> Result<Option<Identity>> {
+fn identity(keep: &mut Keep, scene: &RoomScene, plan: &RoomPlan, device: Option<&DeviceFacts>) -> Result<Option<Identity>> {
     let settings = &plan.settings;
     let identity = keep.identity(|name| {
         let (mut content, mut found) = (Hash::default(), Hash::default());

@@ -46,7 +46,7 @@ struct RoomOnCpu<'a> {
 pub fn on_cpu(scene: &RoomScene, settings: &RoomSettings, control: &mut Control) -> Result<RunResult> {
     let clock = HostClock::start("run");
     let plan = &RoomPlan { is_kept: control.keep.is_used(), ..plan(scene, settings)? };
-    let identity = super::identity(&control.keep, scene, plan, None)?;
+    let identity = super::identity(&mut control.keep, scene, plan, None)?;
     let pool = thread_pool(settings)?;
     let film = match &control.keep.resume {
         Some((_, SavedRun { film: SavedFilm::Room(film), .. })) => film.clone(),

@@ -34,7 +34,7 @@ struct RoomOnGpu<'a> {
 pub fn on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings, control: &mut Control) -> Result<RunResult> {
     let started = Instant::now();
     let plan = RoomPlan { is_kept: control.keep.is_used(), ..RoomPlan::new(scene, settings, &engine::limits(gpu.facts()))? };
-    let identity = super::identity(&control.keep, scene, &plan, Some(gpu.facts()))?;
+    let identity = super::identity(&mut control.keep, scene, &plan, Some(gpu.facts()))?;
     estimate::check_sums(&plan, gpu.facts())?;
     let (mut commands, pipelines_before) = run::commands(gpu, &modules(&plan, gpu), constants(&plan), settings.math, started)?;
     let resources = commands.scope("set-up", |commands| RoomResources::new(gpu, commands, scene, &plan))?;

@@ -1,0 +1,389 @@
+//! A run on several devices: each takes the next block when it is done with one, and integer sums make one film of all, to the bits
+//! of a run on one device.
+//!
+//! Whether the run ends is decided where a run on one device would: after so many blocks, in the order in which they were dealt. Before
+//! a device takes its first block beyond such a look, it hands over what it has. Once all have, these add up to the blocks before the
+//! look and no others; what was done since is left out if the run ends there. A device that fails is given up: the others go on from
+//! the last look.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use super::blocks::Dealer;
+use super::error_bound::FilmError;
+use super::identity::Identity;
+use super::nonfinite_values::NonfiniteValues;
+use super::run::RunResult;
+use super::saved::{SavedFilm, SavedRun};
+use super::watch::{Control, End, Keep, Progress, SaveRun, Watch, looks};
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::ledger::{Fates, Ledger, Losses};
+use crate::settings::stop::Stop;
+
+/// What is run, in either world.
+pub struct Job<'a, Plan, Film> {
+    /// Runs on one device until a goal is reached, or as long as it is dealt blocks.
+    pub run: &'a (dyn Fn(&Gpu, Stop, &mut Control) -> Result<RunResult<Plan, Film>> + Sync),
+    pub film: fn(SavedFilm) -> Film,
+    pub error: &'a dyn Fn(&Film) -> FilmError,
+    pub losses: &'a dyn Fn(&Film, &[Fates]) -> Losses,
+    /// Told of a device that failed and is given up, and why.
+    pub given_up: &'a dyn Fn(&Gpu, &Error),
+    pub stop: Stop,
+    pub alpha: f64,
+    pub rounds: u32,
+    pub rounds_per_block: u32,
+    pub bounces: u32,
+    pub photons_per_round: u64,
+}
+
+/// What a device says.
+enum Event<Plan, Film> {
+    Begins(Box<Identity>),
+    Progress(Box<Progress>),
+    /// What it has done before so many looks.
+    Saved(usize, Box<SavedRun>),
+    Ended(Box<Result<RunResult<Plan, Film>>>),
+}
+
+/// Hands over what a device has done.
+struct HandOver<'a, Plan, Film> {
+    device: usize,
+    dealer: &'a Dealer,
+    events: Sender<(usize, Event<Plan, Film>)>,
+}
+
+impl<Plan, Film> SaveRun for HandOver<'_, Plan, Film> {
+    fn begins(&mut self, identity: &Identity) {
+        // Nobody listens any more: the run ends anyway.
+        let _ = self.events.send((self.device, Event::Begins(Box::new(identity.clone()))));
+    }
+
+    fn save(&mut self, run: &SavedRun, is_last: bool) -> Result<()> {
+        let looks = if is_last { usize::MAX } else { self.dealer.looks_behind(self.device) };
+        let _ = self.events.send((self.device, Event::Saved(looks, Box::new(run.clone()))));
+        Ok(())
+    }
+}
+
+/// What is known of a device.
+struct Known<Plan, Film> {
+    identity: Option<Identity>,
+    progress: Progress,
+    /// What it had done before so many looks, in their order; `None`: nothing.
+    saved: Vec<(usize, Option<SavedRun>)>,
+    result: Option<RunResult<Plan, Film>>,
+    is_over: bool,
+}
+
+/// How some devices ended together.
+enum Outcome<Plan, Film> {
+    Ended(Box<RunResult<Plan, Film>>),
+    /// One failed; the others were stopped. With what all had done at the last look.
+    Failed {
+        device: usize,
+        error: Error,
+        base: Option<SavedRun>,
+    },
+}
+
+/// Between two looks at the clock and at what the user wants.
+const PAUSE: Duration = Duration::from_millis(20);
+
+/// Runs a job on several devices to its end.
+pub fn run_on<Plan, Film>(gpus: &mut Vec<Gpu>, job: &Job<Plan, Film>, control: &mut Control) -> Result<RunResult<Plan, Film>>
+where
+    Plan: Send,
+    Film: Clone + Send,
+{
+    let blocks = job.rounds.div_ceil(job.rounds_per_block);
+    if control.keep.share.count(blocks) < 2 {
+        return (job.run)(&gpus[0], job.stop, control);
+    }
+    let started = Instant::now();
+    let mut base = control.keep.resume.take();
+    loop {
+        let resumed = base.clone();
+        let attempt = Together { job, started, blocks };
+        match attempt.run(gpus, base, control)? {
+            Outcome::Ended(result) => return Ok(*result),
+            Outcome::Failed { error, .. } if gpus.len() == 1 => return Err(error),
+            Outcome::Failed { device, error, base: so_far } => {
+                (job.given_up)(&gpus[device], &error);
+                gpus.remove(device);
+                base = so_far.map(|run| (resumed.as_ref().map(|(path, _)| path.clone()).unwrap_or_default(), run)).or(resumed);
+            }
+        }
+    }
+}
+
+/// One attempt.
+struct Together<'a, Plan, Film> {
+    job: &'a Job<'a, Plan, Film>,
+    started: Instant,
+    blocks: u32,
+}
+
+/// How far an attempt has come.
+struct Attempt<'a, Plan, Film> {
+    devices: Vec<Known<Plan, Film>>,
+    dealer: &'a Dealer,
+    watch: Watch,
+    most_rounds: u32,
+    /// The next look.
+    look: usize,
+    /// All of it at the last look.
+    base: Option<SavedRun>,
+    end: Option<End>,
+    /// When it was saved last, and whether it is about to be.
+    saved: Instant,
+    saves: bool,
+    /// Why nothing comes of it: a device that failed, or one that cannot take part.
+    failed: Option<(usize, Error)>,
+    refused: Option<Error>,
+    /// Numbers of the devices, as the user knows them.
+    numbers: Vec<usize>,
+}
+
+impl<Plan: Send, Film: Clone + Send> Together<'_, Plan, Film> {
+    fn run(&self, gpus: &mut [Gpu], resume: Option<(std::path::PathBuf, SavedRun)>, control: &mut Control) -> Result<Outcome<Plan, Film>> {
+        let job = self.job;
+        let share = control.keep.share;
+        let done = resume.as_ref().map(|(_, run)| run.done.clone()).unwrap_or_default();
+        let most = job.stop.photons.map_or(self.blocks, |photons| {
+            let of_block = (job.photons_per_round * u64::from(job.rounds_per_block)).max(1);
+            photons.div_ceil(of_block).min(u64::from(self.blocks)) as u32
+        });
+        let mut order: Vec<u32> = (share.number..self.blocks).step_by(share.of as usize).filter(|block| !done.contains(*block)).collect();
+        order.truncate(most.saturating_sub(done.count()) as usize);
+        let all = order.len() as u32;
+        let dealer = Arc::new(Dealer::new(order, gpus.len(), looks(done.count()).map(|look| look - done.count())));
+        let cancelled = AtomicBool::new(false);
+        let (events, received) = channel();
+        let mut attempt = Attempt {
+            devices: gpus.iter().map(|_| Known::new()).collect(),
+            dealer: &dealer,
+            watch: Watch::new(job.stop, job.alpha, job.rounds_per_block, self.started),
+            most_rounds: (done.count() + all) * job.rounds_per_block,
+            look: 0,
+            base: resume.as_ref().map(|(_, run)| run.clone()),
+            end: None,
+            saved: Instant::now(),
+            saves: false,
+            failed: None,
+            refused: None,
+            numbers: gpus.iter().map(|gpu| gpu.facts().index).collect(),
+        };
+        attempt.watch.go_on(done.count());
+        let scene = control.keep.scene;
+        let (resume, run) = (Mutex::new(resume), job.run);
+        let no_goal = Stop { error: None, seconds: None, photons: None, ..job.stop };
+        std::thread::scope(|scope| {
+            for (device, gpu) in gpus.iter_mut().enumerate() {
+                let (dealer, events, cancelled, resume) = (&dealer, events.clone(), &cancelled, &resume);
+                scope.spawn(move || {
+                    let mut hand_over = HandOver { device, dealer, events: events.clone() };
+                    let tell = |progress: &Progress| drop(events.send((device, Event::Progress(Box::new(progress.clone())))));
+                    let resume = if device == 0 { resume.lock().unwrap_or_else(PoisonError::into_inner).take() } else { None };
+                    let dealt = Some((dealer.clone(), device));
+                    let keep = Keep { scene, share, resume, every: Duration::MAX, save: Some(&mut hand_over), dealt };
+                    let result = run(gpu, no_goal, &mut Control { cancelled, progress: &mut { tell }, keep });
+                    let _ = events.send((device, Event::Ended(Box::new(result))));
+                });
+            }
+            drop(events);
+            self.watch_over(&mut attempt, &received, &cancelled, control)
+        })?;
+        let base = attempt.base.take();
+        if let Some((device, error)) = attempt.failed.take() {
+            return Ok(Outcome::Failed { device, error, base });
+        }
+        let run = match attempt.end {
+            Some(End::Error) => base,
+            _ => attempt.merged(usize::MAX - 1)?,
+        };
+        let run = run.filter(|run| !run.done.is_empty()).ok_or(Error::Interrupted)?;
+        let is_whole = run.done.count() == done.count() + all;
+        let end = match attempt.end {
+            Some(End::Error) => End::Error,
+            _ if is_whole && job.stop.photons.is_some_and(|photons| run.emitted() >= photons) => End::Photons,
+            _ if is_whole => End::Rounds,
+            end => end.unwrap_or(End::Cancelled),
+        };
+        if let Some(save) = control.keep.save.as_mut() {
+            save.save(&run, true)?;
+        }
+        Ok(Outcome::Ended(Box::new(self.result(attempt, run, end))))
+    }
+
+    /// Until all devices are over.
+    fn watch_over(
+        &self,
+        attempt: &mut Attempt<Plan, Film>,
+        received: &Receiver<(usize, Event<Plan, Film>)>,
+        cancelled: &AtomicBool,
+        control: &mut Control,
+    ) -> Result<()> {
+        let mut failed = Ok(());
+        while attempt.devices.iter().any(|device| !device.is_over) {
+            match received.recv_timeout(PAUSE) {
+                Ok((device, event)) => attempt.take(device, event),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => break,
+            }
+            if let Some(error) = attempt.refused.take() {
+                failed = Err(error);
+            }
+            let is_ending = attempt.end.is_some() || attempt.failed.is_some() || failed.is_err();
+            if is_ending {
+                if attempt.end != Some(End::Time) || control.cancelled.load(Ordering::Relaxed) {
+                    cancelled.store(true, Ordering::Relaxed);
+                }
+                attempt.dealer.close();
+                continue;
+            }
+            if let Err(error) = self.look(attempt, control) {
+                failed = Err(error);
+                continue;
+            }
+            if control.cancelled.load(Ordering::Relaxed) {
+                attempt.end = Some(End::Cancelled);
+            } else if attempt.watch.is_late() {
+                // Blocks under way are done, so that none is missing before the last.
+                attempt.end = Some(End::Time);
+            }
+            if control.keep.save.is_some() && !attempt.saves && attempt.saved.elapsed() >= control.keep.every {
+                attempt.dealer.look_now();
+                attempt.saves = true;
+            }
+            (control.progress)(&self.progress(attempt));
+        }
+        failed
+    }
+
+    /// Looks as far as all devices have handed over what they had done before.
+    fn look(&self, attempt: &mut Attempt<Plan, Film>, control: &mut Control) -> Result<()> {
+        while attempt.end.is_none() && attempt.look < attempt.dealer.looks_dealt() && attempt.is_known(attempt.look) {
+            let Some(run) = attempt.merged(attempt.look)? else { return Ok(()) };
+            attempt.look += 1;
+            attempt.forget();
+            let blocks = run.done.count();
+            if attempt.watch.is_due(blocks) {
+                let film = (self.job.film)(run.film.clone());
+                attempt.watch.look(&(self.job.error)(&film), (self.job.losses)(&film, &run.fates).relative);
+                attempt.watch.check_error(self.job.bounces)?;
+                attempt.end = attempt.watch.end(blocks, 0);
+            }
+            if let Some(save) = control.keep.save.as_mut() {
+                save.save(&run, false)?;
+                (attempt.saved, attempt.saves) = (Instant::now(), false);
+            }
+            attempt.base = Some(run);
+        }
+        Ok(())
+    }
+
+    fn progress(&self, attempt: &Attempt<Plan, Film>) -> Progress {
+        let all = || attempt.devices.iter().map(|device| &device.progress);
+        let rounds: u64 = all().map(|progress| progress.done).sum();
+        let ledger = all().fold(Ledger::default(), |sum, progress| sum.plus(&progress.ledger));
+        attempt.watch.progress(rounds as f64, attempt.most_rounds, self.job.photons_per_round, ledger)
+    }
+
+    /// The result of all, in place of that of the first device.
+    fn result(&self, attempt: Attempt<Plan, Film>, run: SavedRun, end: End) -> RunResult<Plan, Film> {
+        let mut results = attempt.devices.into_iter().filter_map(|device| device.result);
+        let mut result = results.next().expect("a device has ended well");
+        let mut traced = result.ledger().emitted + result.left_out;
+        for other in results {
+            traced += other.ledger().emitted + other.left_out;
+            result.dispatches += other.dispatches;
+            result.submissions += other.submissions;
+            result.pipelines += other.pipelines;
+            result.timings.join(&other.timings);
+            result.nonfinite_values = NonfiniteValues::both(result.nonfinite_values, other.nonfinite_values);
+            result.more_devices.extend(other.device);
+        }
+        let film = (self.job.film)(run.film);
+        RunResult {
+            left_out: traced.saturating_sub(run.fates.iter().map(|fates| fates.emitted).sum()),
+            losses: (self.job.losses)(&film, &run.fates),
+            film,
+            fates: run.fates,
+            end,
+            ..result
+        }
+    }
+}
+
+impl<Plan, Film> Attempt<'_, Plan, Film> {
+    fn take(&mut self, device: usize, event: Event<Plan, Film>) {
+        let own = &mut self.devices[device];
+        match event {
+            Event::Progress(progress) => own.progress = *progress,
+            Event::Saved(looks, run) => own.saved.push((looks, Some(*run).filter(|run| !run.done.is_empty()))),
+            Event::Begins(identity) => {
+                own.identity = Some(*identity);
+                let known: Vec<&Identity> = self.devices.iter().filter_map(|device| device.identity.as_ref()).collect();
+                let difference = known.iter().find_map(|other| known[0].differs_from(other));
+                if let Some(difference) = difference {
+                    self.refused =
+                        Some(Error::setting("--devices", self.numbers[device], format!("cannot take part: what it computes {difference}")));
+                }
+            }
+            Event::Ended(result) => {
+                own.is_over = true;
+                // What it has last stands for all looks that it has not come to.
+                if own.saved.last().is_none_or(|(looks, _)| *looks != usize::MAX) {
+                    own.saved.push((usize::MAX, None));
+                }
+                match *result {
+                    Ok(result) => own.result = Some(result),
+                    // It was stopped before it had anything.
+                    Err(Error::Interrupted) => {}
+                    Err(error) => drop(self.failed.get_or_insert((device, error))),
+                }
+            }
+        }
+    }
+
+    fn is_known(&self, look: usize) -> bool {
+        self.devices.iter().all(|device| device.at(look).is_some())
+    }
+
+    /// What all had done before a look, added up.
+    fn merged(&self, look: usize) -> Result<Option<SavedRun>> {
+        let mut all: Option<SavedRun> = None;
+        for run in self.devices.iter().filter_map(|device| device.at(look)?.as_ref()) {
+            let Some(sum) = &mut all else {
+                all = Some(run.clone());
+                continue;
+            };
+            let share = sum.share;
+            sum.merge(run).expect("each block is dealt once");
+            sum.share = share;
+        }
+        Ok(all)
+    }
+
+    /// Drops what no later look needs.
+    fn forget(&mut self) {
+        for device in &mut self.devices {
+            device.saved.retain(|(looks, _)| *looks > self.look);
+        }
+    }
+}
+
+impl<Plan, Film> Known<Plan, Film> {
+    fn new() -> Known<Plan, Film> {
+        Known { identity: None, progress: Progress::default(), saved: Vec::new(), result: None, is_over: false }
+    }
+
+    /// What it had done before a look, if that is known.
+    fn at(&self, look: usize) -> Option<&Option<SavedRun>> {
+        self.saved.iter().find(|(looks, _)| *looks > look).map(|(_, run)| run)
+    }
+}
