@@ -32,6 +32,7 @@ const LINE: &[&[&str]] = &[
     &["engine::watch", "engine::replay"],
     &["engine::bias_batches"],
     &["engine::run"],
+    &["engine::several_devices"],
     &["engine::room", "engine::scene"],
     &["engine::choose_builder"],
     &["output", "verify::selfcheck"],

@@ -10,6 +10,7 @@ use photonmill::engine::room;
 use photonmill::engine::saved::{SavedFilm, SavedRun};
 use photonmill::engine::scene::{self, RunResult, View, trial};
 use photonmill::engine::watch::{Keep, SaveRun};
+use photonmill::settings::stop::Stop;
 
 /// Keeps the latest of what is saved.
 #[derive(Default)]
@@ -44,7 +45,7 @@ fn kept(gpu: &Gpu, name: &str, settings: &SceneSettings, part: Part) -> (RunResu
         }
     };
     let resume = part.resume.map(|run| (PathBuf::from("a file"), run));
-    let keep = Keep { scene: name, share: part.share, resume, every: Duration::ZERO, save: Some(&mut latest) };
+    let keep = Keep { scene: name, share: part.share, resume, every: Duration::ZERO, save: Some(&mut latest), dealt: None };
     let lit = scene::light(gpu, &view, plan, &mut Control { cancelled: &cancelled, progress: &mut watch, keep }).unwrap();
     (lit, latest.0.expect("a block was done"))
 }
@@ -88,6 +89,23 @@ fn parts_of_a_run_come_to_the_bits_of_one() {
     }
 }
 
+/// A run that goes on looks at its error where one without a break does, at once if it was saved there.
+#[test]
+fn what_goes_on_ends_at_the_same_look() {
+    let Some(gpu) = device() else { return };
+    let wanted = Stop { error: Some(0.5), ..Stop::default() };
+    let settings = SceneSettings { stop: wanted, ..small(1, 400) };
+    let (whole, saved) = kept(&gpu, SCENES[2], &settings, Part::default());
+    assert!(whole.end == End::Error && (17..400).contains(&whole.film.blocks), "{:?} after {}", whole.end, whole.film.blocks);
+    // After 16 blocks, which is a look, 17, and as many as it took.
+    for blocks in [16, 17, whole.film.blocks] {
+        let (_, part) = kept(&gpu, SCENES[2], &small(1, blocks), Part::default());
+        let (on, saved_on) = kept(&gpu, SCENES[2], &settings, Part { resume: Some(part), ..Part::default() });
+        assert!(on.end == End::Error && on.film == whole.film && on.fates == whole.fates, "from {blocks}: {} blocks", on.film.blocks);
+        assert!(saved_on.film == saved.film && saved_on.done == saved.done);
+    }
+}
+
 #[test]
 fn parts_of_the_box_come_to_the_bits_of_one() {
     let gpu = device();
@@ -96,7 +114,7 @@ fn parts_of_the_box_come_to_the_bits_of_one() {
     let run = |gpu: Option<&Gpu>, rounds, share, resume| {
         let (never, mut latest) = (AtomicBool::new(false), Latest::default());
         let resume = Option::map(resume, |run| (PathBuf::from("a file"), run));
-        let keep = Keep { scene: "open-box", share, resume, every: Duration::ZERO, save: Some(&mut latest) };
+        let keep = Keep { scene: "open-box", share, resume, every: Duration::ZERO, save: Some(&mut latest), dealt: None };
         let mut control = Control { cancelled: &never, progress: &mut |_| {}, keep };
         let settings = RoomSettings { rounds, ..settings.clone() };
         room::run(gpu, &open_box(&settings), &settings, &mut control).unwrap();

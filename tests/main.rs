@@ -60,6 +60,7 @@ mod scattering;
 mod scenes;
 mod second_set;
 mod settings;
+mod several_devices;
 mod skies;
 mod stop;
 mod strict;

@@ -50,7 +50,7 @@ impl Room {
     }
 
     /// A picture from a file.
-    fn from_file(&self, gpu: &Gpu, settings: &SceneSettings, path: &Path) -> Result<RunResult, Error> {
+    fn lit_from(&self, gpu: &Gpu, settings: &SceneSettings, path: &Path) -> Result<RunResult, Error> {
         let map = MapFile::open("--map", path)?;
         let settings = map.settings(settings);
         let plan = map.plan(self.plan(gpu, &settings), &self.geometry)?;
@@ -89,13 +89,13 @@ fn pictures_from_a_file_have_the_bits_of_a_run() {
         for (kernel, chunk, samples) in [(Kernel::Box, None, 1), (Kernel::Cone, Some(500), samples)] {
             let settings = SceneSettings { kernel, chunk, samples, ..settings.clone() };
             let whole = room.traced(&gpu, &settings);
-            let found = room.from_file(&gpu, &settings, file.path()).unwrap();
+            let found = room.lit_from(&gpu, &settings, file.path()).unwrap();
             assert!(whole.ledger().stored > 0 && found.fates == whole.fates, "{name}: {}, not {}", found.ledger(), whole.ledger());
             assert!(found.film == whole.film, "{name}: another film");
             assert_eq!(found.losses, whole.losses);
         }
         // Other paths from the camera, and the same photons.
-        let other = room.from_file(&gpu, &SceneSettings { seed: 77, ..settings.clone() }, file.path()).unwrap();
+        let other = room.lit_from(&gpu, &SceneSettings { seed: 77, ..settings.clone() }, file.path()).unwrap();
         assert!(other.fates == room.traced(&gpu, &settings).fates && other.film != room.traced(&gpu, &settings).film);
     }
 }
@@ -106,7 +106,7 @@ fn a_file_that_ends_early_holds_whole_rounds() {
     let room = Room::new(scene("cornell-spheres"));
     let (file, filled) = room.write(&gpu, &small(), 4);
     assert!(filled.is_cancelled && filled.rounds == 4);
-    let found = room.from_file(&gpu, &SceneSettings { rounds: 4, ..small() }, file.path()).unwrap();
+    let found = room.lit_from(&gpu, &SceneSettings { rounds: 4, ..small() }, file.path()).unwrap();
     assert!(found.film == room.traced(&gpu, &SceneSettings { rounds: 4, ..small() }).film);
 }
 
@@ -140,7 +140,7 @@ fn damaged_files_are_refused() {
     let mut bytes = whole.clone();
     bytes[100] ^= 1;
     std::fs::write(damaged.path(), bytes).unwrap();
-    let line = line_of(&room.from_file(&gpu, &settings, damaged.path()).unwrap_err());
+    let line = line_of(&room.lit_from(&gpu, &settings, damaged.path()).unwrap_err());
     assert!(line.contains("is damaged: photons of round 0 in the global map"), "{line}");
 }
 
@@ -193,15 +193,15 @@ fn files_of_other_light_are_refused() {
     let few = SceneSettings { photons: 300, caustic_photons: 300, rounds: 2, ..small() };
     let (file, _) = room.write(&gpu, &few, u64::MAX);
     let other = Room::new(scene("cornell"));
-    let line = line_of(&other.from_file(&gpu, &few, file.path()).unwrap_err());
+    let line = line_of(&other.lit_from(&gpu, &few, file.path()).unwrap_err());
     assert!(line.contains("of another scene (cornell-spheres"), "{line}");
     // Less is wanted than there is.
     let less = SceneSettings { without: vec![Effect::ReflectiveCaustics, Effect::RefractiveCaustics], ..few.clone() };
-    let found = room.from_file(&gpu, &less, file.path()).unwrap();
+    let found = room.lit_from(&gpu, &less, file.path()).unwrap();
     assert!(found.film == room.traced(&gpu, &less).film && found.plan.caustic.is_none());
     // More is wanted.
     let (file, _) = room.write(&gpu, &less, u64::MAX);
-    let line = line_of(&room.from_file(&gpu, &few, file.path()).unwrap_err());
+    let line = line_of(&room.lit_from(&gpu, &few, file.path()).unwrap_err());
     assert!(line.contains("holds no caustic map of the light that this run wants"), "{line}");
 }
 
@@ -260,7 +260,13 @@ fn the_program_makes_reads_and_exports_files() {
     let vertices = &ply.payload["vertex"];
     let map = MapFile::open("FILE", &place.at("map.pm")).unwrap();
     let mut expected = Vec::new();
-    (0..2).for_each(|round| map.photons(round, "caustic", 10, usize::MAX, &mut |photons| Ok(expected.extend_from_slice(photons))).unwrap());
+    (0..2).for_each(|round| {
+        map.photons(round, "caustic", 10, usize::MAX, &mut |photons| {
+            expected.extend_from_slice(photons);
+            Ok(())
+        })
+        .unwrap()
+    });
     assert!(vertices.len() == expected.len() && vertices.len() > 500);
     for (vertex, photon) in pairs(vertices, &expected) {
         let Property::Double(x) = vertex["x"] else { panic!("{vertex:?}") };

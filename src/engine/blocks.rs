@@ -113,15 +113,22 @@ struct Dealing {
     dealt: u32,
     /// Before so many blocks are passed, in this order, a device hands over what it has done.
     looks: Vec<u32>,
-    /// Of each device, how many of these it has come past.
+    /// Of each device, how many of these it has come past, and how many blocks were dealt before its first one.
     behind: Vec<usize>,
+    first: Vec<Option<u32>>,
 }
 
 impl Dealer {
     /// `looks` come after so many of the blocks, in rising order.
     pub fn new(blocks: Vec<u32>, devices: usize, looks: impl Iterator<Item = u32>) -> Dealer {
         let count = blocks.len() as u32;
-        Dealer(Mutex::new(Dealing { blocks, dealt: 0, looks: looks.take_while(|look| *look < count).collect(), behind: vec![0; devices] }))
+        Dealer(Mutex::new(Dealing {
+            blocks,
+            dealt: 0,
+            looks: looks.take_while(|look| *look < count).collect(),
+            behind: vec![0; devices],
+            first: vec![None; devices],
+        }))
     }
 
     fn lock(&self) -> MutexGuard<'_, Dealing> {
@@ -131,11 +138,12 @@ impl Dealer {
     /// A block for a device, and whether it must hand over before that what it has done.
     pub fn next(&self, device: usize) -> Option<(u32, bool)> {
         let mut dealing = self.lock();
-        let Dealing { blocks, dealt, looks, behind } = &mut *dealing;
+        let Dealing { blocks, dealt, looks, behind, first } = &mut *dealing;
         let block = *blocks.get(*dealt as usize)?;
         let passed = looks.partition_point(|look| *look <= *dealt);
         let hands_over = passed > behind[device];
         behind[device] = passed;
+        first[device].get_or_insert(*dealt);
         *dealt += 1;
         Some((block, hands_over))
     }
@@ -143,6 +151,18 @@ impl Dealer {
     /// Looks that a device has come past.
     pub fn looks_behind(&self, device: usize) -> usize {
         self.lock().behind[device]
+    }
+
+    /// Whether a device has no block before a look, and will have none.
+    pub fn has_none_before(&self, device: usize, look: usize) -> bool {
+        let dealing = self.lock();
+        let Some(look) = dealing.looks.get(look).filter(|look| **look <= dealing.dealt) else { return false };
+        dealing.first[device].is_none_or(|first| first >= *look)
+    }
+
+    /// Blocks that were dealt.
+    pub fn dealt(&self) -> u32 {
+        self.lock().dealt
     }
 
     /// Looks before which all blocks are dealt.
@@ -176,6 +196,8 @@ mod tests {
         let dealer = Dealer::new((10..20).collect(), 3, [2, 5, 40].into_iter());
         assert_eq!([0, 0, 1].map(|device| dealer.next(device)), [Some((10, false)), Some((11, false)), Some((12, true))]);
         assert_eq!((dealer.looks_behind(0), dealer.looks_behind(1), dealer.looks_dealt()), (0, 1, 1));
+        assert_eq!([0, 1, 2].map(|device| dealer.has_none_before(device, 0)), [false, true, true]);
+        assert!(!dealer.has_none_before(2, 1));
         assert_eq!([1, 0].map(|device| dealer.next(device)), [Some((13, false)), Some((14, true))]);
         // Two looks at once, for one that took long; and one that was not foreseen.
         assert_eq!((dealer.next(2), dealer.looks_behind(2)), (Some((15, true)), 2));

@@ -251,7 +251,7 @@ impl<Plan: Send, Film: Clone + Send> Together<'_, Plan, Film> {
             }
             if control.cancelled.load(Ordering::Relaxed) {
                 attempt.end = Some(End::Cancelled);
-            } else if attempt.watch.is_late() {
+            } else if attempt.watch.is_late() && attempt.dealer.dealt() > 0 {
                 // Blocks under way are done, so that none is missing before the last.
                 attempt.end = Some(End::Time);
             }
@@ -267,9 +267,14 @@ impl<Plan: Send, Film: Clone + Send> Together<'_, Plan, Film> {
     /// Looks as far as all devices have handed over what they had done before.
     fn look(&self, attempt: &mut Attempt<Plan, Film>, control: &mut Control) -> Result<()> {
         while attempt.end.is_none() && attempt.look < attempt.dealer.looks_dealt() && attempt.is_known(attempt.look) {
-            let Some(run) = attempt.merged(attempt.look)? else { return Ok(()) };
+            let run = attempt.merged(attempt.look)?;
             attempt.look += 1;
             attempt.forget();
+            let Some(run) = run else {
+                // Nothing to save yet.
+                attempt.saves = false;
+                continue;
+            };
             let blocks = run.done.count();
             if attempt.watch.is_due(blocks) {
                 let film = (self.job.film)(run.film.clone());
@@ -351,7 +356,8 @@ impl<Plan, Film> Attempt<'_, Plan, Film> {
     }
 
     fn is_known(&self, look: usize) -> bool {
-        self.devices.iter().all(|device| device.at(look).is_some())
+        let mut devices = self.devices.iter().enumerate();
+        devices.all(|(number, device)| device.at(look).is_some() || self.dealer.has_none_before(number, look))
     }
 
     /// What all had done before a look, added up.
