@@ -261,7 +261,19 @@ fn the_program_shares_a_run() {
     assert_eq!((two["more_devices"].as_array().unwrap().len(), two["blocks"].clone()), (1, 24.into()));
     place.succeed(&format!("render cornell-spheres -o on.exr --resume two.pms {options} --devices {number},{number}"));
     assert!(std::fs::read(place.at("one.exr")).unwrap() == std::fs::read(place.at("on.exr")).unwrap());
+    // The paper's box too.
+    let options = "--photons 501 --rounds 40 --mesh 8 --error 40% -q";
+    place.succeed(&format!("-o one.exr --json one.json {options} --device {number}"));
+    place.succeed(&format!("-o two.exr --json two.json {options} --devices {number},{number}"));
+    assert!(std::fs::read(place.at("one.exr")).unwrap() == std::fs::read(place.at("two.exr")).unwrap());
+    let [one, two] = ["one.json", "two.json"].map(|name| place.json(name));
+    assert!(one["rounds"].as_u64().unwrap() < 40 && one["end"] == "error", "{}", one["rounds"]);
+    for field in ["ledger", "relative_error", "rounds", "end", "losses"] {
+        assert!(!one[field].is_null() && one[field] == two[field], "{field}: {}, {}", one[field], two[field]);
+    }
     place.assert_refused([
+        ("--devices 0 --variant cpu", ["--devices", "on", "no effect with --variant cpu"]),
+        ("--devices 0,0 --rounds 9 --sums f32 -q", ["--devices", "--sums", "integers"]),
         ("render cornell -o a.png -q --devices some", ["--devices", "some", "must be `all`, or numbers"]),
         ("render cornell -o a.png -q --devices 0,,1", ["--devices", "0,,1", "must be `all`, or numbers"]),
         ("render cornell -o a.png -q --devices 99", ["--device", "99", "available"]),

@@ -4,18 +4,18 @@ use std::sync::atomic::AtomicBool;
 
 use clap::Args;
 
-use super::complain;
 use super::interrupt::interruptible;
 use super::keep::Keeper;
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::stop::{StopArgs, bias_before, check_bias, goals, rounds_after, up_to};
+use super::{complain, given_up};
 use crate::engine::Control;
 use crate::engine::saved::SavedFilm;
 use crate::engine::scene::losses::losses;
 use crate::engine::scene::map_file::MapFile;
 use crate::engine::scene::{self, RunResult, SceneFilm, View};
 use crate::engine::several_devices;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::ledger::Fates;
 use crate::output::scene_report;
@@ -169,9 +169,7 @@ impl Job<'_> {
             },
             error: &|film: &SceneFilm| film.error(plan.film.confidence),
             losses: &|film: &SceneFilm, fates: &[Fates]| losses(geometry, plan, fates, film),
-            given_up: &|gpu: &Gpu, error: &Error| {
-                complain(&format!("warning: {} is given up, and the others go on: {error}", gpu.facts().label()));
-            },
+            given_up: &given_up,
             stop: plan.settings.stop,
             alpha: plan.settings.alpha,
             rounds: plan.settings.rounds,

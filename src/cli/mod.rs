@@ -250,6 +250,11 @@ fn complain(line: &str) {
     print_line(&format!("photonmill: {line}"));
 }
 
+/// A device that failed while others share its run.
+fn given_up(gpu: &Gpu, error: &Error) {
+    complain(&format!("warning: {} is given up, and the others go on: {error}", gpu.facts().label()));
+}
+
 /// Text on stdout; a reader that has gone away, as `head` does, has seen enough.
 fn say(text: &str) -> Result<()> {
     match writeln!(std::io::stdout(), "{text}") {

@@ -122,6 +122,24 @@ fn parse_devices(text: &str) -> std::result::Result<DeviceNumbers, String> {
 }
 
 impl DevicesOfRunArgs {
+    /// The same for a run that needs none: none after one line on stderr where there is no Vulkan, and nobody asked for a device.
+    pub(super) fn open_or_none(&self, reporter: &ProgressReporter) -> Result<Vec<Gpu>> {
+        if self.devices.is_some() {
+            return self.open(reporter);
+        }
+        let gpu = self.one.chosen.open(&self.one.options())?;
+        gpu.iter().for_each(|gpu| reporter.device(Some(gpu)));
+        Ok(gpu.into_iter().collect())
+    }
+
+    /// Refuses devices where nothing is run on any.
+    pub(super) fn check_unused(&self, idle: &str) -> Result<()> {
+        let DeviceArgs { device, validate } = &self.one.chosen;
+        require(device.is_none(), "--device", device.as_deref().unwrap_or_default(), idle)?;
+        require(self.devices.is_none(), "--devices", "on", idle)?;
+        require(!validate, "--validate", "on", idle)
+    }
+
     /// The devices, the one that others join first.
     pub(super) fn open(&self, reporter: &ProgressReporter) -> Result<Vec<Gpu>> {
         let numbers = match &self.devices {

@@ -1,5 +1,6 @@
 //! The main job: light the open box with one builder.
 
+use std::cell::OnceCell;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -7,22 +8,25 @@ use std::time::Instant;
 use clap::Args;
 
 use super::keep::{KeepArgs, Keeper};
-use super::options::{CommonArgs, ReportArgs, Reports, TimedDeviceArgs};
+use super::options::{CommonArgs, DevicesOfRunArgs, ReportArgs, Reports};
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::stop::{StopArgs, bias_before, goals, rounds_after, up_to};
 use super::values::{
     BuilderArg, SwitchArg, builder_parser, parse_integer, parse_number, parse_numbers, parse_photon_name, parse_shininess, parse_threads,
     parse_within, value_enum,
 };
-use super::{DeviceArgs, End, complain, say, say_beside};
+use super::{End, complain, given_up, say, say_beside};
 use crate::engine;
 use crate::engine::Control;
 use crate::engine::choose_builder::{Choice, choose_builder};
 use crate::engine::replay::PhotonName;
-use crate::engine::room::film::estimate_walls;
+use crate::engine::room::film::{RoomFilm, estimate_walls};
 use crate::engine::room::{self, RunResult};
+use crate::engine::saved::SavedFilm;
+use crate::engine::several_devices;
 use crate::error::{Result, require};
 use crate::gpu::Gpu;
+use crate::ledger::Fates;
 use crate::output::colour::Format;
 use crate::output::destination::{Destination, Folder, check_distinct, write_all};
 use crate::output::image::overview;
@@ -138,13 +142,13 @@ pub(super) struct RunArgs {
     common: CommonArgs,
     /// Trace a single photon of this run, print where it is stored, and exit; rounds and photons count from 0
     #[arg(long, value_name = "ROUND:PHOTON", value_parser = parse_photon_name, help_heading = "Checks",
-        conflicts_with_all = ["output", "irradiance", "radiosity", "json", "trace", "time_dispatches"])]
+        conflicts_with_all = ["output", "irradiance", "radiosity", "json", "trace", "time_dispatches", "devices"])]
     replay: Option<PhotonName>,
 
     #[command(flatten)]
     progress: ProgressArgs,
     #[command(flatten)]
-    device: TimedDeviceArgs,
+    device: DevicesOfRunArgs,
 }
 
 value_enum!(PresetArg => Preset {
@@ -233,11 +237,8 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
     settings.validate()?;
     let stores_none = settings.reflectance == 0.0 && args.irradiance.is_some();
     require(!stores_none, "--reflectance", 0, "must be above 0 with --irradiance: the photon map holds only reflected photons")?;
-    let DeviceArgs { device, validate } = &args.device.chosen;
     if settings.builder == Builder::Cpu {
-        let idle = "has no effect with --variant cpu; leave one of the two out";
-        require(device.is_none(), "--device", device.as_deref().unwrap_or_default(), idle)?;
-        require(!validate, "--validate", "on", idle)?;
+        args.device.check_unused("has no effect with --variant cpu; leave one of the two out")?;
     }
     let scene = open_box(&settings);
     if let Some(name) = args.replay {
@@ -249,12 +250,12 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
         complain(&format!("warning: {warning}"));
     }
     let reporter = ProgressReporter::new(&args.progress);
-    let gpu = match settings.builder {
-        Builder::Cpu => None,
-        _ => args.device.chosen.open(&args.device.options())?,
-    };
-    reporter.device(gpu.as_ref());
-    let settings = match &gpu {
+    let mut gpus = if settings.builder == Builder::Cpu { Vec::new() } else { args.device.open_or_none(&reporter)? };
+    if gpus.is_empty() {
+        reporter.device(None);
+    }
+    let gpu = gpus.first();
+    let settings = match gpu {
         Some(gpu) if args.variant == Some(None) => RoomSettings { builder: fastest(gpu, &scene, &settings, &reporter)?, ..settings },
         None => RoomSettings { builder: Builder::Cpu, ..settings },
         _ => settings,
@@ -263,18 +264,21 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
         let why = "has a radius of its own at each point, whose bias --bias cannot measure; leave --bias out";
         require(!args.stop.bias, "--nearest", nearest, why)?;
     }
-    announce(&reporter, gpu.as_ref(), &scene, &settings)?;
-    let measure = |settings: &RoomSettings, rounds| room::measure_bias(gpu.as_ref(), &scene, settings, rounds, cancelled);
-    let before = bias_before(&settings.stop, args.stop.bias, false, &reporter, |rounds| measure(&settings, rounds))?;
+    announce(&reporter, gpu, &scene, &settings)?;
+    let measure = |gpu: Option<&Gpu>, settings: &RoomSettings, rounds| room::measure_bias(gpu, &scene, settings, rounds, cancelled);
+    let before = bias_before(&settings.stop, args.stop.bias, false, &reporter, |rounds| measure(gpu, &settings, rounds))?;
     let settings = RoomSettings { stop: Stop { bias: before.map(|bias| bias.upper), ..settings.stop }, ..settings };
     reporter.status("making the pipelines");
     let keep = keeper.keep("open-box");
     let mut control = Control { cancelled, progress: &mut |progress| reporter.report(progress, "photon"), keep };
-    let mut outcome = room::run(gpu.as_ref(), &scene, &settings, &mut control)?;
+    let mut outcome = match gpus.len() {
+        0 | 1 => room::run(gpus.first(), &scene, &settings, &mut control)?,
+        _ => share(&mut gpus, &scene, &settings, &mut control)?,
+    };
     outcome.bias = before;
     if before.is_none() && args.stop.bias && !outcome.is_cancelled() {
         reporter.status("measuring the bias");
-        outcome.bias = measure(&settings, rounds_after(outcome.film.rounds))?;
+        outcome.bias = measure(gpus.first(), &settings, rounds_after(outcome.film.rounds))?;
     }
     reporter.finish();
     let end = End::of(&outcome);
@@ -285,6 +289,35 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
     outputs.write(outcome, &scene)?;
     keeper.finish()?;
     Ok(end)
+}
+
+/// Runs on several devices.
+fn share(gpus: &mut Vec<Gpu>, scene: &RoomScene, settings: &RoomSettings, control: &mut Control) -> Result<RunResult> {
+    require(settings.sums == Sums::Integer, "--devices", "with --sums", "adds up integers only; leave --sums out")?;
+    let plan = RoomPlan::new(scene, settings, &engine::limits(gpus[0].facts()))?;
+    let weights = OnceCell::new();
+    let run =
+        |gpu: &Gpu, stop: Stop, control: &mut Control| room::run(Some(gpu), scene, &RoomSettings { stop, ..settings.clone() }, control);
+    let job = several_devices::Job {
+        run: &run,
+        film: |film| match film {
+            SavedFilm::Room(film) => film,
+            SavedFilm::Scene(_) => unreachable!("the box was lit"),
+        },
+        error: &|film: &RoomFilm| room::error(film, scene, &plan, &weights),
+        losses: &|_: &RoomFilm, fates: &[Fates]| room::losses(&plan, fates),
+        given_up: &given_up,
+        stop: settings.stop,
+        // The paper's radius never shrinks, and its rounds are independent.
+        alpha: 1.0,
+        rounds: settings.rounds,
+        rounds_per_block: 1,
+        bounces: settings.bounces,
+        photons_per_round: settings.photons.into(),
+    };
+    let outcome = several_devices::run_on(gpus, &job, control)?;
+    // With its goals, which no device had.
+    Ok(RunResult { plan: RoomPlan { settings: settings.clone(), ..outcome.plan }, ..outcome })
 }
 
 /// What will be traced, before it is.
@@ -323,7 +356,7 @@ fn fastest(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings, reporter: &Pro
 
 /// Where one photon of the run is stored.
 fn show_photon(args: &RunArgs, settings: &RoomSettings, scene: &RoomScene, name: PhotonName) -> Result<End> {
-    let gpu = if settings.builder == Builder::Cpu { None } else { args.device.chosen.open(&args.device.chosen.options())? };
+    let gpu = if settings.builder == Builder::Cpu { None } else { args.device.one.chosen.open(&args.device.one.chosen.options())? };
     say(&room::replay(gpu.as_ref(), scene, settings, name)?.table(scene, settings.seed))?;
     Ok(End::Finished)
 }

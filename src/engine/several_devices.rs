@@ -23,10 +23,13 @@ use crate::gpu::Gpu;
 use crate::ledger::{Fates, Ledger, Losses};
 use crate::settings::stop::Stop;
 
+/// Runs a job on one device.
+type RunOnOne<Plan, Film> = dyn Fn(&Gpu, Stop, &mut Control) -> Result<RunResult<Plan, Film>> + Sync;
+
 /// What is run, in either world.
 pub struct Job<'a, Plan, Film> {
     /// Runs on one device until a goal is reached, or as long as it is dealt blocks.
-    pub run: &'a (dyn Fn(&Gpu, Stop, &mut Control) -> Result<RunResult<Plan, Film>> + Sync),
+    pub run: &'a RunOnOne<Plan, Film>,
     pub film: fn(SavedFilm) -> Film,
     pub error: &'a dyn Fn(&Film) -> FilmError,
     pub losses: &'a dyn Fn(&Film, &[Fates]) -> Losses,
@@ -86,7 +89,7 @@ enum Outcome<Plan, Film> {
     Failed {
         device: usize,
         error: Error,
-        base: Option<SavedRun>,
+        base: Option<Box<SavedRun>>,
     },
 }
 
@@ -114,7 +117,7 @@ where
             Outcome::Failed { device, error, base: so_far } => {
                 (job.given_up)(&gpus[device], &error);
                 gpus.remove(device);
-                base = so_far.map(|run| (resumed.as_ref().map(|(path, _)| path.clone()).unwrap_or_default(), run)).or(resumed);
+                base = so_far.map(|run| (resumed.as_ref().map(|(path, _)| path.clone()).unwrap_or_default(), *run)).or(resumed);
             }
         }
     }
@@ -199,7 +202,7 @@ impl<Plan: Send, Film: Clone + Send> Together<'_, Plan, Film> {
         })?;
         let base = attempt.base.take();
         if let Some((device, error)) = attempt.failed.take() {
-            return Ok(Outcome::Failed { device, error, base });
+            return Ok(Outcome::Failed { device, error, base: base.map(Box::new) });
         }
         let run = match attempt.end {
             Some(End::Error) => base,

@@ -114,6 +114,7 @@ pub fn text(outcome: &RunResult, error: &FilmError) -> String {
     let settings = &outcome.plan.settings;
     let device = outcome.device.as_ref().map_or_else(|| format!("CPU, {}", host_driver(outcome)), DeviceFacts::label);
     writeln!(text, "{device}").unwrap();
+    outcome.more_devices.iter().for_each(|facts| writeln!(text, "{}", facts.label()).unwrap());
     writeln!(
         text,
         "open-box, {}: {} of {} photons, {}, radius {} m, {} gather{}, {} sums, {} seed {}",

@@ -78,11 +78,11 @@ fn identity(keep: &mut Keep, scene: &RoomScene, plan: &RoomPlan, device: Option<
 }
 
 /// What a film tells of its error. `weights` are [`irradiance_weights`], made at the first look.
-fn error(film: &RoomFilm, scene: &RoomScene, plan: &RoomPlan, weights: &OnceCell<Vec<f64>>) -> FilmError {
+pub fn error(film: &RoomFilm, scene: &RoomScene, plan: &RoomPlan, weights: &OnceCell<Vec<f64>>) -> FilmError {
     film.error(weights.get_or_init(|| irradiance_weights(scene, plan)), 1.0, &plan.settings.stop)
 }
 
 /// Light that the cap on bounces kept from the result.
-fn losses(plan: &RoomPlan, fates: &[Fates]) -> Losses {
+pub fn losses(plan: &RoomPlan, fates: &[Fates]) -> Losses {
     Losses::of_room(&fates[0], plan.settings.light_power.iter().sum())
 }
