@@ -24,12 +24,12 @@ use crate::ledger::{Fates, Ledger, Losses};
 use crate::settings::stop::Stop;
 
 /// Runs a job on one device.
-type RunOnOne<Plan, Film> = dyn Fn(&Gpu, Stop, &mut Control) -> Result<RunResult<Plan, Film>> + Sync;
+type RunOnOne<'a, Plan, Film> = dyn Fn(&Gpu, Stop, &mut Control) -> Result<RunResult<Plan, Film>> + Sync + 'a;
 
 /// What is run, in either world.
 pub struct Job<'a, Plan, Film> {
     /// Runs on one device until a goal is reached, or as long as it is dealt blocks.
-    pub run: &'a RunOnOne<Plan, Film>,
+    pub run: &'a RunOnOne<'a, Plan, Film>,
     pub film: fn(SavedFilm) -> Film,
     pub error: &'a dyn Fn(&Film) -> FilmError,
     pub losses: &'a dyn Fn(&Film, &[Fates]) -> Losses,
