@@ -265,7 +265,7 @@ fn the_program_makes_reads_and_exports_files() {
             expected.extend_from_slice(photons);
             Ok(())
         })
-        .unwrap()
+        .unwrap();
     });
     assert!(vertices.len() == expected.len() && vertices.len() > 500);
     for (vertex, photon) in pairs(vertices, &expected) {
