@@ -22,6 +22,7 @@ mod dispersion;
 mod engine;
 mod extensions;
 mod extremes;
+mod faults;
 mod film;
 mod gltf;
 mod guide;
