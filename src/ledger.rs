@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::constants::{TALLY_ROWS, TOTAL_FLUX_BITS};
+use crate::constants::TALLY_ROWS;
 use crate::records::Tally;
 
 /// Fates of a run's photons.
@@ -120,24 +120,13 @@ impl Fates {
         totals.interrupted += open;
     }
 
-    /// Whether they are what files may hold: of so many bounces, with sums that are numbers.
-    pub fn is_sound(&self, bounces: usize) -> bool {
-        // Far below what 64 bits hold, however many rounds are added up.
-        let most = 1 << 40;
-        let BounceFates { stored, absorbed, escaped, dropped } =
-            self.bounces.iter().fold(BounceFates::default(), |most, bounce| BounceFates {
-                stored: most.stored.max(bounce.stored),
-                absorbed: most.absorbed.max(bounce.absorbed),
-                escaped: most.escaped.max(bounce.escaped),
-                dropped: most.dropped.max(bounce.dropped),
-            });
-        let counts = [self.emitted, stored, absorbed, escaped, dropped];
+    /// Whether they are what files may hold: counts whose sum is no more than this, and flux that can be added up.
+    pub fn is_sound(&self, most: u64) -> bool {
+        let of_bounces = self.bounces.iter().flat_map(|bounce| [bounce.stored, bounce.absorbed, bounce.escaped, bounce.dropped]);
         let totals = self.totals.unwrap_or_default();
-        let others = [totals.stored, totals.cut_off, totals.clamped, totals.interrupted];
-        let mut flux = totals.cut_flux.into_iter().chain(totals.clamped_flux);
-        self.bounces.len() == bounces
-            && counts.into_iter().chain(others).all(|count| count <= most)
-            && flux.all(|flux| flux <= most << TOTAL_FLUX_BITS)
+        let others = [self.emitted, totals.stored, totals.cut_off, totals.clamped, totals.interrupted];
+        let sum: u128 = of_bounces.chain(others).map(u128::from).sum();
+        sum <= most.into() && totals.cut_flux.iter().chain(&totals.clamped_flux).all(|flux| *flux <= 1 << 62)
     }
 
     /// What kernels have counted; nobody knows yet of how many photons.

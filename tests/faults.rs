@@ -20,7 +20,8 @@ fn killed_runs_go_on(moments: u32) {
     let mut rounds_before = 0;
     for moment in 1..=moments {
         let resume = if place.at("c.pms").exists() { "--resume c.pms" } else { "" };
-        let mut child = place.command(&line(96, &format!("-o a.exr --checkpoint c.pms --every 1ms {resume}"))).stdout(Stdio::null()).spawn().unwrap();
+        let mut child =
+            place.command(&line(96, &format!("-o a.exr --checkpoint c.pms --every 1ms {resume}"))).stdout(Stdio::null()).spawn().unwrap();
         // Golden sections of the length, so that moments are near to one another nowhere.
         let share = f64::from(moment) * 0.618_033_988_749_895 % 1.0;
         std::thread::sleep(Duration::from_secs_f64(length.as_secs_f64() * share));

@@ -4,21 +4,36 @@
 use std::fmt::Debug;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 use std::sync::mpsc;
 use std::time::Duration;
 
 use glam::{DVec4, Vec3};
 use image::{ImageFormat, RgbImage};
+use photonmill::engine::Control;
+use photonmill::engine::differences::Differences;
+use photonmill::engine::film::{BlockSums, LatestBlocks};
+use photonmill::engine::room;
+use photonmill::engine::saved::{SavedFilm, SavedRun};
+use photonmill::engine::scene::SceneFilm;
+use photonmill::engine::scene::map_file::{MapFile, MapWriter};
+use photonmill::engine::watch::{Keep, SaveRun};
+use photonmill::ledger::Fates;
+use photonmill::output::merge_report;
+use photonmill::photon::MapPhoton;
+use photonmill::plan::differences::difference_count;
 use photonmill::plan::scene::ScenePlan;
 use photonmill::plan::sensor::Sensor;
 use photonmill::plan::{Limits, RoomPlan, photons_of};
+use photonmill::rng::Rng;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::sky::Sky;
-use photonmill::scene::{Material, Reading, Scene};
-use photonmill::settings::RoomSettings;
+use photonmill::scene::{Material, Reading, Scene, built_in};
 use photonmill::settings::scene::SceneSettings;
+use photonmill::settings::{Builder, RoomSettings};
 use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
 
 use change::{Random, change, pack, parts};
 use gltf_file::{data_uri, encoded, floats, set_buffer};
@@ -731,4 +746,161 @@ fn compressed_views_of_any_bytes_are_read_or_refused() {
         }));
     }
     assert!((5..400).contains(&read), "{read}");
+}
+
+/// Keeps what a run saves last.
+struct Latest(Option<SavedRun>);
+
+impl SaveRun for Latest {
+    fn save(&mut self, run: &SavedRun, _: bool) -> photonmill::error::Result<()> {
+        self.0 = Some(run.clone());
+        Ok(())
+    }
+}
+
+/// A checkpoint of the paper's box, by the CPU.
+fn checkpoint() -> SavedRun {
+    let settings = RoomSettings { photons: 101, rounds: 3, mesh: 2, builder: Builder::Cpu, rng: Rng::Philox, ..RoomSettings::default() };
+    let (never, mut latest) = (AtomicBool::new(false), Latest(None));
+    let keep = Keep { scene: "open-box", every: Duration::ZERO, save: Some(&mut latest), ..Keep::default() };
+    let mut control = Control { cancelled: &never, progress: &mut |_| {}, keep };
+    room::run(None, &open_box(&settings), &settings, &mut control).unwrap();
+    latest.0.expect("a block was done")
+}
+
+/// A checkpoint of a picture of four pixels, as far as its parts must fit one another.
+fn checkpoint_of_picture() -> SavedRun {
+    let (scene, settings) = (built_in::by_name("cornell").unwrap(), SceneSettings::default());
+    let geometry = Geometry::new(&scene).unwrap();
+    let sensor = Sensor::Picture { width: 2, height: 2 };
+    let plan = ScenePlan::new(&scene, &geometry, &settings, sensor, &Limits::of_host()).unwrap();
+    let blocks = || BlockSums { rounds: 2 * plan.film.rounds_per_block, blocks: 2, sums: vec![7; 12], squares: vec![25; 12] };
+    let film = SceneFilm {
+        of_blocks: blocks(),
+        of_surfaces: Some(blocks()),
+        latest: LatestBlocks::default(),
+        differences: Differences(vec![0; difference_count(4)]),
+        one_hits: vec![0; 4 * photonmill::constants::HIT_KINDS as usize],
+        part_totals: vec![3; 4],
+        anomalies: [0; photonmill::plan::buffers::ANOMALY_WORDS],
+        class_counts: vec![0; 2 * photonmill::constants::RADIUS_CLASSES as usize],
+        stored: [1; 3],
+        plan: plan.film,
+    };
+    let mut of_box = checkpoint();
+    of_box.done = serde_json::from_value(json!([{"start": 0, "end": 2}])).unwrap();
+    SavedRun { sensor: Some(sensor), fates: vec![Fates::of_scene(4); 2], film: film.into(), ..of_box }
+}
+
+/// A file of photons of two rounds.
+fn photon_map(path: &Path) {
+    let scene = built_in::by_name("cornell").unwrap();
+    let geometry = Geometry::new(&scene).unwrap();
+    let settings = SceneSettings { photons: 4, caustic_photons: 4, bounces: 3, ..SceneSettings::default() };
+    let plan = ScenePlan::new(&scene, &geometry, &settings, Sensor::Picture { width: 2, height: 2 }, &Limits::of_host()).unwrap();
+    let mut file = std::fs::File::create(path).unwrap();
+    let mut writer = MapWriter::new(&mut file, "cornell", &geometry, &plan, "none").unwrap();
+    for _ in 0..2 {
+        for _ in plan.maps() {
+            writer.begin_map();
+            writer.add(&[MapPhoton { flux: Vec3::ONE, ..MapPhoton::default() }; 5]).unwrap();
+            let mut fates = Fates { emitted: 4, ..Fates::of_scene(3) };
+            fates.bounces[0].absorbed = 4;
+            fates.totals.get_or_insert_default().stored = 5;
+            writer.end_map(fates);
+        }
+        writer.end_round();
+    }
+    writer.finish().unwrap();
+}
+
+/// What a file with a hash of its own becomes with another header: where its header is, what stands before and behind its length, and
+/// what it is a hash of, are the caller's.
+fn with_header(header: &[u8], random: &mut Random, pack: impl Fn(&[u8]) -> Vec<u8>) -> Vec<u8> {
+    let mut value: Value = serde_json::from_slice(header).unwrap();
+    (0..=random.below(2)).for_each(|_| change(&mut value, random));
+    pack(&serde_json::to_vec(&value).unwrap())
+}
+
+/// Checkpoints whose header says anything, with a checksum that is right: refused in one line, or of use.
+#[test]
+fn checkpoints_of_any_header_are_refused_or_of_use() {
+    for saved in [checkpoint(), checkpoint_of_picture()] {
+        let whole = saved.to_bytes();
+        assert!(SavedRun::from_bytes(&whole).unwrap() == saved);
+        let length = u64::from_le_bytes(whole[16..24].try_into().unwrap()) as usize;
+        let (header, arrays) = whole[24..whole.len() - 32].split_at(length);
+        let mut random = Random(SEED);
+        let (mut taken, mut refused) = (0, 0);
+        for _ in 0..1500 {
+            let bytes = with_header(header, &mut random, |header| {
+                let mut bytes = [&whole[..16], &(header.len() as u64).to_le_bytes(), header, arrays].concat();
+                let checksum = Sha256::digest(&bytes);
+                bytes.extend_from_slice(&checksum);
+                bytes
+            });
+            match SavedRun::from_bytes(&bytes) {
+                Ok(run) => {
+                    taken += 1;
+                    use_run(&run, &saved);
+                }
+                Err(line) => {
+                    refused += 1;
+                    assert!(!line.is_empty() && line.lines().count() == 1, "{line}");
+                }
+            }
+        }
+        assert!(taken > 100 && refused > 100, "{taken} taken, {refused} refused");
+    }
+}
+
+/// Reads, merges and reports a run as `merge` does.
+fn use_run(run: &SavedRun, other: &SavedRun) {
+    assert_eq!(run.to_bytes(), SavedRun::from_bytes(&run.to_bytes()).unwrap().to_bytes());
+    let _ = (run.missing(), run.emitted(), run.identity.differs_from(&other.identity));
+    let film = match &run.film {
+        SavedFilm::Scene(film) => Some(&**film),
+        SavedFilm::Room(_) => None,
+    };
+    assert!(!merge_report::text(run, 1, film).is_empty());
+    if let Some(film) = film {
+        let _ = (merge_report::json(run, film, &[]), film.mean(0), film.standard_error(0));
+    }
+}
+
+/// Files of photons likewise.
+#[test]
+fn photon_maps_of_any_header_are_refused_or_of_use() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.pm");
+    photon_map(&path);
+    let whole = std::fs::read(&path).unwrap();
+    let tail = whole.len() - 56;
+    let start = tail - u64::from_le_bytes(whole[tail..tail + 8].try_into().unwrap()) as usize;
+    let mut random = Random(SEED);
+    let (mut taken, mut refused) = (0, 0);
+    for _ in 0..1500 {
+        let bytes = with_header(&whole[start..tail], &mut random, |header| {
+            [&whole[..start], header, &(header.len() as u64).to_le_bytes(), &Sha256::digest(header), &whole[..16]].concat()
+        });
+        std::fs::write(&path, bytes).unwrap();
+        match MapFile::open("--map", &path) {
+            Ok(map) => {
+                taken += 1;
+                let _ = (photonmill::output::photon_map::text(&map.header), photonmill::output::photon_map::json(&map.header));
+                for round in 0..map.rounds() {
+                    for of_map in &map.header.maps {
+                        // Checksums may be wrong now.
+                        let _ = map.photons(round, &of_map.name, 2, 100, &mut |_| Ok(()));
+                    }
+                }
+            }
+            Err(error) => {
+                refused += 1;
+                let line = error.to_string();
+                assert_eq!((error.exit_code(), line.lines().count()), (2, 1), "{line}");
+            }
+        }
+    }
+    assert!(taken > 100 && refused > 100, "{taken} taken, {refused} refused");
 }

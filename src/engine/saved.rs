@@ -95,6 +95,8 @@ impl SavedRun {
 const MAGIC: &[u8; 16] = b"photonmill run\r\n";
 /// Of what follows them. A change that older programs cannot read makes it another one.
 const FORMAT: u32 = 2;
+/// Of the photons of a run, by any count: a year of the fastest device is a millionth of it.
+const MOST_COUNTED: u64 = 1 << 60;
 /// Of the checksum at the end.
 const CHECKSUM_BYTES: usize = 32;
 
@@ -272,6 +274,9 @@ impl SavedRun {
         if !done.is_valid() || share.of == 0 || share.number >= share.of {
             return wrong("its blocks or its share");
         }
+        if !fates.iter().all(|fates| fates.is_sound(MOST_COUNTED)) {
+            return wrong("the fates of its photons");
+        }
         let mut reader = Reader { list: arrays.iter(), bytes };
         let of_blocks = reader.next_sums("sums", rounds, done.count())?;
         let (numbers, values): (Vec<u32>, Vec<f32>) = (reader.next("kept blocks")?, reader.next("kept values")?);
@@ -289,6 +294,9 @@ impl SavedRun {
                 (RoomFilm { of_blocks, latest, kind: Sums::Integer, channel_count, scale, emitted, photons_per_round }.into(), 1, values)
             }
             FilmHeader::Scene { plan, anomalies, stored } => {
+                if !plan.is_sound() {
+                    return wrong("its film's plan");
+                }
                 let of_surfaces = reader.next_sums("surfaces", rounds, done.count())?;
                 let rounds_per_block = plan.rounds_per_block;
                 let seen = if plan.sees_light { of_blocks.sums.len() } else { 0 };

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::settings::stop::Measure;
+use crate::settings::stop::{CONFIDENCES, Measure};
 
 /// What tells the bias of a scene's radii.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -44,4 +44,19 @@ pub struct FilmPlan {
     pub confidence: f64,
     pub measure: Measure,
     pub bias: BiasPlan,
+}
+
+impl FilmPlan {
+    /// Whether it is what a file may hold: numbers that a plan may have.
+    pub fn is_sound(&self) -> bool {
+        let FilmPlan { scale, limit, point_limit, rounds_per_block, samples, roundings_per_round, rare_radiance, .. } = *self;
+        let is_positive = |value: f64| value.is_finite() && value > 0.0;
+        [scale, limit, point_limit].into_iter().all(is_positive)
+            && rounds_per_block.is_power_of_two()
+            && samples.is_power_of_two()
+            && [roundings_per_round, rare_radiance].into_iter().chain(self.widest_radii).all(|value| value.is_finite() && value >= 0.0)
+            && self.alpha > 0.0
+            && self.alpha <= 1.0
+            && CONFIDENCES.contains(&self.confidence)
+    }
 }

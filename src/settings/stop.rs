@@ -15,6 +15,9 @@ named! {
     }
 }
 
+/// Levels of confidence with which errors may be stated.
+pub const CONFIDENCES: std::ops::RangeInclusive<f64> = 0.5..=0.9999;
+
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Stop {
     /// Relative error that is good enough.
@@ -48,7 +51,7 @@ impl Stop {
         if let Some(error) = self.error {
             require((1e-6..=1.0).contains(&error), "--error", error, "must be from 0.0001 % to 100 %")?;
         }
-        require((0.5..=0.9999).contains(&self.confidence), "--confidence", self.confidence, "must be from 50 % to 99.99 %")?;
+        require(CONFIDENCES.contains(&self.confidence), "--confidence", self.confidence, "must be from 50 % to 99.99 %")?;
         if let Some(seconds) = self.seconds {
             require((1e-3..=1e6).contains(&seconds), "--time", seconds, "must be from 1ms to 1000000s")?;
         }

@@ -31,6 +31,8 @@ const FORMAT: u32 = 1;
 /// Behind the header: its length, its hash, and the magic bytes again, without which a file is cut off.
 const TAIL_BYTES: usize = 8 + 32 + MAGIC.len();
 const PHOTON_BYTES: u64 = size_of::<MapPhoton>() as u64;
+/// Of the photons of a round, by any count.
+const MOST_COUNTED: u64 = 1 << 44;
 /// Photons that have a checksum together.
 const PIECE: usize = 1 << 20;
 
@@ -158,7 +160,10 @@ impl Header {
         let rows = self.settings.bounces.min(TALLY_ROWS) as usize;
         let is_sound = |(map, photons): (&MapOfRound, &Photons)| {
             let Photons { byte, count, crc32, fates } = photons;
-            let (ledger, starts) = (fates.is_sound(rows).then(|| fates.ledger()), *byte >= MAGIC.len() as u64 && byte.is_multiple_of(16));
+            let (ledger, starts) = (
+                (fates.bounces.len() == rows && fates.is_sound(MOST_COUNTED)).then(|| fates.ledger()),
+                *byte >= MAGIC.len() as u64 && byte.is_multiple_of(16),
+            );
             let ends = count.checked_mul(PHOTON_BYTES).and_then(|bytes| bytes.checked_add(*byte)).is_some_and(|last| last <= end);
             let counts =
                 ledger.is_some_and(|ledger| ledger.closes() && ledger.emitted == u64::from(map.photons) && ledger.stored == *count);
