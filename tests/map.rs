@@ -53,7 +53,12 @@ impl Room {
     fn lit_from(&self, gpu: &Gpu, settings: &SceneSettings, path: &Path) -> Result<RunResult, Error> {
         let map = MapFile::open("--map", path)?;
         let settings = map.settings(settings);
-        let plan = map.plan(self.plan(gpu, &settings), &self.geometry)?;
+        // A plan whose own photons would carry otherwise, as another camera's do: what counts is what those of the file carry.
+        let mut plan = self.plan(gpu, &settings);
+        for of_run in plan.global.iter_mut().chain(&mut plan.caustic) {
+            (of_run.flux_scale, of_run.flux_gain) = (7.0 * of_run.flux_scale, 2.0 * of_run.flux_gain);
+        }
+        let plan = map.plan(plan, &self.geometry)?;
         scene::light_from(gpu, &self.view(), plan, Some(&map), &mut Control::default())
     }
 
