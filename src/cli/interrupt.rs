@@ -28,7 +28,7 @@ pub(super) fn exit_code() -> u8 {
 }
 
 /// The flag that the first Ctrl-C (SIGTERM, SIGHUP) sets; the run then ends early and writes what it has. The second ends
-/// the program at once, as does the first where nothing looks at the flag. What is half-written goes.
+/// the program at once, as does the first where nothing looks at the flag. A half-written file is removed.
 pub(super) fn cancel_on_signal() -> Arc<AtomicBool> {
     let cancelled = Arc::new(AtomicBool::new(false));
     let flag = cancelled.clone();
