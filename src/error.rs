@@ -75,6 +75,14 @@ pub enum Error {
     #[error("{call} failed on the device: {reason}")]
     Device { call: &'static str, reason: String },
 
+    /// The device is gone, or its driver has reset it.
+    #[error("{}; the system's log says why; with --checkpoint a run can be gone on with", self.what())]
+    DeviceLost { call: &'static str },
+
+    /// Memory of the device or of the host ran out.
+    #[error("{}; ask for a smaller picture or fewer photons, or choose another device with --device", self.what())]
+    OutOfMemory { call: &'static str, what: String },
+
     /// The device lost photons or counted them twice.
     #[error(
         "the photon ledger does not close: {ledger}; the device or its driver loses work: update the driver, or choose another device with --device"
@@ -113,6 +121,15 @@ impl Error {
             | Error::NoValidationLayer => 2,
             Error::Interrupted => 130,
             _ => 1,
+        }
+    }
+
+    /// What failed, without a remedy.
+    pub fn what(&self) -> String {
+        match self {
+            Error::DeviceLost { call } => format!("{call} failed on the device: the device was lost"),
+            Error::OutOfMemory { call, what } => format!("{call} failed on the device: {what}"),
+            other => other.to_string(),
         }
     }
 

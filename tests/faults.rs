@@ -80,3 +80,138 @@ fn a_full_disk_costs_nothing_that_was_there() {
     assert!(stderr.starts_with("photonmill: -o m.pm: cannot be written"), "{stderr}");
     assert_eq!(place.names(), names, "a part of a file is left");
 }
+
+const LONG: &str = "--size 12x12 --photons 1500 --caustic-photons 800 --block 1 -q --rounds 40";
+
+/// Planted faults, and what the run says of each: how it goes on.
+fn assert_goes_on<'a>(line: &str, cases: impl IntoIterator<Item = (&'a str, &'a [&'a str])>) {
+    let place = Place::new();
+    let picture = |name: &str| std::fs::read(place.at(name)).unwrap();
+    place.succeed(&format!("{line} -o whole.exr"));
+    for (faults, said) in cases {
+        let output = place.command(&on_device(&format!("{line} -o a.exr"))).env("PHOTONMILL_FAULTS", faults).output().unwrap();
+        let stderr = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{faults}: {stderr}");
+        let lines: Vec<&str> = stderr.lines().collect();
+        let is_said = lines.len() == said.len() && lines.iter().zip(said).all(|(line, said)| line.contains(said));
+        assert!(is_said && lines.iter().all(|line| line.starts_with("photonmill: warning: ")), "{faults}: {stderr}");
+        assert!(picture("a.exr") == picture("whole.exr"), "{faults}: another picture");
+        std::fs::remove_file(place.at("a.exr")).unwrap();
+    }
+}
+
+const ANEW: &str = "was opened anew, and the run goes on: vk";
+const SMALLER: &str = "goes on in smaller pieces, with";
+
+/// A device that is lost or whose memory is full goes on to the same bits: in the trial, in the first round, in later ones, and twice.
+#[test]
+fn a_device_that_fails_goes_on_to_the_same_bits() {
+    let Some(_) = device() else { return };
+    let scene: [(&str, &[&str]); 6] = [
+        ("vkQueueSubmit2@6=lost", &[ANEW]),
+        ("vkWaitForFences@15=lost", &[ANEW]),
+        ("vkQueueSubmit2@40=lost,vkQueueSubmit2@60=lost", &[ANEW, ANEW]),
+        ("vkAllocateMemory@60=device-memory", &[SMALLER]),
+        ("vkAllocateMemory@20=device-memory,vkQueueSubmit2@30=lost", &[SMALLER, ANEW]),
+        ("vkCreateComputePipelines@4=host-memory", &[SMALLER]),
+    ];
+    assert_goes_on(&format!("render cornell-spheres {LONG}"), scene);
+    let of_box: [(&str, &[&str]); 3] = [
+        ("vkQueueSubmit2@6=lost", &[ANEW]),
+        ("vkAllocateMemory@20=device-memory", &[SMALLER]),
+        ("vkCreateBuffer@20=host-memory,vkQueueSubmit2@6=lost", &[SMALLER, ANEW]),
+    ];
+    assert_goes_on("--rounds 30 --photons 800 --rng philox --mesh 8 -q", of_box);
+}
+
+/// What a device that is lost for good had done is in the checkpoint, and one line says so.
+#[test]
+fn a_device_that_is_lost_for_good_leaves_a_checkpoint() {
+    let Some(_) = device() else { return };
+    let place = Place::new();
+    let line = format!("render cornell-spheres {LONG}");
+    place.succeed(&format!("{line} -o whole.exr"));
+    let kept = on_device(&format!("{line} -o a.exr --checkpoint c.pms --every 1ms"));
+    let output = place.command(&kept).env("PHOTONMILL_FAULTS", "vkQueueSubmit2@40+=lost").output().unwrap();
+    let stderr = text(&output.stderr);
+    assert_eq!((output.status.code(), stderr.lines().count()), (Some(1), 1), "{stderr}");
+    assert!(stderr.starts_with("photonmill: vk") && stderr.contains("the device was lost"), "{stderr}");
+    assert!(!place.at("a.exr").exists(), "a picture of less than all");
+    let saved = SavedRun::from_bytes(&std::fs::read(place.at("c.pms")).unwrap()).unwrap();
+    assert!(!saved.done.is_empty() && saved.missing() > 0, "{:?}", saved.done);
+    place.succeed(&format!("{line} -o a.exr --resume c.pms"));
+    assert!(std::fs::read(place.at("a.exr")).unwrap() == std::fs::read(place.at("whole.exr")).unwrap(), "another picture");
+    // Not a line of Rust's own, and no file, where it is lost before anything is done.
+    let names = place.names();
+    for faults in ["vkCreateDevice@1=lost", "vkQueueSubmit2@1=lost", "vkAllocateMemory@1+=device-memory", "vkQueueSubmit2@12+=lost"] {
+        let output = place.command(&on_device(&format!("{line} -o b.exr"))).env("PHOTONMILL_FAULTS", faults).output().unwrap();
+        let stderr = text(&output.stderr);
+        assert_eq!((output.status.code(), stderr.lines().count()), (Some(1), 1), "{faults}: {stderr}");
+        assert!(stderr.starts_with("photonmill: ") && place.names() == names, "{faults}: {stderr}");
+    }
+}
+
+/// One of two devices may be lost, opened anew, or have too little memory.
+#[test]
+fn one_of_several_devices_that_fails_goes_on() {
+    let Some(_) = device() else { return };
+    let cases: [(&str, &[&str]); 2] = [("vkQueueSubmit2@60=lost", &[ANEW]), ("vkAllocateMemory@150=device-memory", &[SMALLER])];
+    let number = std::env::var("PHOTONMILL_DEVICE").map_or(0, |_| device().unwrap().facts().index);
+    let place = Place::new();
+    place.succeed(&format!("render cornell-spheres {LONG} -o whole.exr"));
+    for (faults, said) in cases {
+        let line = format!("render cornell-spheres {LONG} -o a.exr --devices {number},{number}");
+        let output = place.command(&line).env("PHOTONMILL_FAULTS", faults).output().unwrap();
+        let stderr = text(&output.stderr);
+        assert!(output.status.success() && stderr.lines().count() == said.len() && stderr.contains(said[0]), "{faults}: {stderr}");
+        assert!(std::fs::read(place.at("a.exr")).unwrap() == std::fs::read(place.at("whole.exr")).unwrap(), "{faults}: another picture");
+    }
+}
+
+/// Photons for a file go on behind the last whole round.
+#[test]
+fn a_map_goes_on_behind_its_last_whole_round() {
+    let Some(_) = device() else { return };
+    let place = Place::new();
+    let line = "map cornell-spheres --photons 900 --caustic-photons 500 --rounds 6 -q";
+    place.succeed(&format!("{line} -o whole.pm"));
+    let make = |faults: &str| place.command(&on_device(&format!("{line} -o a.pm"))).env("PHOTONMILL_FAULTS", faults).output().unwrap();
+    let output = make("vkQueueSubmit2@30=lost");
+    assert!(output.status.success() && text(&output.stderr).contains(ANEW), "{}", text(&output.stderr));
+    assert!(std::fs::read(place.at("a.pm")).unwrap() == std::fs::read(place.at("whole.pm")).unwrap(), "other photons");
+    let output = make("vkQueueSubmit2@30+=lost");
+    assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
+    place.succeed("map info a.pm --json a.json");
+    let rounds = place.json("a.json")["rounds"].as_u64().unwrap();
+    assert!((1..6).contains(&rounds), "{rounds} rounds");
+}
+
+/// What --memory allows is never exceeded: smaller pieces, and the same bits; too little is refused by what is needed.
+#[test]
+fn memory_is_kept_to() {
+    let Some(_) = device() else { return };
+    let place = Place::new();
+    let line = "render cornell-spheres --size 24x24 --photons 60000 --caustic-photons 30000 --rounds 2 --block 1 -q";
+    place.succeed(&format!("{line} -o whole.exr"));
+    let bytes = |name: &str| -> f64 { place.json(name)["plan"]["bytes"].as_f64().unwrap() };
+    let chunk = |name: &str| place.json(name)["plan"]["maps"][0]["chunk_photons"].as_u64().unwrap();
+    place.succeed(&format!("{line} -o a.exr --json whole.json"));
+    for limit in ["40M", "20MiB", "12582912"] {
+        place.succeed(&format!("{line} -o a.exr --json a.json --memory {limit}"));
+        assert!(std::fs::read(place.at("a.exr")).unwrap() == std::fs::read(place.at("whole.exr")).unwrap(), "{limit}: another picture");
+        let most = limit.trim_end_matches("MiB").trim_end_matches('M').parse::<f64>().unwrap();
+        let most = if most > 1e6 { most } else { most * 1048576.0 };
+        assert!(bytes("a.json") <= most && bytes("whole.json") > most, "{limit}: {}, {}", bytes("a.json"), bytes("whole.json"));
+        assert!(chunk("a.json") < chunk("whole.json"));
+    }
+    place.assert_refused([
+        (
+            on_device(&format!("render cornell-spheres --size 1000x1000 -q -o b.exr --memory 8M")),
+            ["--memory 8M", "MiB of device memory"].as_slice(),
+        ),
+        (on_device(&format!("{line} -o b.exr --memory 1023K")), ["--memory 1023K", "1 MiB or more"].as_slice()),
+        (on_device(&format!("{line} -o b.exr --memory lots")), ["--memory lots", "512M"].as_slice()),
+        (on_device(&format!("{line} -o b.exr --memory -1G")), ["--memory", "512M"].as_slice()),
+        ("--variant cpu --memory 1G -o b.png".to_owned(), ["--memory", "--variant cpu"].as_slice()),
+    ]);
+}

@@ -9,7 +9,7 @@ use photonmill::engine::End;
 use photonmill::engine::saved::{SavedFilm, SavedRun};
 use photonmill::engine::scene::losses::losses;
 use photonmill::engine::scene::{self, RunResult, SceneFilm, View, trial};
-use photonmill::engine::several_devices::{Job, run_on};
+use photonmill::engine::several_devices::{Job, Remedy, run_on};
 use photonmill::engine::watch::{Keep, SaveRun};
 use photonmill::ledger::Fates;
 use photonmill::settings::stop::Stop;
@@ -118,9 +118,11 @@ impl Room {
             },
             error: &|film: &SceneFilm| film.error(plan.film.confidence),
             losses: &|film: &SceneFilm, fates: &[Fates]| losses(&self.geometry, &plan, fates, film),
-            given_up: &|_: &Gpu, _: &Error| {
+            failed: &|_: &Gpu, _: &Error, remedy: Remedy| {
+                assert_eq!(remedy, Remedy::GivenUp);
                 given_up.fetch_add(1, Ordering::Relaxed);
             },
+            can_go_on: true,
             stop: plan.settings.stop,
             alpha: plan.settings.alpha,
             rounds: plan.settings.rounds,

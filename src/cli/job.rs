@@ -8,13 +8,13 @@ use super::interrupt::interruptible;
 use super::keep::Keeper;
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::stop::{StopArgs, bias_before, check_bias, goals, rounds_after, up_to};
-use super::{complain, given_up};
-use crate::engine::Control;
+use super::{complain, device_failed};
 use crate::engine::saved::SavedFilm;
 use crate::engine::scene::losses::losses;
 use crate::engine::scene::map_file::MapFile;
 use crate::engine::scene::{self, RunResult, SceneFilm, View};
-use crate::engine::several_devices;
+use crate::engine::several_devices::{self, until_done};
+use crate::engine::{self, Control};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::ledger::Fates;
@@ -90,7 +90,6 @@ impl Job<'_> {
         cancelled: &AtomicBool,
     ) -> Result<RunResult> {
         let Job { scene, geometry, sensor, camera, phases, map, point, .. } = *self;
-        let gpu = &gpus[0];
         let is_picture = matches!(sensor, Sensor::Picture { .. });
         let mut settings = self.settings.in_whole_blocks(is_picture);
         if let Some(most) = map.map(MapFile::rounds).filter(|most| settings.rounds > *most) {
@@ -102,30 +101,28 @@ impl Job<'_> {
             reporter.note(&format!("--rounds {} is taken as {}: whole blocks of {block}", self.settings.rounds, settings.rounds));
         }
         let view = View { geometry, camera, phases };
-        let plan = scene::trial::plan(gpu, scene, &view, settings, sensor)?;
+        let plan = until_done(&mut gpus[0], &device_failed, |gpu| scene::trial::plan(gpu, scene, &view, settings, sensor))?;
         let mut plan = map.into_iter().try_fold(plan, |plan, map| map.plan(plan, geometry))?;
         if let Some(warning) = scene_report::radius_warning(&plan, geometry, point) {
             complain(&format!("warning: {warning}"));
         }
         self.announce(&plan, reporter);
-        let measure = |gpu: &Gpu, plan: &ScenePlan, factor_and_rounds| {
-            interruptible(|| scene::bias::measure(gpu, scene, &view, plan, factor_and_rounds, cancelled))
+        let measure = |gpu: &mut Gpu, plan: &ScenePlan, factor_and_rounds| {
+            let once = |gpu: &Gpu| scene::bias::measure(gpu, scene, &view, plan, factor_and_rounds, cancelled);
+            interruptible(|| until_done(gpu, &device_failed, once))
         };
         let alpha = settings.alpha;
         check_bias(&settings.stop, plan.film.bias)?;
         // The error asked for is noise and bias together, so what blocks do not tell must be known beforehand.
         let takes_extra_runs = stop.bias && plan.film.bias == BiasPlan::ExtraRuns;
-        let before = bias_before(&settings.stop, takes_extra_runs, alpha < 1.0, reporter, |rounds| measure(gpu, &plan, (1.0, rounds)))?;
+        let before =
+            bias_before(&settings.stop, takes_extra_runs, alpha < 1.0, reporter, |rounds| measure(&mut gpus[0], &plan, (1.0, rounds)))?;
         plan.settings.stop.bias = before.map(|bias| bias.upper);
 
         reporter.status("making the pipelines");
         let keep = keeper.keep(&scene.name);
         let mut control = Control { cancelled, progress: &mut |progress| reporter.report(progress, "round"), keep };
-        let mut lit = if gpus.len() == 1 {
-            interruptible(|| scene::light_from(gpu, &view, plan, map, &mut control))?
-        } else {
-            interruptible(|| self.share(gpus, &view, &plan, &mut control))?
-        };
+        let mut lit = interruptible(|| self.light(gpus, &view, &plan, &mut control))?;
         if lit.is_cancelled() {
             complain(&format!("ended early: the results are of {} of {}", counted(lit.film.rounds, "round"), settings.rounds));
             return Ok(lit);
@@ -136,7 +133,7 @@ impl Job<'_> {
             // At the radius whose square is the mean of the rounds' squares.
             None if takes_extra_runs => {
                 reporter.status("measuring the bias");
-                measure(&gpus[0], &lit.plan, (shrunk.sqrt(), rounds_after(lit.film.rounds)))?
+                measure(&mut gpus[0], &lit.plan, (shrunk.sqrt(), rounds_after(lit.film.rounds)))?
             }
             None => None,
         };
@@ -144,18 +141,21 @@ impl Job<'_> {
         Ok(lit)
     }
 
-    /// Runs on several devices, for the first of which the plan was made.
-    fn share(&self, gpus: &mut Vec<Gpu>, view: &View, plan: &ScenePlan, control: &mut Control) -> Result<RunResult> {
+    /// Runs on all devices, for the first of which the plan was made.
+    fn light(&self, gpus: &mut Vec<Gpu>, view: &View, plan: &ScenePlan, control: &mut Control) -> Result<RunResult> {
         let Job { scene, geometry, map, .. } = *self;
-        let facts = gpus[0].facts();
-        let first = (facts.name.clone(), facts.driver.clone());
+        let first = gpus[0].facts().clone();
         let run = |gpu: &Gpu, stop: Stop, control: &mut Control| {
-            let is_alike = (&gpu.facts().name, &gpu.facts().driver) == (&first.0, &first.1);
-            let mut plan = if is_alike {
-                plan.clone()
+            let facts = gpu.facts();
+            let is_alike = (&facts.name, &facts.driver) == (&first.name, &first.driver);
+            let replan = |new: Result<ScenePlan>| map.into_iter().try_fold(new?, |plan, map| map.plan(plan, geometry));
+            let mut plan = if !is_alike {
+                replan(scene::trial::plan(gpu, scene, view, &plan.settings, plan.sensor))?
+            } else if facts.usable_memory_bytes != first.usable_memory_bytes {
+                let limits = engine::limits(facts);
+                replan(ScenePlan::with_trial(scene, geometry, &plan.settings, plan.sensor, &limits, plan.trial.clone()))?
             } else {
-                let plan = scene::trial::plan(gpu, scene, view, &plan.settings, plan.sensor)?;
-                map.into_iter().try_fold(plan, |plan, map| map.plan(plan, geometry))?
+                plan.clone()
             };
             plan.settings.stop = stop;
             scene::light_from(gpu, view, plan, map, control)
@@ -169,7 +169,8 @@ impl Job<'_> {
             },
             error: &|film: &SceneFilm| film.error(plan.film.confidence),
             losses: &|film: &SceneFilm, fates: &[Fates]| losses(geometry, plan, fates, film),
-            given_up: &given_up,
+            failed: &device_failed,
+            can_go_on: true,
             stop: plan.settings.stop,
             alpha: plan.settings.alpha,
             rounds: plan.settings.rounds,
@@ -177,8 +178,9 @@ impl Job<'_> {
             bounces: plan.settings.bounces,
             photons_per_round,
         };
-        let lit = several_devices::run_on(gpus, &job, control)?;
+        let mut lit = several_devices::run_on(gpus, &job, control)?;
         // With its goals, which no device had.
-        Ok(RunResult { plan: plan.clone(), ..lit })
+        lit.plan.settings.stop = plan.settings.stop;
+        Ok(lit)
     }
 }

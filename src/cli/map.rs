@@ -11,14 +11,16 @@ use super::picture_size::PictureSize;
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::scene::{PhotonArgs, SceneArgs, camera, geometry};
 use super::values::{parse_integer, value_enum};
-use super::{End, JsonOrStdoutArg, complain, optional_file, say};
+use super::{End, JsonOrStdoutArg, complain, device_failed, optional_file, say};
 use crate::engine;
 use crate::engine::Control;
-use crate::engine::scene::fill_map::fill;
+use crate::engine::scene::fill_map::{Filled, fill};
 use crate::engine::scene::map_file::{MapFile, MapWriter};
 use crate::engine::scene::{View, trial};
+use crate::engine::several_devices::until_done;
 use crate::engine::watch::Keep;
 use crate::error::{Error, Result, require};
+use crate::gpu::Gpu;
 use crate::output::destination::{Destination, write_all};
 use crate::output::photon_map;
 use crate::plan::scene::ScenePlan;
@@ -143,12 +145,14 @@ fn make(args: &MakeArgs, cancelled: &AtomicBool) -> Result<End> {
     let (width, height) = PictureSize::resolve(None, &camera, &reporter)?;
     let camera = if scene.cameras.is_empty() { scene.camera_around(f64::from(width) / f64::from(height)) } else { camera };
     let geometry = geometry(&scene, &settings, &reporter)?;
-    let gpu = args.device.open(&reporter)?;
+    let mut gpu = args.device.open(&reporter)?;
     let view = View { geometry: &geometry, camera: Some(&camera), phases: &[] };
-    let plan = trial::plan(&gpu, &scene, &view, &settings, Sensor::Picture { width, height })?;
+    let sensor = Sensor::Picture { width, height };
+    let trial = until_done(&mut gpu, &device_failed, |gpu| trial::plan(gpu, &scene, &view, &settings, sensor))?.trial;
     // No picture is made, so that its buffers need no room.
-    let limits = engine::limits(gpu.facts());
-    let plan = ScenePlan::with_trial(&scene, &geometry, &settings, Sensor::Picture { width: 1, height: 1 }, &limits, plan.trial)?;
+    let sensor = Sensor::Picture { width: 1, height: 1 };
+    let plan_of = |gpu: &Gpu| ScenePlan::with_trial(&scene, &geometry, &settings, sensor, &engine::limits(gpu.facts()), trial.clone());
+    let plan = plan_of(&gpu)?;
     let maps: Vec<String> = plan.maps().map(|map| counted(map.photons, &format!("{} photon", map.name))).collect();
     let no_photons = "calls for no photons: nothing scatters light a second time, and nothing makes caustics";
     require(!maps.is_empty(), "SCENE", &args.scene.scene, no_photons)?;
@@ -159,7 +163,15 @@ fn make(args: &MakeArgs, cancelled: &AtomicBool) -> Result<End> {
     let unwritten = |error: std::io::Error| output.failed(&error);
     let mut writer = MapWriter::new(file.file(), &scene.name, &geometry, &plan, &gpu.facts().label()).map_err(unwritten)?;
     let mut control = Control { cancelled, progress: &mut |progress| reporter.report(progress, "round"), keep: Keep::default() };
-    let filled = interruptible(|| fill(&gpu, &geometry, &plan, &mut writer, &unwritten, &mut control))?;
+    let mut once = |gpu: &Gpu| fill(gpu, &geometry, &plan_of(gpu)?, &mut writer, &unwritten, &mut control);
+    let filled = interruptible(|| until_done(&mut gpu, &device_failed, &mut once));
+    // A device that is gone for good leaves whole rounds too.
+    let (filled, failed) = match filled {
+        Err(error @ (Error::DeviceLost { .. } | Error::OutOfMemory { .. })) if writer.rounds() > 0 => {
+            (Filled { rounds: writer.rounds(), is_cancelled: true, nonfinite_values: None }, Some(error))
+        }
+        filled => (filled?, None),
+    };
     let header = writer.finish().map_err(unwritten)?;
     file.finish()?;
     reporter.finish();
@@ -168,7 +180,7 @@ fn make(args: &MakeArgs, cancelled: &AtomicBool) -> Result<End> {
     }
     let found = filled.nonfinite_values.map_or_else(String::new, |values| values.text() + "\n");
     say(&format!("{found}{}\nwrote {}", photon_map::text(&header).trim_end(), args.output.display()))?;
-    Ok(if filled.is_cancelled { End::Cancelled } else { End::Finished })
+    failed.map_or(Ok(if filled.is_cancelled { End::Cancelled } else { End::Finished }), Err)
 }
 
 /// A file that is written piece by piece.

@@ -33,11 +33,13 @@ use std::path::PathBuf;
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::engine::run::RunResult;
+use crate::engine::several_devices::Remedy;
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Options};
 use crate::output::destination::Destination;
 use interrupt::{cancel_on_signal, exit_code, interruptible};
 use progress::print_line;
+use values::parse_bytes;
 
 /// Photon mapping on any Vulkan GPU.
 ///
@@ -104,6 +106,10 @@ struct DeviceArgs {
     /// GPU if there is one]
     #[arg(long, value_name = "NUMBER|NAME", allow_negative_numbers = true)]
     device: Option<String>,
+    /// Most device memory that buffers may take, as 512M or 2G; work is done in smaller pieces to keep to it, with the same result to
+    /// the bit [default: half of the device's]
+    #[arg(long, value_name = "BYTES", value_parser = parse_bytes, allow_hyphen_values = true)]
+    memory: Option<u64>,
     /// Turn on the Vulkan validation layer with synchronization validation; any message is an error
     #[arg(long)]
     validate: bool,
@@ -111,7 +117,7 @@ struct DeviceArgs {
 
 impl DeviceArgs {
     fn options(&self) -> Options {
-        Options { device: self.device.clone(), validate: self.validate, ..Options::default() }
+        Options { device: self.device.clone(), validate: self.validate, memory: self.memory, ..Options::default() }
     }
 
     /// The same for a command that measures.
@@ -250,9 +256,15 @@ fn complain(line: &str) {
     print_line(&format!("photonmill: {line}"));
 }
 
-/// A device that failed while others share its run.
-fn given_up(gpu: &Gpu, error: &Error) {
-    complain(&format!("warning: {} is given up, and the others go on: {error}", gpu.facts().label()));
+/// Tells of a device that failed while it was at work.
+fn device_failed(gpu: &Gpu, error: &Error, remedy: Remedy) {
+    let facts = gpu.facts();
+    let what = match remedy {
+        Remedy::OpenedAnew => "was opened anew, and the run goes on".to_owned(),
+        Remedy::LessMemory => format!("goes on in smaller pieces, with {} MiB at most", facts.usable_memory_bytes >> 20),
+        Remedy::GivenUp => "is given up, and the others go on".to_owned(),
+    };
+    complain(&format!("warning: {} {what}: {}", facts.label(), error.what()));
 }
 
 /// Text on stdout; a reader that has gone away, as `head` does, has seen enough.

@@ -134,9 +134,10 @@ impl DevicesOfRunArgs {
 
     /// Refuses devices where nothing is run on any.
     pub(super) fn check_unused(&self, idle: &str) -> Result<()> {
-        let DeviceArgs { device, validate } = &self.one.chosen;
+        let DeviceArgs { device, validate, memory } = &self.one.chosen;
         require(device.is_none(), "--device", device.as_deref().unwrap_or_default(), idle)?;
         require(self.devices.is_none(), "--devices", "on", idle)?;
+        require(memory.is_none(), "--memory", memory.unwrap_or_default(), idle)?;
         require(!validate, "--validate", "on", idle)
     }
 

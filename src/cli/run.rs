@@ -15,7 +15,7 @@ use super::values::{
     BuilderArg, SwitchArg, builder_parser, parse_integer, parse_number, parse_numbers, parse_photon_name, parse_shininess, parse_threads,
     parse_within, value_enum,
 };
-use super::{End, complain, given_up, say, say_beside};
+use super::{End, complain, device_failed, say, say_beside};
 use crate::engine;
 use crate::engine::Control;
 use crate::engine::choose_builder::{Choice, choose_builder};
@@ -23,7 +23,7 @@ use crate::engine::replay::PhotonName;
 use crate::engine::room::film::{RoomFilm, estimate_walls};
 use crate::engine::room::{self, RunResult};
 use crate::engine::saved::SavedFilm;
-use crate::engine::several_devices;
+use crate::engine::several_devices::{self, until_done};
 use crate::error::{Result, require};
 use crate::gpu::Gpu;
 use crate::ledger::Fates;
@@ -265,20 +265,23 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
         require(!args.stop.bias, "--nearest", nearest, why)?;
     }
     announce(&reporter, gpu, &scene, &settings)?;
-    let measure = |gpu: Option<&Gpu>, settings: &RoomSettings, rounds| room::measure_bias(gpu, &scene, settings, rounds, cancelled);
-    let before = bias_before(&settings.stop, args.stop.bias, false, &reporter, |rounds| measure(gpu, &settings, rounds))?;
+    let measure = |gpu: Option<&mut Gpu>, settings: &RoomSettings, rounds| match gpu {
+        Some(gpu) => until_done(gpu, &device_failed, |gpu| room::measure_bias(Some(gpu), &scene, settings, rounds, cancelled)),
+        None => room::measure_bias(None, &scene, settings, rounds, cancelled),
+    };
+    let before = bias_before(&settings.stop, args.stop.bias, false, &reporter, |rounds| measure(gpus.first_mut(), &settings, rounds))?;
     let settings = RoomSettings { stop: Stop { bias: before.map(|bias| bias.upper), ..settings.stop }, ..settings };
     reporter.status("making the pipelines");
     let keep = keeper.keep("open-box");
     let mut control = Control { cancelled, progress: &mut |progress| reporter.report(progress, "photon"), keep };
     let mut outcome = match gpus.len() {
-        0 | 1 => room::run(gpus.first(), &scene, &settings, &mut control)?,
-        _ => share(&mut gpus, &scene, &settings, &mut control)?,
+        0 => room::run(None, &scene, &settings, &mut control)?,
+        _ => light(&mut gpus, &scene, &settings, &mut control)?,
     };
     outcome.bias = before;
     if before.is_none() && args.stop.bias && !outcome.is_cancelled() {
         reporter.status("measuring the bias");
-        outcome.bias = measure(gpus.first(), &settings, rounds_after(outcome.film.rounds))?;
+        outcome.bias = measure(gpus.first_mut(), &settings, rounds_after(outcome.film.rounds))?;
     }
     reporter.finish();
     let end = End::of(&outcome);
@@ -291,9 +294,10 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
     Ok(end)
 }
 
-/// Runs on several devices.
-fn share(gpus: &mut Vec<Gpu>, scene: &RoomScene, settings: &RoomSettings, control: &mut Control) -> Result<RunResult> {
-    require(settings.sums == Sums::Integer, "--devices", "with --sums", "adds up integers only; leave --sums out")?;
+/// Runs on all devices.
+fn light(gpus: &mut Vec<Gpu>, scene: &RoomScene, settings: &RoomSettings, control: &mut Control) -> Result<RunResult> {
+    let is_alone = gpus.len() == 1;
+    require(is_alone || settings.sums == Sums::Integer, "--devices", "with --sums", "adds up integers only; leave --sums out")?;
     let plan = RoomPlan::new(scene, settings, &engine::limits(gpus[0].facts()))?;
     let weights = OnceCell::new();
     let run =
@@ -306,7 +310,8 @@ fn share(gpus: &mut Vec<Gpu>, scene: &RoomScene, settings: &RoomSettings, contro
         },
         error: &|film: &RoomFilm| room::error(film, scene, &plan, &weights),
         losses: &|_: &RoomFilm, fates: &[Fates]| room::losses(&plan, fates),
-        given_up: &given_up,
+        failed: &device_failed,
+        can_go_on: settings.sums == Sums::Integer,
         stop: settings.stop,
         // The paper's radius never shrinks, and its rounds are independent.
         alpha: 1.0,

@@ -10,6 +10,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use crate::engine::blocks::Share;
 use crate::engine::replay::PhotonName;
+use crate::gpu::LEAST_MEMORY;
 use crate::settings::scene::Effect;
 use crate::settings::{Builder, Math, WALL_NAMES};
 
@@ -119,6 +120,16 @@ pub(super) fn parse_seconds(text: &str) -> Parsed<f64> {
     let units = [("ms", 1e-3), ("s", 1.0), ("m", 60.0), ("h", 3600.0)];
     let (number, unit) = units.iter().find_map(|(name, unit)| Some((text.strip_suffix(name)?, *unit))).unwrap_or((text, 1.0));
     number.trim().parse().map(|count: f64| count * unit).map_err(|_| "must be a time, such as 2s, 500ms or 3m".to_owned())
+}
+
+/// Bytes, as a number or with K, M, G or T for powers of 1024.
+pub(super) fn parse_bytes(text: &str) -> Parsed<u64> {
+    let units = [("K", 10), ("M", 20), ("G", 30), ("T", 40)];
+    let short = text.strip_suffix("iB").unwrap_or(text);
+    let (number, bits) = units.iter().find_map(|(name, bits)| Some((short.strip_suffix(name)?, *bits))).unwrap_or((short, 0));
+    let allowed = format!("must be {} MiB or more, as bytes or with K, M, G or T behind the number: 512M, 2G", LEAST_MEMORY >> 20);
+    let bytes = number.trim().parse::<f64>().ok().map(|number| number * (1u64 << bits) as f64);
+    bytes.filter(|bytes| (LEAST_MEMORY as f64..1e18).contains(bytes)).map(|bytes| bytes as u64).ok_or(allowed)
 }
 
 /// `3/8`, counted from 1.

@@ -8,7 +8,8 @@ use sha2::{Digest, Sha256};
 use crate::gpu::DeviceFacts;
 use crate::settings::Math;
 
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// By default that of a run that nobody has to know again.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Identity {
     /// What the scene is called; another name makes no other identity.
     pub scene: String,

@@ -34,8 +34,7 @@ use crate::plan::Limits;
 pub fn limits(facts: &DeviceFacts) -> Limits {
     Limits {
         buffer_bytes: facts.storage_buffer_range_bytes.min(facts.allocation_bytes),
-        // Half, as the device is not ours alone.
-        memory_bytes: facts.device_memory_bytes / 2,
+        memory_bytes: facts.usable_memory_bytes,
         group_size: facts.work_group_size,
         votes_in_loops: facts.votes_in_loops,
         ..Limits::of_kind(facts.kind)

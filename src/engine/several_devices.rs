@@ -1,10 +1,12 @@
-//! A run on several devices: each takes the next block when it is done with one, and integer sums make one film of all, to the bits
-//! of a run on one device.
+//! A run on one device or several, to its end, whatever becomes of the devices. Each takes the next block when it is done with one, and
+//! integer sums make one film of all, to the bits of a run on one device.
 //!
 //! Whether the run ends is decided where a run on one device would: after so many blocks, in the order in which they were dealt. Before
 //! a device takes its first block beyond such a look, it hands over what it has. Once all have, these add up to the blocks before the
-//! look and no others; what was done since is left out if the run ends there. A device that fails is given up: the others go on from
-//! the last look.
+//! look and no others; what was done since is left out if the run ends there.
+//!
+//! A device that is lost is opened anew, and one whose memory is full goes on with less; where that is of no use it is given up, and the
+//! others go on. All of them go on from the last look; one device alone, from what it has noted of itself.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -33,14 +35,73 @@ pub struct Job<'a, Plan, Film> {
     pub film: fn(SavedFilm) -> Film,
     pub error: &'a dyn Fn(&Film) -> FilmError,
     pub losses: &'a dyn Fn(&Film, &[Fates]) -> Losses,
-    /// Told of a device that failed and is given up, and why.
-    pub given_up: &'a dyn Fn(&Gpu, &Error),
+    /// Told of a device that failed, why, and what is done about it.
+    pub failed: &'a dyn Fn(&Gpu, &Error, Remedy),
+    /// Whether what is done can be gone on with: sums of floats cannot.
+    pub can_go_on: bool,
     pub stop: Stop,
     pub alpha: f64,
     pub rounds: u32,
     pub rounds_per_block: u32,
     pub bounces: u32,
     pub photons_per_round: u64,
+}
+
+/// What is done about a device that failed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Remedy {
+    OpenedAnew,
+    LessMemory,
+    GivenUp,
+}
+
+/// A device that fails more often without having done anything in between is not worth it.
+const MOST_FAILURES: u32 = 4;
+/// Between two times at which a run on one device is noted, in memory.
+const NOTED_EVERY: Duration = Duration::from_secs(10);
+
+/// Makes a device that failed fit for the same work; `None` where that cannot be.
+fn mend(gpu: &mut Gpu, error: &Error) -> Option<Remedy> {
+    match error {
+        Error::DeviceLost { .. } => gpu.reopen().is_ok().then_some(Remedy::OpenedAnew),
+        Error::OutOfMemory { .. } => gpu.use_less_memory().then_some(Remedy::LessMemory),
+        _ => None,
+    }
+}
+
+/// Does what can be done again from its start until a device is fit for it.
+pub fn until_done<T>(gpu: &mut Gpu, failed: &dyn Fn(&Gpu, &Error, Remedy), mut work: impl FnMut(&Gpu) -> Result<T>) -> Result<T> {
+    for failures in 1.. {
+        let error = match work(gpu) {
+            Err(error) if failures <= MOST_FAILURES => error,
+            done => return done,
+        };
+        let Some(remedy) = mend(gpu, &error) else { return Err(error) };
+        failed(gpu, &error, remedy);
+    }
+    unreachable!("failures are counted")
+}
+
+/// Notes a run on one device in memory, and hands it on to whoever keeps it.
+struct Notes<'a> {
+    outer: Option<&'a mut dyn SaveRun>,
+    wants_identity: bool,
+    latest: Option<SavedRun>,
+}
+
+impl SaveRun for Notes<'_> {
+    fn wants_identity(&self) -> bool {
+        self.wants_identity
+    }
+
+    fn begins(&mut self, identity: &Identity) {
+        self.outer.iter_mut().for_each(|outer| outer.begins(identity));
+    }
+
+    fn save(&mut self, run: &SavedRun, is_last: bool) -> Result<()> {
+        self.latest = (!is_last).then(|| run.clone());
+        self.outer.iter_mut().try_for_each(|outer| outer.save(run, is_last))
+    }
 }
 
 /// What a device says.
@@ -96,29 +157,71 @@ enum Outcome<Plan, Film> {
 /// Between two looks at the clock and at what the user wants.
 const PAUSE: Duration = Duration::from_millis(20);
 
-/// Runs a job on several devices to its end.
+/// Runs a job on one device or several to its end.
 pub fn run_on<Plan, Film>(gpus: &mut Vec<Gpu>, job: &Job<Plan, Film>, control: &mut Control) -> Result<RunResult<Plan, Film>>
 where
     Plan: Send,
     Film: Clone + Send,
 {
     let blocks = job.rounds.div_ceil(job.rounds_per_block);
-    if control.keep.share.count(blocks) < 2 {
-        return (job.run)(&gpus[0], job.stop, control);
-    }
     let started = Instant::now();
+    // Another scene's file is to be refused; what was noted of this run is known to be its own.
+    let wants_identity = control.keep.save.is_some() || control.keep.resume.is_some();
+    let is_shared = control.keep.share.count(blocks) > 1;
     let mut base = control.keep.resume.take();
+    let mut failures = 0;
     loop {
         let resumed = base.clone();
-        let attempt = Together { job, started, blocks };
-        match attempt.run(gpus, base, control)? {
+        let outcome = if is_shared && gpus.len() > 1 {
+            Together { job, started, blocks }.run(gpus, base, control)?
+        } else {
+            job.alone(&gpus[0], base, started.elapsed(), is_shared && job.can_go_on, wants_identity, control)
+        };
+        let (device, error, so_far) = match outcome {
             Outcome::Ended(result) => return Ok(*result),
-            Outcome::Failed { error, .. } if gpus.len() == 1 => return Err(error),
-            Outcome::Failed { device, error, base: so_far } => {
-                (job.given_up)(&gpus[device], &error);
-                gpus.remove(device);
-                base = so_far.map(|run| (resumed.as_ref().map(|(path, _)| path.clone()).unwrap_or_default(), *run)).or(resumed);
+            Outcome::Failed { device, error, base } => (device, error, base),
+        };
+        let count = |run: &SavedRun| run.done.count();
+        let is_further = so_far.as_deref().map_or(0, count) > resumed.as_ref().map_or(0, |(_, run)| count(run));
+        failures = if is_further { 1 } else { failures + 1 };
+        let file = resumed.as_ref().map(|(path, _)| path.clone()).unwrap_or_default();
+        base = so_far.map(|run| (file, *run)).or(resumed);
+        let remedy = if failures > MOST_FAILURES { None } else { mend(&mut gpus[device], &error) };
+        if remedy.is_none() && gpus.len() == 1 {
+            if let (Some(save), Some((_, run))) = (control.keep.save.as_mut(), &base) {
+                save.save(run, true)?;
             }
+            return Err(error);
+        }
+        (job.failed)(&gpus[device], &error, remedy.unwrap_or(Remedy::GivenUp));
+        if remedy.is_none() {
+            gpus.remove(device);
+            failures = 0;
+        }
+    }
+}
+
+impl<Plan, Film> Job<'_, Plan, Film> {
+    /// Runs on one device; of its time some is `spent`.
+    fn alone(
+        &self,
+        gpu: &Gpu,
+        resume: Option<(std::path::PathBuf, SavedRun)>,
+        spent: Duration,
+        notes_itself: bool,
+        wants_identity: bool,
+        control: &mut Control,
+    ) -> Outcome<Plan, Film> {
+        let Keep { scene, share, every, save, .. } = &mut control.keep;
+        let every = if save.is_some() { (*every).min(NOTED_EVERY) } else { NOTED_EVERY };
+        let is_used = notes_itself || save.is_some();
+        let mut notes = Notes { outer: save.as_mut().map(|save| &mut **save as &mut dyn SaveRun), wants_identity, latest: None };
+        let save = is_used.then_some(&mut notes as &mut dyn SaveRun);
+        let keep = Keep { scene, share: *share, resume, every, save, dealt: None };
+        let stop = Stop { seconds: self.stop.seconds.map(|seconds| (seconds - spent.as_secs_f64()).max(0.0)), ..self.stop };
+        match (self.run)(gpu, stop, &mut Control { cancelled: control.cancelled, progress: &mut *control.progress, keep }) {
+            Ok(result) => Outcome::Ended(Box::new(result)),
+            Err(error) => Outcome::Failed { device: 0, error, base: notes.latest.map(Box::new) },
         }
     }
 }

@@ -26,6 +26,11 @@ pub struct Control<'a> {
 
 /// Takes a run as far as whole blocks are done.
 pub trait SaveRun {
+    /// Whether it must know what the run computes.
+    fn wants_identity(&self) -> bool {
+        true
+    }
+
     /// Told once what the run computes, before its first block.
     fn begins(&mut self, _: &Identity) {}
 
@@ -71,8 +76,13 @@ impl Keep<'_> {
     /// The identity of the run, which takes a while to find out, where anybody asks. Fails where the file that it is to go on with is
     /// of another one.
     pub fn identity(&mut self, of_run: impl FnOnce(&str) -> Identity) -> Result<Option<Identity>> {
-        if self.save.is_none() && self.resume.is_none() {
-            return Ok(None);
+        let is_wanted = match (&self.save, &self.resume) {
+            (None, None) => return Ok(None),
+            (Some(save), _) => save.wants_identity(),
+            (None, Some(_)) => true,
+        };
+        if !is_wanted {
+            return Ok(Some(Identity::default()));
         }
         let identity = of_run(self.scene);
         if let Some(save) = &mut self.save {

@@ -7,9 +7,10 @@ use ash::vk;
 use bytemuck::Pod;
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
+use gpu_allocator::{AllocationError, AllocationSizes};
 use serde::Serialize;
 
-use super::{Context, Gpu, call};
+use super::{Context, Gpu, call, faults};
 use crate::error::{Error, Result};
 
 /// Who touches a buffer's memory.
@@ -86,6 +87,19 @@ pub struct AnyBuffer {
     context: Arc<Context>,
 }
 
+/// What takes memory of a device.
+const ALLOCATION: &str = "vkAllocateMemory";
+
+fn full(name: &str, size_bytes: u64, why: String) -> Error {
+    Error::OutOfMemory { call: ALLOCATION, what: format!("no {size_bytes} bytes for {name}: {why}") }
+}
+
+/// Blocks of memory that are taken at once where so many bytes may be: what is taken and not used stays small beside them.
+pub(super) fn blocks_within(bytes: u64) -> AllocationSizes {
+    let block = (bytes / 16).clamp(4 << 20, 256 << 20);
+    AllocationSizes::new(block, block.min(64 << 20))
+}
+
 impl Gpu {
     /// A buffer of `count` elements of `T`, and of one at least, as Vulkan has no empty ones. Its
     /// content is undefined.
@@ -99,32 +113,19 @@ impl Gpu {
                 | vk::BufferUsageFlags::TRANSFER_SRC
                 | vk::BufferUsageFlags::TRANSFER_DST,
         );
+        if let Some(most) = self.options.memory.filter(|_| memory == Memory::Device) {
+            let held = self.held_memory().device_bytes;
+            if held + size_bytes > most {
+                return Err(full(name, size_bytes, format!("{held} of the {most} bytes of --memory are in use")));
+            }
+        }
         let device = &self.context.device;
         // SAFETY: `info` is complete; the buffer is destroyed in Drop.
         let raw = call("vkCreateBuffer", unsafe { device.create_buffer(&info, None) })?;
         let mut buffer = AnyBuffer { name: name.to_owned(), memory, size_bytes, raw, allocation: None, context: self.context.clone() };
         // SAFETY: the buffer was just made.
         let requirements = unsafe { device.get_buffer_memory_requirements(raw) };
-        let allocation = self
-            .context
-            .allocator()
-            .as_mut()
-            .expect("the allocator lives as long as the device")
-            .allocate(&AllocationCreateDesc {
-                name,
-                requirements,
-                location: match memory {
-                    Memory::Device => MemoryLocation::GpuOnly,
-                    Memory::Upload => MemoryLocation::CpuToGpu,
-                    Memory::ReadBack => MemoryLocation::GpuToCpu,
-                },
-                linear: true,
-                allocation_scheme: AllocationScheme::GpuAllocatorManaged,
-            })
-            .map_err(|error| Error::Device {
-                call: "memory allocation",
-                reason: format!("{size_bytes} bytes for {name}: {error}; trace fewer photons at once with --chunk"),
-            })?;
+        let allocation = self.allocate(name, size_bytes, memory, requirements)?;
         // SAFETY: memory and offset come from the allocator for these requirements, and the allocation is
         // freed after the buffer.
         call("vkBindBufferMemory", unsafe { device.bind_buffer_memory(raw, allocation.memory(), allocation.offset()) })?;
@@ -132,6 +133,24 @@ impl Gpu {
         self.context.held().take(memory, size_bytes);
         self.context.set_name(raw, name);
         Ok(Buffer { any: buffer, element: PhantomData })
+    }
+
+    fn allocate(&self, name: &str, size_bytes: u64, memory: Memory, requirements: vk::MemoryRequirements) -> Result<Allocation> {
+        let mut allocator = self.context.allocator();
+        let location = match memory {
+            Memory::Device => MemoryLocation::GpuOnly,
+            Memory::Upload => MemoryLocation::CpuToGpu,
+            Memory::ReadBack => MemoryLocation::GpuToCpu,
+        };
+        let allocation_scheme = AllocationScheme::GpuAllocatorManaged;
+        let wanted = AllocationCreateDesc { name, requirements, location, linear: true, allocation_scheme };
+        if faults::planted(ALLOCATION).is_err() {
+            return Err(full(name, size_bytes, "the memory is full".to_owned()));
+        }
+        allocator.as_mut().expect("the allocator lives as long as the device").allocate(&wanted).map_err(|error| match error {
+            AllocationError::OutOfMemory => full(name, size_bytes, "the memory is full".to_owned()),
+            error => Error::Device { call: ALLOCATION, reason: format!("{size_bytes} bytes for {name}: {error}") },
+        })
     }
 
     /// What buffers take by the sizes that were asked for; an allocator rounds them up.

@@ -59,8 +59,7 @@ pub struct Commands<'gpu> {
     /// Buffers that only this submission needs.
     staging: Vec<AnyBuffer>,
     work: u64,
-    /// Share of a plan's work per submission that keeps submissions short on this device and in this scene.
-    pace: f64,
+    pace: Pace,
     interrupt: Option<Interrupt<'gpu>>,
     dispatch_count: u64,
     submission_count: u64,
@@ -92,10 +91,40 @@ impl Interrupt<'_> {
     }
 }
 
-/// Wall time that a submission should take: short enough that a run ends soon after it is asked to.
-const SUBMISSION_TIME: Duration = Duration::from_millis(100);
-/// Least share of a plan's work that a submission is cut down to where a device is slow.
-const LEAST_PACE: f64 = 1.0 / 256.0;
+/// What work takes on this device and in this scene, by the scope in which it is done: so that neither a dispatch nor a submission takes
+/// long.
+#[derive(Default)]
+struct Pace {
+    /// Since the last submission.
+    work: HashMap<String, u64>,
+    /// Seconds that a unit of work took lately at most.
+    seconds: HashMap<String, f64>,
+}
+
+/// What work of one scope should take between two submissions: half of what a dispatch may, as not all pieces are alike.
+const PIECE_TIME: f64 = 0.025;
+/// Share of a plan's work per submission that is taken at once as long as nobody knows how long it takes, and the least.
+const FIRST_SHARE: u64 = 16;
+const LEAST_SHARE: u64 = 64;
+/// What is left of a time once another was measured: what is slow here may be behind the next corner too.
+const MEMORY: f64 = 0.7;
+
+impl Pace {
+    /// Units of work of a scope that may be done at once, where a plan allows so many.
+    fn fits(&self, scope: &str, most: u64) -> u64 {
+        let share = |parts: u64| (most / parts).max(1);
+        self.seconds.get(scope).map_or(share(FIRST_SHARE), |seconds| ((PIECE_TIME / seconds) as u64).clamp(share(LEAST_SHARE), most))
+    }
+
+    /// Takes what scopes took in a submission.
+    fn learn(&mut self, took: &HashMap<&str, Duration>) {
+        for (scope, work) in self.work.drain().filter(|(_, work)| *work > 0) {
+            let Some(took) = took.get(scope.as_str()) else { continue };
+            let before = self.seconds.entry(scope).or_default();
+            *before = (took.as_secs_f64() / work as f64).max(MEMORY * *before);
+        }
+    }
+}
 
 /// Descriptor sets and storage buffers of one descriptor pool.
 const SETS_PER_POOL: u32 = 256;
@@ -134,7 +163,7 @@ impl<'gpu> Commands<'gpu> {
             hazards: Hazards::default(),
             staging: Vec::new(),
             work: 0,
-            pace: 1.0,
+            pace: Pace::default(),
             interrupt: None,
             dispatch_count: 0,
             submission_count: 0,
@@ -163,9 +192,13 @@ impl<'gpu> Commands<'gpu> {
         };
         self.timings.count(&path);
         let begin = self.timestamps.write(self.command_buffer);
+        let outer = self.open_scopes.len();
         self.open_scopes.push(OpenScope { name: path, begin });
         let result = body(self);
-        self.close_scope();
+        // None is open any more where a submission failed.
+        if self.open_scopes.len() > outer {
+            self.close_scope();
+        }
         result
     }
 
@@ -182,7 +215,7 @@ impl<'gpu> Commands<'gpu> {
 
     /// Runs a kernel on its buffers.
     pub fn dispatch<K: Kernel>(&mut self, kernel: K, push: &K::Push, extent: Extent) -> Result<()> {
-        if self.gpu.time_dispatches {
+        if self.gpu.options.time_dispatches {
             return self.scope(K::MODULE.name, |commands| commands.record_dispatch(kernel, push, extent));
         }
         self.record_dispatch(kernel, push, extent)
@@ -306,20 +339,27 @@ impl<'gpu> Commands<'gpu> {
         Ok(ReadBack(Some(read_back)))
     }
 
-    /// Counts work of any unit towards [`Commands::work`].
+    fn innermost_scope(&self) -> &str {
+        self.open_scopes.last().map_or("", |scope| &scope.name)
+    }
+
+    /// Counts work of any unit that was recorded in the innermost scope.
     pub fn add_work(&mut self, amount: u64) {
         self.work += amount;
+        let scope = self.innermost_scope().to_owned();
+        *self.pace.work.entry(scope).or_default() += amount;
     }
 
-    /// Work counted since the last submission.
-    pub fn work(&self) -> u64 {
-        self.work
-    }
-
-    /// What a plan's work per submission comes to, so that none takes long. It decides how work is split, which changes no
-    /// result.
+    /// Work that a dispatch of the innermost scope should do at most, where a plan allows so much between two submissions. It decides
+    /// how work is split, which changes no result.
     pub fn paced(&self, work_per_submission: u64) -> u64 {
-        ((work_per_submission as f64 * self.pace) as u64).max(1)
+        self.pace.fits(self.innermost_scope(), work_per_submission)
+    }
+
+    /// Whether what is recorded should run now, before more is added, so that no submission takes long.
+    pub fn is_due(&self, work_per_submission: u64) -> bool {
+        let long = |(scope, work): (&String, &u64)| *work >= self.pace.fits(scope, work_per_submission);
+        self.work >= work_per_submission || self.pace.work.iter().any(long)
     }
 
     /// From now on every submission fails with [`Error::Interrupted`] once it has ended, if the interrupt is up by then.
@@ -348,20 +388,20 @@ impl<'gpu> Commands<'gpu> {
         let submission = [vk::SubmitInfo2::default().command_buffer_infos(&command_buffers)];
         // SAFETY: everything recorded is alive; the fence is unsignalled, and waiting for it ends
         // all use of it and of the command buffer.
-        unsafe {
+        let run = || unsafe {
             call("vkEndCommandBuffer", device.end_command_buffer(self.command_buffer))?;
             call("vkQueueSubmit2", device.queue_submit2(self.gpu.queue, &submission, self.fence))?;
             call("vkWaitForFences", device.wait_for_fences(&[self.fence], true, u64::MAX))?;
-            call("vkResetFences", device.reset_fences(&[self.fence]))?;
-        }
+            call("vkResetFences", device.reset_fences(&[self.fence]))
+        };
+        run().inspect_err(|_| {
+            // Nothing may be destroyed that is still in use, also on a device that fails; a lost one answers at once.
+            // SAFETY: the queue is of this thread alone.
+            let _ = unsafe { device.device_wait_idle() };
+        })?;
         let wall = submitted.elapsed();
         self.gpu.idleness.set(self.gpu.idleness.get().after(submitted, submitted + wall));
         self.submission_count += 1;
-        if wall > SUBMISSION_TIME.mul_f64(1.5) && self.work > 0 {
-            self.pace = (self.pace * 0.5).max(LEAST_PACE);
-        } else if wall < SUBMISSION_TIME / 2 {
-            self.pace = (self.pace * 2.0).min(1.0);
-        }
         self.collect_timings(submitted, wall)?;
 
         // SAFETY: the submission has ended, so its descriptor sets are free.
@@ -389,11 +429,17 @@ impl<'gpu> Commands<'gpu> {
     fn collect_timings(&mut self, submitted: Instant, wall: Duration) -> Result<()> {
         let start = submitted.duration_since(self.started);
         let timed = std::mem::take(&mut self.timed_scopes);
+        let mut took: HashMap<&str, Duration> = HashMap::new();
         if let Some(times) = self.timestamps.read(&timed)? {
             for (scope, (begin, duration)) in timed.iter().zip(times) {
                 self.timings.add(Span { name: scope.name.clone(), clock: Clock::Gpu, start: start + begin, duration });
+                *took.entry(&scope.name).or_default() += duration;
             }
+        } else {
+            // Without timestamps each scope may have taken all of the time.
+            took.extend(timed.iter().map(|scope| (scope.name.as_str(), wall)));
         }
+        self.pace.learn(&took);
         let outermost = timed.last().map(|scope| scope.name.split('/').next().unwrap_or_default().to_owned());
         if let Some(name) = outermost {
             self.timings.add(Span { name, clock: Clock::Wall, start, duration: wall });
@@ -416,7 +462,7 @@ impl<'gpu> Commands<'gpu> {
     /// falls, but not its memory's, which favours passes that wait for memory. The zero of all times moves by as much, so that
     /// it counts in none.
     pub fn warm_up(&mut self) -> Result<()> {
-        if self.gpu.warms_up {
+        if self.gpu.options.warm_up {
             let began = Instant::now();
             clock::warm_up(self.gpu, self.gpu.idleness.get().at(began).max(LEAST_WARM_UP))?;
             self.started += began.elapsed();

@@ -25,6 +25,9 @@ pub struct DeviceFacts {
     pub storage_buffer_range_bytes: u64,
     pub allocation_bytes: u64,
     pub device_memory_bytes: u64,
+    /// What plans may use of it: half, as the device is not ours alone, or what the user says.
+    #[serde(skip)]
+    pub usable_memory_bytes: u64,
     pub storage_buffers_per_stage: u32,
     pub work_group_count_x: u32,
     pub work_group_count_y: u32,
@@ -221,6 +224,7 @@ fn facts(instance: &ash::Instance, device: vk::PhysicalDevice, index: usize) -> 
     let driver: Vec<&str> = driver.split_whitespace().filter(is_new).collect();
     let heaps = memory.memory_heaps_as_slice().iter();
     let of_device = heaps.filter(|heap| heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL));
+    let device_memory_bytes = of_device.map(|heap| heap.size).max().unwrap_or(0);
     DeviceFacts {
         index,
         driver: driver.join(" "),
@@ -230,7 +234,8 @@ fn facts(instance: &ash::Instance, device: vk::PhysicalDevice, index: usize) -> 
         subgroup_size: v11.subgroup_size,
         storage_buffer_range_bytes: u64::from(limits.max_storage_buffer_range),
         allocation_bytes: v11.max_memory_allocation_size.min(v13.max_buffer_size),
-        device_memory_bytes: of_device.map(|heap| heap.size).max().unwrap_or(0),
+        device_memory_bytes,
+        usable_memory_bytes: device_memory_bytes / 2,
         storage_buffers_per_stage: limits.max_per_stage_descriptor_storage_buffers,
         work_group_count_x: limits.max_compute_work_group_count[0],
         work_group_count_y: limits.max_compute_work_group_count[1],

@@ -197,7 +197,7 @@ impl Gpu {
     /// SPIR-V of a kernel, or what stands for it in this device.
     fn words_of(&self, module: &Module) -> Vec<u32> {
         let own = || ash::util::read_spv(&mut Cursor::new(module.spirv)).expect("build.rs wrote whole SPIR-V words");
-        self.replaced.iter().find(|(name, _)| name == module.name).map_or_else(own, |(_, words)| words.clone())
+        self.options.replaced.iter().find(|(name, _)| name == module.name).map_or_else(own, |(_, words)| words.clone())
     }
 
     /// A pipeline that is still to be compiled.

@@ -6,6 +6,7 @@ pub mod check;
 pub mod clock;
 pub mod commands;
 pub mod device;
+mod faults;
 pub mod kernel;
 mod mapped_file;
 mod reconvergence;
@@ -51,6 +52,8 @@ pub struct Options {
     pub time_dispatches: bool,
     /// Keep a card busy before the first round of every run, so that its times are those of a card at work.
     pub warm_up: bool,
+    /// Bytes that all buffers of the device may take together; `None` for half of its memory.
+    pub memory: Option<u64>,
     /// Behave as on a device without timestamps.
     pub without_timestamps: bool,
     /// Behave as on a device without 64-bit atomics.
@@ -62,10 +65,8 @@ pub struct Options {
 /// An open device, of one thread at a time.
 pub struct Gpu {
     facts: DeviceFacts,
-    time_dispatches: bool,
-    warms_up: bool,
+    options: Options,
     idleness: Cell<Idleness>,
-    replaced: Vec<(String, Vec<u32>)>,
     queue: vk::Queue,
     pipelines: RefCell<HashMap<kernel::PipelineKey, Arc<kernel::Pipeline>>>,
     set_layouts: kernel::SetLayouts,
@@ -113,8 +114,16 @@ impl Drop for Context {
 
 /// Turns a Vulkan result into an [`Error`] that names the call.
 pub(crate) fn call<T>(name: &'static str, result: ash::prelude::VkResult<T>) -> Result<T> {
-    result.map_err(|code| Error::Device { call: name, reason: format!("{code} ({code:?})") })
+    result.and_then(|value| faults::planted(name).map(|()| value)).map_err(|code| match code {
+        vk::Result::ERROR_DEVICE_LOST => Error::DeviceLost { call: name },
+        vk::Result::ERROR_OUT_OF_DEVICE_MEMORY => Error::OutOfMemory { call: name, what: "the device's memory is full".into() },
+        vk::Result::ERROR_OUT_OF_HOST_MEMORY => Error::OutOfMemory { call: name, what: "the host's memory is full".into() },
+        code => Error::Device { call: name, reason: format!("{code} ({code:?})") },
+    })
 }
+
+/// Less than this is of no use to any run, bytes.
+pub const LEAST_MEMORY: u64 = 1 << 20;
 
 impl Gpu {
     /// Opens a device and runs the start-up check on it.
@@ -143,6 +152,9 @@ impl Gpu {
         };
         facts.timestamp_bits = if options.without_timestamps { 0 } else { facts.timestamp_bits };
         facts.int64_atomics &= !options.without_int64_atomics;
+        if let Some(memory) = options.memory {
+            facts.usable_memory_bytes = memory;
+        }
         let debug = messages.is_some().then(|| ash::ext::debug_utils::Device::new(&instance, &device));
         let allocator = Allocator::new(&AllocatorCreateDesc {
             instance: instance.clone(),
@@ -150,7 +162,7 @@ impl Gpu {
             physical_device,
             debug_settings: Default::default(),
             buffer_device_address: false,
-            allocation_sizes: Default::default(),
+            allocation_sizes: options.memory.map_or_else(Default::default, buffer::blocks_within),
         })
         .map_err(|error| Error::Device { call: "the memory allocator", reason: error.to_string() })?;
         let context = Arc::new(Context {
@@ -165,10 +177,8 @@ impl Gpu {
         let cache = kernel::DiskCache::open(&context, &facts)?;
         let mut gpu = Gpu {
             facts,
-            time_dispatches: options.time_dispatches,
-            warms_up: options.warm_up,
+            options: options.clone(),
             idleness: Cell::new(Idleness::new(Instant::now())),
-            replaced: options.replaced.clone(),
             queue,
             pipelines: RefCell::default(),
             set_layouts: kernel::SetLayouts::new(&context),
@@ -176,7 +186,7 @@ impl Gpu {
             context,
         };
         gpu.facts.votes_in_loops = check::run(&gpu)?;
-        if gpu.warms_up {
+        if gpu.options.warm_up {
             clock::prepare(&gpu)?;
         }
         Ok(gpu)
@@ -194,13 +204,33 @@ impl Gpu {
     /// From now on runs this SPIR-V in place of the kernels' own, by the kernel's name. Kernels that were replaced before and are
     /// not named now get their own back. The start-up check is not repeated.
     pub fn replace(&mut self, replaced: Vec<(String, Vec<u32>)>) {
-        let before = std::mem::replace(&mut self.replaced, replaced);
-        let changed = |kernel| before.iter().chain(&self.replaced).any(|(name, _)| name == kernel);
+        let before = std::mem::replace(&mut self.options.replaced, replaced);
+        let changed = |kernel| before.iter().chain(&self.options.replaced).any(|(name, _)| name == kernel);
         self.pipelines.get_mut().retain(|key, _| !changed(key.kernel));
     }
 
     pub fn facts(&self) -> &DeviceFacts {
         &self.facts
+    }
+
+    /// Opens the device anew, as is needed where it was lost. Nothing that was made with it is of use then.
+    pub fn reopen(&mut self) -> Result<()> {
+        let index = self.facts.index.to_string();
+        let usable_memory_bytes = self.facts.usable_memory_bytes;
+        let fresh = Gpu::open(&Options { device: Some(index), ..self.options.clone() })?;
+        *self = Gpu { options: self.options.clone(), ..fresh };
+        self.facts.usable_memory_bytes = usable_memory_bytes;
+        Ok(())
+    }
+
+    /// Plans made from now on use half of the memory; `false` where that would be next to none.
+    pub fn use_less_memory(&mut self) -> bool {
+        let half = self.facts.usable_memory_bytes / 2;
+        let is_enough = half >= LEAST_MEMORY;
+        if is_enough {
+            self.facts.usable_memory_bytes = half;
+        }
+        is_enough
     }
 
     /// Fails if the validation layer has said anything so far.

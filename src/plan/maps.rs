@@ -114,6 +114,7 @@ fn map(
         radius,
         radius_from: from,
         classes,
+        expected,
         lanes: capacity::lanes_of(expected / FOUND_BY_LANE, limits),
         target_count: 0,
         through_openings,

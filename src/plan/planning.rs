@@ -28,6 +28,8 @@ const FILM_BITS: i32 = 24;
 /// Most units that all rounds may add to a pixel, and rounds to which any run may go on with the same unit.
 const MOST_UNITS: f64 = (1u64 << 62) as f64;
 const ROUNDS_OF_UNIT: u32 = 1 << 16;
+/// Chunks of so few photons take next to no memory.
+const LEAST_CHUNK: u32 = 1 << 10;
 /// A photon in its map, sorted and unsorted, and its place in its bucket.
 const MAP_ENTRY_BYTES: u64 = 2 * size_of::<MapPhoton>() as u64 + 4;
 
@@ -46,6 +48,34 @@ impl ScenePlan {
         limits: &Limits,
         trial: Option<Trial>,
     ) -> Result<ScenePlan> {
+        // Where the scene and the picture leave little room, photons are traced in smaller chunks.
+        let mut for_maps = *limits;
+        loop {
+            let plan = ScenePlan::with_maps_within(scene, geometry, settings, sensor, limits, &for_maps, trial.clone())?;
+            let chunk = plan.maps().map(|map| map.chunk_photons).max().unwrap_or(0);
+            if plan.bytes <= limits.memory_bytes {
+                return Ok(plan);
+            }
+            if chunk <= LEAST_CHUNK {
+                let needed = format!(
+                    "is less than the {} MiB of device memory that the run needs even in small pieces; ask for a smaller picture, or choose another --device",
+                    plan.bytes.div_ceil(1 << 20)
+                );
+                return Err(Error::setting("--memory", format!("{}M", limits.memory_bytes >> 20), needed));
+            }
+            for_maps.memory_bytes = for_maps.memory_bytes.min(4 * plan.bytes) / 2;
+        }
+    }
+
+    fn with_maps_within(
+        scene: &Scene,
+        geometry: &Geometry,
+        settings: &SceneSettings,
+        sensor: Sensor,
+        limits: &Limits,
+        for_maps: &Limits,
+        trial: Option<Trial>,
+    ) -> Result<ScenePlan> {
         let began = Instant::now();
         settings.validate()?;
         let count = geometry.triangles.len();
@@ -61,7 +91,7 @@ impl ScenePlan {
         let by_itself = if settings.math == Math::Strict || !limits.votes_in_loops { Builder::Ballot } else { Builder::Persistent };
         let settings = SceneSettings { builder: Some(settings.builder.unwrap_or(by_itself)), ..settings.clone() };
         let split = settings.illumination == Illumination::Split;
-        let maps = Maps::new(scene, geometry, &settings, limits, trial.as_ref(), &keeps)?;
+        let maps = Maps::new(scene, geometry, &settings, for_maps, trial.as_ref(), &keeps)?;
         let gather_rays = match (keeps(Effect::Indirect), settings.final_gather, keeps(Effect::Glossy)) {
             (true, true, _) => GATHER_ALL,
             (true, false, true) if split => GATHER_GLOSSY,
@@ -178,11 +208,7 @@ impl ScenePlan {
             });
         }
         self.bytes = bytes_of(&self.buffers(geometry));
-        let chunk = self.settings.chunk.map_or("(default)".into(), |chunk| chunk.to_string());
-        let (bytes, most) = (self.bytes, limits.memory_bytes);
-        let too_much =
-            format!("the run needs {bytes} bytes of device memory, but the device has {most}; ask for smaller chunks or a smaller picture");
-        require(bytes <= most, "--chunk", chunk, too_much)
+        Ok(())
     }
 
     fn aim_in_words(&self) -> String {

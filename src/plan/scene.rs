@@ -45,6 +45,8 @@ pub struct MapPlan {
     pub radius_from: RadiusFrom,
     /// `None` where all points have the same radius.
     pub classes: Option<Classes>,
+    /// Photons of a round that lie within it, on average.
+    pub expected: f64,
     /// Invocations that share the candidates of a visible point.
     pub lanes: u32,
     /// Spheres that its photons are aimed at; 0: they leave their lights in all directions.
@@ -59,6 +61,12 @@ pub struct MapPlan {
 }
 
 impl MapPlan {
+    /// Candidates of a point among the photons of a chunk, roughly.
+    pub fn tests_per_point(&self) -> u64 {
+        let of_chunk = self.expected * f64::from(self.chunk_photons) / f64::from(self.photons.max(1));
+        TESTS_PER_POINT.max((TESTS_PER_PHOTON * of_chunk) as u64)
+    }
+
     /// Words of the counters: length of the map, then of the lists of a segment.
     pub fn counter_count(&self) -> u64 {
         2 + u64::from(self.segment_bounces.min(SEGMENT_BOUNCES))
@@ -114,6 +122,8 @@ pub struct ScenePlan {
 
 /// Candidates of a point, roughly: what a lookup counts as work.
 pub const TESTS_PER_POINT: u64 = 256;
+/// Photons in the cells in reach for each within the radius.
+const TESTS_PER_PHOTON: f64 = 4.0;
 /// Landings of each photon of a chunk that a map has room for.
 pub const SEGMENT_BOUNCES: u32 = 16;
 /// Flights of a photon, generously.

@@ -69,7 +69,7 @@ fn point_ranges(commands: &Commands, plan: &RoomPlan, tests_per_point: u64, lane
     let (group_size, lanes) = (u64::from(plan.settings.group_size), u64::from(lanes));
     // Invocations are numbered in 32 bits.
     let most_groups = u64::from(commands.facts().work_group_count_x).min(u64::from(u32::MAX) / group_size);
-    let groups = (plan.pair_tests_per_submission / tests_per_point.max(1) * lanes / group_size).clamp(1, most_groups);
+    let groups = (commands.paced(plan.pair_tests_per_submission) / tests_per_point.max(1) * lanes / group_size).clamp(1, most_groups);
     let (points, step) = (plan.points.len(), (groups * group_size / lanes).max(1) as usize);
     (0..points).step_by(step).map(move |first| (first as u32, points.min(first + step) as u32))
 }
@@ -92,7 +92,7 @@ fn gather_brute(commands: &mut Commands, resources: &RoomResources, plan: &RoomP
     for (first_point, end_point) in point_ranges(commands, plan, tests_per_point, 1) {
         let point_count = end_point - first_point;
         let tests_per_slice = u64::from(point_count) * tests_per_point;
-        let slices_at_once = (plan.pair_tests_per_submission / tests_per_slice).clamp(1, u64::from(MAX_GROUPS)) as u32;
+        let slices_at_once = (commands.paced(plan.pair_tests_per_submission) / tests_per_slice).clamp(1, u64::from(MAX_GROUPS)) as u32;
         for first_slice in (0..slice_count).step_by(slices_at_once as usize) {
             let slices = slices_at_once.min(slice_count - first_slice);
             let push = GatherPush { first_point, end_point, first_slice, ..whole };

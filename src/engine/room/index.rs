@@ -52,5 +52,5 @@ pub fn build(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan
 /// Counts work, and hands the commands over once they amount to a submission.
 pub fn add_work(commands: &mut Commands, plan: &RoomPlan, pair_tests: u64) -> Result<()> {
     commands.add_work(pair_tests);
-    if commands.work() >= plan.pair_tests_per_submission { commands.submit() } else { Ok(()) }
+    if commands.is_due(plan.pair_tests_per_submission) { commands.submit() } else { Ok(()) }
 }

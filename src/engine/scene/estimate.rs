@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::Round;
-use super::points::{add_work, rounding, runs};
+use super::points::{in_pieces, rounding};
 use super::radius_class::map_class;
 use super::resources::{PhotonBuffers, SceneResources};
 use crate::constants::MAX_GROUPS;
@@ -13,7 +13,7 @@ use crate::gpu::kernels::{
 };
 use crate::gpu::{Commands, Extent};
 use crate::plan::differences::row_length;
-use crate::plan::scene::{MapPlan, TESTS_PER_POINT};
+use crate::plan::scene::MapPlan;
 use crate::records::{CellPush, CrowdSizePush, DiscCutsPush, EndDifferencePush, FluxToRadiancePush, ResolvePush, SceneGatherPush};
 
 /// Finds the walls at which each visible point's density estimates from a map end.
@@ -21,7 +21,7 @@ pub fn cut_discs(commands: &mut Commands, round: Round, map: &MapPlan) -> Result
     let Round { resources, plan, .. } = round;
     let SceneResources { scene, visible_points, radius_classes, disc_cuts, .. } = resources;
     let (width, height) = plan.sensor.size();
-    for (first_point, end_point) in runs(plan.visible_points(), plan.pixels_at_once(4)) {
+    in_pieces(commands, plan, plan.visible_points(), plan.pixels_at_once(4), 256, |commands, first_point, end_point| {
         let push = DiscCutsPush {
             first_point,
             end_point,
@@ -34,10 +34,8 @@ pub fn cut_discs(commands: &mut Commands, round: Round, map: &MapPlan) -> Result
             radius: plan.widest_radius(map, round.number) as f32,
         };
         let kernel = DiscCuts { scene, visible_points, radius_classes, disc_cuts };
-        commands.dispatch(kernel, &push, Extent::Items(u64::from(end_point - first_point)))?;
-        add_work(commands, plan, 256 * u64::from(end_point - first_point))?;
-    }
-    Ok(())
+        commands.dispatch(kernel, &push, Extent::Items(u64::from(end_point - first_point)))
+    })
 }
 
 /// Adds a chunk of a map to the estimates of all visible points whose class this grid serves, all where radii have no classes.
@@ -54,7 +52,7 @@ pub fn gather(
     let SceneResources { scene, visible_points, matt_lobes, matt_covers, estimates, near_sums, .. } = resources;
     let SceneResources { radius_classes, disc_cuts, nonfinite_values, .. } = resources;
     let point_count = plan.visible_points();
-    let (lanes, step) = (map.lanes, plan.points_at_once());
+    let lanes = map.lanes;
     let (width, height) = plan.sensor.size();
     macro_rules! kernel {
         ($kernel:ident) => {
@@ -81,7 +79,7 @@ pub fn gather(
             commands.dispatch(kernel!(GatherVisiblePointsTwoWords), push, extent)
         }
     };
-    for (first_point, end_point) in runs(point_count, step) {
+    in_pieces(commands, plan, point_count, plan.points_at_once(), map.tests_per_point(), |commands, first_point, end_point| {
         let push = SceneGatherPush {
             first_point,
             end_point,
@@ -106,10 +104,8 @@ pub fn gather(
         dispatch(commands, &push, Extent::Groups(groups, 1))?;
         let size = CrowdSizePush { items_per_group: plan.settings.group_size / lanes, max_groups: MAX_GROUPS };
         commands.dispatch(CrowdSize { crowded, dispatch_args }, &size, Extent::Groups(1, 1))?;
-        dispatch(commands, &SceneGatherPush { first_slice: 1, ..push }, Extent::Indirect(dispatch_args))?;
-        add_work(commands, plan, TESTS_PER_POINT * u64::from(end_point - first_point))?;
-    }
-    Ok(())
+        dispatch(commands, &SceneGatherPush { first_slice: 1, ..push }, Extent::Indirect(dispatch_args))
+    })
 }
 
 /// Turns what the maps found at all visible points into light; so many photons of the global and of the caustic map were traced.
@@ -121,7 +117,7 @@ pub fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u32; 2])
     let flux =
         |map: &Option<MapPlan>| map.as_ref().map_or(0.0, |map| map.photon_flux_of(geometry, traced[usize::from(map.caustic_only)])) as f32;
     let (width, height) = plan.sensor.size();
-    for (first_point, end_point) in runs(plan.visible_points(), plan.pixels_at_once(4)) {
+    in_pieces(commands, plan, plan.visible_points(), plan.pixels_at_once(4), 256, |commands, first_point, end_point| {
         let push = FluxToRadiancePush {
             first_point,
             end_point,
@@ -153,10 +149,8 @@ pub fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u32; 2])
             part_totals,
             nonfinite_values,
         };
-        commands.dispatch(kernel, &push, Extent::Items(u64::from(end_point - first_point)))?;
-        add_work(commands, plan, 256 * u64::from(end_point - first_point))?;
-    }
-    Ok(())
+        commands.dispatch(kernel, &push, Extent::Items(u64::from(end_point - first_point)))
+    })
 }
 
 /// Ends a round: light that was found joins its block, and at the end of that the film.
@@ -167,7 +161,8 @@ pub fn resolve(commands: &mut Commands, round: Round, ends_block: bool) -> Resul
     let pixel_count = plan.sensor.pixels();
     let points_per_pixel = if resources.photons.is_some() { plan.points_per_pixel } else { 0 };
     let block = round.number / plan.film.rounds_per_block;
-    for (first_pixel, end_pixel) in runs(pixel_count, plan.pixels_at_once(1)) {
+    let work = u64::from(plan.samples() + points_per_pixel);
+    in_pieces(commands, plan, pixel_count, plan.pixels_at_once(1), work, |commands, first_pixel, end_pixel| {
         let push = ResolvePush { first_pixel, end_pixel, pixel_count, points_per_pixel, block, ends_block: u32::from(ends_block) };
         let kernel = Resolve {
             pass_sums,
@@ -181,10 +176,8 @@ pub fn resolve(commands: &mut Commands, round: Round, ends_block: bool) -> Resul
             part_totals,
             latest_blocks,
         };
-        commands.dispatch(kernel, &push, Extent::Items(u64::from(end_pixel - first_pixel)))?;
-        add_work(commands, plan, u64::from(end_pixel - first_pixel) * u64::from(plan.samples() + points_per_pixel))?;
-    }
-    Ok(())
+        commands.dispatch(kernel, &push, Extent::Items(u64::from(end_pixel - first_pixel)))
+    })
 }
 
 /// Ends a block: what a smaller radius would change in it joins the sums of all blocks.

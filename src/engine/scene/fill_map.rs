@@ -27,8 +27,8 @@ pub struct Filled {
     pub nonfinite_values: Option<NonfiniteValues>,
 }
 
-/// Traces the photons of all rounds of a plan and hands them to a writer. A round that is cut short is left out; without a first one
-/// this fails.
+/// Traces the photons of all rounds of a plan that a writer lacks, and hands them to it. A round that is cut short is left out; without
+/// a first one this fails.
 pub fn fill(
     gpu: &Gpu,
     geometry: &Geometry,
@@ -42,7 +42,8 @@ pub fn fill(
     let resources = SceneResources::new(gpu, &mut commands, geometry, plan, &[])?;
     commands.set_interrupt(Some(Interrupt { cancelled: control.cancelled, deadline: None }));
     let mut ledger = Ledger::default();
-    let mut rounds = 0;
+    writer.drop_open_round().map_err(unwritten)?;
+    let mut rounds = writer.rounds();
     while rounds < plan.settings.rounds {
         let round = Round { resources: &resources, geometry, plan, number: rounds };
         match one_round(&mut commands, round, writer, unwritten) {

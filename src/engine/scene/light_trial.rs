@@ -4,7 +4,7 @@
 use glam::Vec4;
 
 use super::Round;
-use super::points::{add_work, runs};
+use super::points::in_pieces;
 use crate::constants::{DOMAIN_LIGHTS, SEEN, SEEN_BY_GATHER};
 use crate::error::Result;
 use crate::gpu::kernels::TryLights;
@@ -74,13 +74,13 @@ fn what_clusters_add(gpu: &Gpu, commands: &mut Commands, round: Round, tree: &Li
     let found = gpu.buffer::<f32>("what lights add", u64::from(pair_count), Memory::Device)?;
     commands.upload(&receivers, points)?;
     let draws = Draws { seed: words(round.plan.settings.seed), round: 0, domain: DOMAIN_LIGHTS };
-    for (first_pair, end_pair) in runs(pair_count, round.plan.pixels_at_once(ray_count)) {
+    let (most, work) = (round.plan.pixels_at_once(ray_count), 64 * u64::from(ray_count));
+    in_pieces(commands, round.plan, pair_count, most, work, |commands, first_pair, end_pair| {
         let resources = round.resources;
         let kernel =
             TryLights { scene: &resources.scene, receivers: &receivers, found: &found, nonfinite_values: &resources.nonfinite_values };
         let push = TryLightsPush { draws, first_pair, end_pair, ray_count };
-        commands.dispatch(kernel, &push, Extent::Items(u64::from(end_pair - first_pair)))?;
-        add_work(commands, round.plan, 64 * u64::from(end_pair - first_pair) * u64::from(ray_count))?;
-    }
+        commands.dispatch(kernel, &push, Extent::Items(u64::from(end_pair - first_pair)))
+    })?;
     Ok((commands.read(&found, pair_count as usize)?, ray_count))
 }

@@ -5,7 +5,7 @@
 //! is mapped into it.
 
 use std::fs::File;
-use std::io::Write;
+use std::io::{Seek, SeekFrom, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -241,12 +241,22 @@ impl<'a> MapWriter<'a> {
         self.header.rounds.push(std::mem::take(&mut self.maps));
     }
 
+    /// Whole rounds.
+    pub fn rounds(&self) -> u32 {
+        self.header.rounds.len() as u32
+    }
+
+    /// Forgets what there is of the round under way.
+    pub fn drop_open_round(&mut self) -> std::io::Result<()> {
+        self.byte = self.maps.first().map_or(self.byte, |map| map.byte);
+        self.maps.clear();
+        self.file.set_len(self.byte)?;
+        self.file.seek(SeekFrom::Start(self.byte)).map(|_| ())
+    }
+
     /// Ends the file behind its last whole round.
-    pub fn finish(self) -> std::io::Result<Header> {
-        use std::io::{Seek, SeekFrom};
-        let first = self.maps.first().map_or(self.byte, |map| map.byte);
-        self.file.set_len(first)?;
-        self.file.seek(SeekFrom::Start(first))?;
+    pub fn finish(mut self) -> std::io::Result<Header> {
+        self.drop_open_round()?;
         let header = serde_json::to_vec(&self.header).expect("a header is plain data");
         self.file.write_all(&header)?;
         self.file.write_all(&(header.len() as u64).to_le_bytes())?;

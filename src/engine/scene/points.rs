@@ -13,16 +13,32 @@ use crate::rng::{mix32, words};
 use crate::scene::geometry::Geometry;
 use crate::scene::{Camera, Lens, Projection};
 
-/// Runs of `count` items, `step` long.
-pub(super) fn runs(count: u32, step: u32) -> impl Iterator<Item = (u32, u32)> {
-    (0..count).step_by(step as usize).map(move |first| (first, count.min(first.saturating_add(step))))
+/// Records `count` items, so many that none keeps the device busy for long, and at most `most`, at a time; each is so much `work`. Hands
+/// the commands over where they amount to a submission.
+pub(super) fn in_pieces(
+    commands: &mut Commands,
+    plan: &ScenePlan,
+    count: u32,
+    most: u32,
+    work: u64,
+    mut record: impl FnMut(&mut Commands, u32, u32) -> Result<()>,
+) -> Result<()> {
+    let mut first = 0;
+    while first < count {
+        let fits = commands.paced(plan.work_per_submission) / work.max(1);
+        let end = count.min(first.saturating_add(fits.max(LEAST_ITEMS).min(most.into()) as u32));
+        record(commands, first, end)?;
+        commands.add_work(work * u64::from(end - first));
+        if commands.is_due(plan.work_per_submission) {
+            commands.submit()?;
+        }
+        first = end;
+    }
+    Ok(())
 }
 
-/// Hands the commands over once they amount to a submission.
-pub(super) fn add_work(commands: &mut Commands, plan: &ScenePlan, work: u64) -> Result<()> {
-    commands.add_work(work);
-    if commands.work() >= commands.paced(plan.work_per_submission) { commands.submit() } else { Ok(()) }
-}
+/// Fewer would leave any device idle.
+const LEAST_ITEMS: u64 = 256;
 
 /// What decides in a round which fractions are rounded up (`glsl/world/scene/rounding.glsl`).
 pub(super) fn rounding(plan: &ScenePlan, round: u32) -> u32 {
@@ -48,11 +64,11 @@ macro_rules! camera_kernel {
 pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Result<()> {
     let Round { resources, geometry, plan, number: round } = round;
     let SceneResources { camera_paths: [camera_paths, _], camera_path_counts, .. } = resources;
-    let step = plan.pixels_at_once(plan.rays_per_pixel());
+    let rays = plan.rays_per_pixel();
     let goes_on = plan.chains_go_on();
     let emitter_count = geometry.emitters.len() as u32;
     let draws = |domain| Draws { seed: words(plan.settings.seed), round, domain };
-    for (first, end) in runs(plan.sensor.pixels(), step) {
+    in_pieces(commands, plan, plan.sensor.pixels(), plan.pixels_at_once(rays), 64 * u64::from(rays), |commands, first, end| {
         if goes_on {
             commands.fill(camera_path_counts, 0, 1, 0);
         }
@@ -107,9 +123,8 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
         if goes_on {
             go_on(commands, resources, geometry, plan, round)?;
         }
-        add_work(commands, plan, 64 * u64::from(end - first) * u64::from(plan.rays_per_pixel()))?;
-    }
-    Ok(())
+        Ok(())
+    })
 }
 
 /// Follows camera paths that are still under way over mirrors and glass, until none is left.

@@ -4,7 +4,7 @@
 
 use std::ops::Range;
 
-use super::points::{add_work, runs};
+use super::points::in_pieces;
 use super::resources::{PhotonBuffers, SceneResources};
 use super::{Round, View, index};
 use crate::constants::{CLASSES_OF_GRID, NO_CLASS, RADIUS_CLASSES};
@@ -51,11 +51,10 @@ pub fn find(commands: &mut Commands, round: Round, photons: &PhotonBuffers, view
     // All points of a map whose radius is given have class 0.
     let unknown = plan.maps().filter(|map| map.classes.is_some()).map(|map| NO_CLASS << map_class(map)).sum();
     commands.fill(radius_classes, 0, u64::from(point_count), unknown);
-    for (first_point, end_point) in runs(point_count, plan.pixels_at_once(CLEARANCE_RAYS)) {
+    in_pieces(commands, plan, point_count, plan.pixels_at_once(CLEARANCE_RAYS), CLEARANCE_WORK, |commands, first_point, end_point| {
         let push = ClearancePush { first_point, end_point, rank: CLEARANCE_RANK };
-        commands.dispatch(Clearance { scene, visible_points, clearances }, &push, Extent::Items(u64::from(end_point - first_point)))?;
-        add_work(commands, plan, CLEARANCE_WORK * u64::from(end_point - first_point))?;
-    }
+        commands.dispatch(Clearance { scene, visible_points, clearances }, &push, Extent::Items(u64::from(end_point - first_point)))
+    })?;
     for map in plan.maps() {
         of_map(commands, round, photons, map, view)?;
     }
@@ -121,7 +120,8 @@ fn of_map(commands: &mut Commands, round: Round, buffers: &PhotonBuffers, map: &
             ..index::cells(round, map, radius_of_class(widest, first_class))
         };
         index::build(commands, round, buffers, map, &cells)?;
-        for (first_point, end_point) in runs(plan.visible_points(), plan.points_at_once()) {
+        let (points, most) = (plan.visible_points(), plan.points_at_once());
+        in_pieces(commands, plan, points, most, TESTS_PER_POINT, |commands, first_point, end_point| {
             let push = RadiusClassPush {
                 first_point,
                 end_point,
@@ -139,9 +139,8 @@ fn of_map(commands: &mut Commands, round: Round, buffers: &PhotonBuffers, map: &
             let SceneResources { scene, visible_points, radius_classes, clearances, class_counts, .. } = resources;
             let PhotonBuffers { cells, sorted_map, .. } = buffers;
             let kernel = RadiusClass { scene, visible_points, cells, sorted_map, radius_classes, clearances, class_counts };
-            commands.dispatch(kernel, &push, Extent::Items(u64::from(end_point - first_point)))?;
-            add_work(commands, plan, TESTS_PER_POINT * u64::from(end_point - first_point))?;
-        }
+            commands.dispatch(kernel, &push, Extent::Items(u64::from(end_point - first_point)))
+        })?;
     }
     Ok(())
 }

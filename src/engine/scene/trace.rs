@@ -216,7 +216,7 @@ fn trace_persistent(
         commands.dispatch(kernel, &push, Extent::Items(u64::from(push.stride)))?;
         commands.add_work(WORK_PER_PHOTON * u64::from(count));
         first += count;
-        if first < end && commands.work() >= commands.paced(plan.work_per_submission) {
+        if first < end && commands.is_due(plan.work_per_submission) {
             commands.submit()?;
         }
     }
@@ -225,8 +225,8 @@ fn trace_persistent(
 
 /// Photons of one dispatch.
 fn photons_at_once(commands: &Commands, plan: &ScenePlan) -> u32 {
-    let paced = commands.paced(u64::from(plan.photons_per_dispatch()));
-    (paced as u32).max(LEAST_PHOTONS).min(plan.photons_per_dispatch())
+    let paced = commands.paced(plan.work_per_submission) / WORK_PER_PHOTON;
+    (paced.min(u32::MAX.into()) as u32).max(LEAST_PHOTONS).min(plan.photons_per_dispatch())
 }
 
 /// Fewer photons in a dispatch would leave a device idle.

@@ -1,7 +1,7 @@
 //! Rays from points of a trial and from what they meet, as light may come to these points.
 
 use super::Round;
-use super::points::{add_work, runs};
+use super::points::in_pieces;
 use crate::error::Result;
 use crate::gpu::kernels::TrialRays;
 use crate::gpu::{Commands, Extent, Gpu, Memory};
@@ -23,12 +23,11 @@ pub fn cast(gpu: &Gpu, commands: &mut Commands, round: Round, points: &[Receiver
     let receivers = gpu.buffer::<Receiver>("points of the trial", points.len() as u64, Memory::Device)?;
     let trial_rays = gpu.buffer::<TrialRay>("rays of the trial", 2 * u64::from(ray_count), Memory::Device)?;
     commands.upload(&receivers, points)?;
-    for (first_ray, end_ray) in runs(ray_count, plan.pixels_at_once(2)) {
+    in_pieces(commands, plan, ray_count, plan.pixels_at_once(2), 128, |commands, first_ray, end_ray| {
         let nonfinite_values = &resources.nonfinite_values;
         let kernel = TrialRays { scene: &resources.scene, receivers: &receivers, trial_rays: &trial_rays, nonfinite_values };
         let push = TrialRaysPush { seed: words(plan.settings.seed), first_ray, end_ray, rays_of_point };
-        commands.dispatch(kernel, &push, Extent::Items(u64::from(end_ray - first_ray)))?;
-        add_work(commands, plan, 128 * u64::from(end_ray - first_ray))?;
-    }
+        commands.dispatch(kernel, &push, Extent::Items(u64::from(end_ray - first_ray)))
+    })?;
     commands.read(&trial_rays, 2 * ray_count as usize)
 }
