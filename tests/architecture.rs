@@ -300,6 +300,14 @@ fn vulkan_and_unsafe_stay_in_the_engine() {
     }
 }
 
+/// The clock of the day may be set while a run goes on; times are taken by one that only runs forward.
+#[test]
+fn nothing_goes_by_the_clock_of_the_day() {
+    for (path, source) in files("src", &[".rs"]) {
+        assert!(!has_word(&code_of(&source), "SystemTime"), "{path}: SystemTime");
+    }
+}
+
 #[test]
 fn no_kernel_forks_inside_a_function() {
     let sources = files("glsl", &SHADERS);

@@ -75,9 +75,12 @@ fn a_scene_costs_what_it_did() {
     let device_bytes = plan.bytes;
     let lit = lit::light(&gpu, &View { geometry: &geometry, camera: scene.cameras.first(), phases: &[] }, plan);
     let events = [0, 1].map(|map: usize| Counts::of(&lit.fates[map], 1).events as u64);
-    // Where one dispatch may leave camera paths under way, the host looks how many, each round.
+    // Where one dispatch may leave camera paths under way, the host looks how many, each round; and a slow device tries how long some
+    // points take before it takes the others.
     let (goes_on, paths) = (lit.plan.chains_go_on(), lit.plan.camera_path_capacity().max(1));
-    assert_eq!((lit.dispatches, lit.submissions, lit.pipelines), (88, if goes_on { 6 } else { 3 }, 14));
+    let (dispatches, submissions) = if goes_on { (88..=92, 6..=10) } else { (88..=88, 3..=3) };
+    assert!(dispatches.contains(&lit.dispatches) && submissions.contains(&lit.submissions), "{} {}", lit.dispatches, lit.submissions);
+    assert_eq!(lit.pipelines, 14);
     let bytes = device_bytes - 2 * paths * size_of::<CameraPath>() as u64;
     assert_eq!((events, bytes), ([3483, 2439], 4_530_816));
 }

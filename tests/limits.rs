@@ -12,6 +12,7 @@ use photonmill::engine::scene::{self, Round, RunResult, View, trace};
 use photonmill::output::scene_report;
 use photonmill::plan::radius::{mean_squared_radius, squared_radius};
 use photonmill::settings::stop::Stop;
+use photonmill::timings::{Clock, Span};
 
 fn settings() -> SceneSettings {
     SceneSettings { photons: 8000, caustic_photons: 8000, rounds: 8, shadow_rays: 1, ..by_rounds() }
@@ -227,4 +228,33 @@ fn long_rounds_end_soon_after_they_are_asked_to() {
     let reference = run(&gpu, &scene, &reference, &AtomicBool::new(false)).unwrap();
     let (found, expected) = (mean_red(&lit), mean_red(&reference));
     assert!((found / expected - 1.0).abs() < 0.05, "{found}, {expected}");
+}
+
+/// A gather over wide radii, which nobody could know to be slow, is cut into pieces as its time becomes known.
+#[test]
+fn no_dispatch_takes_long() {
+    let Some(gpu) = open(Options { time_dispatches: true, ..Options::default() }) else { return };
+    if gpu.facts().timestamp_bits == 0 {
+        return;
+    }
+    let is_cpu = gpu.facts().kind == "cpu";
+    let photons = if is_cpu { 40_000 } else { 10_000_000 };
+    let wide = SceneSettings { photons, caustic_photons: 2000, rounds: 3, radius: Some(0.4), ..settings() };
+    let size = if is_cpu { 64 } else { 512 };
+    let of = scene("cornell-spheres");
+    let (geometry, plan) = scene_plan(&gpu, &of, &wide, square_picture(size)).unwrap();
+    let kernels: Vec<&str> = scene::modules(&plan, gpu.facts()).iter().map(|module| module.name).collect();
+    let view = View { geometry: &geometry, camera: Some(&of.first_camera()), phases: &[] };
+    let lit = scene::light(&gpu, &view, plan, &mut Control::default()).unwrap();
+    let is_dispatch = |span: &&Span| span.clock == Clock::Gpu && kernels.iter().any(|kernel| span.name.ends_with(&format!("/{kernel}")));
+    let dispatches: Vec<&Span> = lit.timings.spans().iter().filter(is_dispatch).collect();
+    let gathers = dispatches.iter().filter(|span| span.name.contains("/gather/gather_visible_points"));
+    let (count, total) = gathers.fold((0, Duration::ZERO), |(count, total), span| (count + 1, total + span.duration));
+    // On a machine that others use too, lavapipe's times are not its own.
+    let most = Duration::from_millis(if is_cpu { 200 } else { 50 });
+    assert!(total > 10 * most && count > 20, "{total:?} in {count} pieces show nothing");
+    // What is slow in which part of the picture is known to a slow device from the second round on.
+    let first_round = dispatches.iter().find(|span| span.name.ends_with("/resolve")).unwrap().start;
+    let slowest = dispatches.iter().filter(|span| !is_cpu || span.start > first_round).max_by_key(|span| span.duration).unwrap();
+    assert!(slowest.duration < most, "{}: {:?}", slowest.name, slowest.duration);
 }

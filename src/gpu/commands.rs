@@ -97,31 +97,51 @@ impl Interrupt<'_> {
 struct Pace {
     /// Since the last submission.
     work: HashMap<String, u64>,
-    /// Seconds that a unit of work took lately at most.
-    seconds: HashMap<String, f64>,
+    known: HashMap<String, Known>,
+}
+
+/// What is known of a scope.
+#[derive(Default)]
+struct Known {
+    /// That a unit of work took lately at most.
+    seconds: f64,
+    /// Work that was done between two submissions at most.
+    most: u64,
 }
 
 /// What work of one scope should take between two submissions: half of what a dispatch may, as not all pieces are alike.
 const PIECE_TIME: f64 = 0.025;
-/// Share of a plan's work per submission that is taken at once as long as nobody knows how long it takes, and the least.
-const FIRST_SHARE: u64 = 16;
-const LEAST_SHARE: u64 = 64;
-/// What is left of a time once another was measured: what is slow here may be behind the next corner too.
-const MEMORY: f64 = 0.7;
+/// Share of a plan's work per submission that is taken at once as long as nobody knows how long it takes.
+const FIRST_SHARE: u64 = 256;
+/// How many times as much is dared as was ever done at once, as not all parts of a picture are alike.
+const GROWTH: u64 = 4;
+/// What is left of a time once another was measured: what is slow in one part of a picture comes again in the next round.
+const MEMORY: f64 = 0.97;
+/// What a submission should take: short enough that a run ends soon after it is asked to.
+const SUBMISSION_TIME: f64 = 0.1;
 
 impl Pace {
     /// Units of work of a scope that may be done at once, where a plan allows so many.
     fn fits(&self, scope: &str, most: u64) -> u64 {
-        let share = |parts: u64| (most / parts).max(1);
-        self.seconds.get(scope).map_or(share(FIRST_SHARE), |seconds| ((PIECE_TIME / seconds) as u64).clamp(share(LEAST_SHARE), most))
+        let fits = self.known.get(scope).map_or(most / FIRST_SHARE, |known| {
+            let at_once = known.most.max(most / FIRST_SHARE).saturating_mul(GROWTH);
+            at_once.min((PIECE_TIME / known.seconds) as u64)
+        });
+        fits.min(most).max(1)
+    }
+
+    /// Seconds that what was recorded will take, as far as that is known.
+    fn expected(&self) -> f64 {
+        self.work.iter().filter_map(|(scope, work)| Some(self.known.get(scope)?.seconds * *work as f64)).sum()
     }
 
     /// Takes what scopes took in a submission.
     fn learn(&mut self, took: &HashMap<&str, Duration>) {
         for (scope, work) in self.work.drain().filter(|(_, work)| *work > 0) {
             let Some(took) = took.get(scope.as_str()) else { continue };
-            let before = self.seconds.entry(scope).or_default();
-            *before = (took.as_secs_f64() / work as f64).max(MEMORY * *before);
+            let known = self.known.entry(scope).or_default();
+            known.seconds = (took.as_secs_f64() / work as f64).max(MEMORY * known.seconds);
+            known.most = known.most.max(work);
         }
     }
 }
@@ -356,10 +376,16 @@ impl<'gpu> Commands<'gpu> {
         self.pace.fits(self.innermost_scope(), work_per_submission)
     }
 
-    /// Whether what is recorded should run now, before more is added, so that no submission takes long.
+    /// Whether what is recorded should run before more is recorded in the innermost scope.
     pub fn is_due(&self, work_per_submission: u64) -> bool {
-        let long = |(scope, work): (&String, &u64)| *work >= self.pace.fits(scope, work_per_submission);
-        self.work >= work_per_submission || self.pace.work.iter().any(long)
+        let scope = self.innermost_scope();
+        let done = self.pace.work.get(scope).copied().unwrap_or(0);
+        done >= self.pace.fits(scope, work_per_submission) || self.is_full(work_per_submission)
+    }
+
+    /// Whether what is recorded amounts to a submission.
+    pub fn is_full(&self, work_per_submission: u64) -> bool {
+        self.work >= work_per_submission || self.pace.expected() >= SUBMISSION_TIME
     }
 
     /// From now on every submission fails with [`Error::Interrupted`] once it has ended, if the interrupt is up by then.
@@ -588,5 +614,38 @@ impl Drop for Commands<'_> {
             device.destroy_fence(self.fence, None);
             device.destroy_command_pool(self.pool, None);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn learns(pace: &mut Pace, scope: &'static str, work: u64, millis: u64) {
+        pace.work.insert(scope.to_owned(), work);
+        pace.learn(&HashMap::from([(scope, Duration::from_millis(millis))]));
+    }
+
+    #[test]
+    fn pieces_become_as_long_as_they_may_be() {
+        const MOST: u64 = 1 << 20;
+        let mut pace = Pace::default();
+        assert_eq!(pace.fits("a", MOST), MOST / FIRST_SHARE);
+        // Twice as slow as it may be, then fast: it is not trusted at once.
+        learns(&mut pace, "a", 1 << 18, 50);
+        assert_eq!(pace.fits("a", MOST), 1 << 17);
+        learns(&mut pace, "a", 1 << 17, 1);
+        assert!((130_000..140_000).contains(&pace.fits("a", MOST)), "{}", pace.fits("a", MOST));
+        (0..200).for_each(|_| learns(&mut pace, "a", 1 << 17, 1));
+        assert_eq!(pace.fits("a", MOST), MOST);
+        // Slow beyond measure, and what nothing is known of.
+        learns(&mut pace, "a", 1, 1_000_000);
+        assert_eq!((pace.fits("a", MOST), pace.fits("b", MOST)), (1, MOST / FIRST_SHARE));
+        // Little that was fast says little of much.
+        learns(&mut pace, "c", 1 << 13, 0);
+        assert_eq!(pace.fits("c", MOST), GROWTH << 13);
+        // A scope without work says nothing.
+        learns(&mut pace, "b", 0, 1000);
+        assert_eq!(pace.fits("b", MOST), MOST / FIRST_SHARE);
     }
 }

@@ -63,7 +63,7 @@ impl<'a> World for RoomOnGpu<'a> {
     }
 
     fn is_full(&self, commands: &Commands<'a>) -> bool {
-        commands.is_due(self.plan.pair_tests_per_submission) || commands.timestamps_left() < trace::timestamps_per_chunk(self.plan)
+        commands.is_full(self.plan.pair_tests_per_submission) || commands.timestamps_left() < trace::timestamps_per_chunk(self.plan)
     }
 
     fn end_block(&mut self, commands: &mut Commands<'a>, _: &RunState) -> Result<()> {

@@ -156,7 +156,7 @@ impl<'a> World for SceneOnGpu<'a> {
     }
 
     fn is_full(&self, commands: &Commands<'a>) -> bool {
-        commands.timestamps_left() < TIMESTAMPS_PER_ROUND || commands.is_due(self.plan.work_per_submission / 2)
+        commands.timestamps_left() < TIMESTAMPS_PER_ROUND || commands.is_full(self.plan.work_per_submission / 2)
     }
 
     fn end_block(&mut self, commands: &mut Commands<'a>, _: &RunState) -> Result<()> {
@@ -433,7 +433,7 @@ fn one_chunk(commands: &mut Commands, round: Round, map: &MapInRound, chunk: (u3
 fn gather_in_grids(commands: &mut Commands, round: Round, map: &MapInRound) -> Result<()> {
     let MapInRound { photons, map, grids } = *map;
     for (grid, classes) in grids.iter().enumerate() {
-        if commands.timestamps_left() < TIMESTAMPS_PER_GRID || commands.is_due(round.plan.work_per_submission) {
+        if commands.timestamps_left() < TIMESTAMPS_PER_GRID || commands.is_full(round.plan.work_per_submission) {
             commands.submit()?;
         }
         let radius = radius_class::radius_of_class(round.plan.widest_radius(map, round.number), classes.start);

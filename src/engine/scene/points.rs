@@ -29,16 +29,17 @@ pub(super) fn in_pieces(
         let end = count.min(first.saturating_add(fits.max(LEAST_ITEMS).min(most.into()) as u32));
         record(commands, first, end)?;
         commands.add_work(work * u64::from(end - first));
-        if commands.is_due(plan.work_per_submission) {
+        first = end;
+        let wants_time = if first < count { commands.is_due(plan.work_per_submission) } else { commands.is_full(plan.work_per_submission) };
+        if wants_time {
             commands.submit()?;
         }
-        first = end;
     }
     Ok(())
 }
 
 /// Fewer would leave any device idle.
-const LEAST_ITEMS: u64 = 256;
+const LEAST_ITEMS: u64 = 16;
 
 /// What decides in a round which fractions are rounded up (`glsl/world/scene/rounding.glsl`).
 pub(super) fn rounding(plan: &ScenePlan, round: u32) -> u32 {

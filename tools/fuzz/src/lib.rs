@@ -1,7 +1,11 @@
 //! What the targets share.
 
-mod change;
+pub mod change;
 pub mod mutation;
+pub mod sealed;
+pub mod seeds;
+
+use std::path::PathBuf;
 
 use photonmill::error::Error;
 
@@ -15,4 +19,9 @@ pub fn panics_are_caught() {
 pub fn refused(error: &Error) {
     let line = error.to_string();
     assert!(error.exit_code() == 2 && !line.is_empty() && line.lines().count() == 1, "{line:?}");
+}
+
+/// A file of this process; `run` lays it into memory.
+pub fn file(name: &str) -> PathBuf {
+    std::env::temp_dir().join(format!("photonmill-fuzz-{}-{name}", std::process::id()))
 }

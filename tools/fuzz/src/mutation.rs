@@ -8,7 +8,18 @@ use serde_json::{Value, json};
 use super::change::{Random, change, pack, parts, pointers};
 
 /// Bytes, how many of them count, and how many there may be; returns how many count now.
-type MutateBytes = fn(&mut [u8], usize, usize) -> usize;
+pub type MutateBytes = fn(&mut [u8], usize, usize) -> usize;
+
+/// Puts a changed input in the place of the old one; where there is none that fits, libFuzzer changes the old one.
+pub fn put(new: Option<Vec<u8>>, data: &mut [u8], size: usize, max_size: usize, mutate_bytes: MutateBytes) -> usize {
+    match new.filter(|new| new.len() <= max_size) {
+        Some(new) => {
+            data[..new.len()].copy_from_slice(&new);
+            new.len()
+        }
+        None => mutate_bytes(data, size, max_size),
+    }
+}
 
 /// The changed file; `None` where it cannot be read, and now and then where it can.
 pub fn mutate(file: &[u8], seed: u32, mutate_bytes: MutateBytes) -> Option<Vec<u8>> {
@@ -29,7 +40,7 @@ pub fn mutate(file: &[u8], seed: u32, mutate_bytes: MutateBytes) -> Option<Vec<u
 }
 
 /// libFuzzer's own changes, with room for a few bytes more.
-fn grown(mut bytes: Vec<u8>, mutate_bytes: MutateBytes) -> Vec<u8> {
+pub fn grown(mut bytes: Vec<u8>, mutate_bytes: MutateBytes) -> Vec<u8> {
     let length = bytes.len();
     bytes.resize(length + 16, 0);
     let most = bytes.len();

@@ -12,10 +12,10 @@ use photonmill::plan::sensor::Sensor;
 use photonmill::scene::Scene;
 use photonmill::scene::geometry::Geometry;
 use photonmill::settings::scene::SceneSettings;
-use photonmill_fuzz::{mutation, panics_are_caught, refused};
+use photonmill_fuzz::{file, mutation, panics_are_caught, refused};
 
-/// The file that the loader opens; `run` lays it into memory.
-static FILE: LazyLock<PathBuf> = LazyLock::new(|| std::env::temp_dir().join(format!("photonmill-fuzz-{}.gltf", std::process::id())));
+/// The file that the loader opens.
+static FILE: LazyLock<PathBuf> = LazyLock::new(|| file("a.gltf"));
 
 fuzz_target!(init: panics_are_caught(), |bytes: &[u8]| {
     // The loader tells .gltf and .glb apart by content.
@@ -25,7 +25,7 @@ fuzz_target!(init: panics_are_caught(), |bytes: &[u8]| {
         let limits = Limits::of_host();
         let plan = ScenePlan::new(&scene, &geometry, &SceneSettings::default(), Sensor::Picture { width: 16, height: 16 }, &limits)?;
         check(&scene, &geometry);
-        assert!(plan.film_scale.is_finite() && plan.film_scale > 0.0, "film scale {}", plan.film_scale);
+        assert!(plan.film.scale.is_finite() && plan.film.scale > 0.0, "film scale {}", plan.film.scale);
         assert!(plan.bytes <= limits.memory_bytes, "{} bytes", plan.bytes);
         Ok(())
     });
@@ -68,11 +68,5 @@ fn check(scene: &Scene, geometry: &Geometry) {
 
 // Bytes alone rarely stay JSON, and never a .glb of the right lengths: most files are changed value by value.
 fuzz_mutator!(|data: &mut [u8], size: usize, max_size: usize, seed: u32| {
-    match mutation::mutate(&data[..size], seed, fuzzer_mutate) {
-        Some(new) if new.len() <= max_size => {
-            data[..new.len()].copy_from_slice(&new);
-            new.len()
-        }
-        _ => fuzzer_mutate(data, size, max_size),
-    }
+    mutation::put(mutation::mutate(&data[..size], seed, fuzzer_mutate), data, size, max_size, fuzzer_mutate)
 });

@@ -13,9 +13,9 @@ use photonmill::rng::Rng;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::{Scene, built_in};
-use photonmill::settings::stop::Stop;
 use photonmill::settings::scene::{Effect, Filter, Illumination, Kernel, Part, SceneSettings};
-use photonmill::settings::{EmissionLaw, Gather, Math, PhongDirection, Preset, RoomSettings, Sums, Builder};
+use photonmill::settings::stop::{Measure, Stop};
+use photonmill::settings::{Builder, EmissionLaw, Gather, Math, PhongDirection, Preset, RoomSettings, Sums};
 use photonmill_fuzz::{panics_are_caught, refused};
 
 static SCENES: LazyLock<Vec<(Scene, Geometry)>> = LazyLock::new(|| {
@@ -83,7 +83,7 @@ fn plan_triangles(request: &Triangles) -> photonmill::error::Result<()> {
     }
     let plan = plan?;
     assert!(plan.bytes <= limits.memory_bytes, "{} bytes", plan.bytes);
-    assert!(plan.film_scale.is_finite() && plan.film_scale > 0.0, "film scale {}", plan.film_scale);
+    assert!(plan.film.is_sound(), "{:?}", plan.film);
     plan.maps().for_each(|map| check_map(&plan, map, &limits));
     assert!(plan.pixels_at_once(plan.rays_per_pixel()) > 0);
     Ok(())
@@ -105,10 +105,11 @@ fn stop(u: &mut Unstructured) -> Result<Stop> {
     let usual = Stop::default();
     Ok(Stop {
         error: if u.arbitrary()? { Some(number(u, 0.01)?) } else { None },
+        measure: *u.choose(&Measure::ALL)?,
         confidence: number(u, usual.confidence)?,
         seconds: if u.arbitrary()? { Some(number(u, 1.0)?) } else { None },
         photons: if u.arbitrary()? { Some(u.arbitrary()?) } else { None },
-        ..usual
+        bias: if u.arbitrary()? { Some(number(u, 0.01)?) } else { None },
     })
 }
 
@@ -117,7 +118,7 @@ impl<'a> Arbitrary<'a> for Room {
         let preset = *u.choose(&[Preset::Naive, Preset::Modified, Preset::Phong, Preset::Rounds])?;
         let usual = RoomSettings::preset(preset);
         Ok(Room(RoomSettings {
-            builder: *u.choose(&[Builder::Naive, Builder::Atomic, Builder::Ballot, Builder::Cpu])?,
+            builder: *u.choose(&Builder::ALL)?,
             photons: count(u, usual.photons)?,
             rounds: count(u, usual.rounds)?,
             bounces: count(u, usual.bounces)?,
@@ -159,6 +160,7 @@ impl<'a> Arbitrary<'a> for Triangles {
             photons: count(u, usual.photons)?,
             caustic_photons: count(u, usual.caustic_photons)?,
             rounds: count(u, usual.rounds)?,
+            block: if u.arbitrary()? { Some(count(u, 4)?) } else { None },
             bounces: count(u, usual.bounces)?,
             seed: u.arbitrary()?,
             radius: if u.arbitrary()? { Some(number(u, 0.05)?) } else { None },

@@ -1,0 +1,134 @@
+//! Files of runs and of photons, small and made without a device: what fuzzing begins with.
+
+use std::fs::File;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+use glam::Vec3;
+use photonmill::constants::{HIT_KINDS, RADIUS_CLASSES};
+use photonmill::engine::Control;
+use photonmill::engine::blocks::{Blocks, Share};
+use photonmill::engine::differences::Differences;
+use photonmill::engine::film::{BlockSums, KeptBlock, LatestBlocks};
+use photonmill::engine::identity::{Hash, Identity};
+use photonmill::engine::room;
+use photonmill::engine::saved::SavedRun;
+use photonmill::engine::scene::SceneFilm;
+use photonmill::engine::scene::map_file::MapWriter;
+use photonmill::engine::watch::{Keep, SaveRun};
+use photonmill::ledger::Fates;
+use photonmill::photon::MapPhoton;
+use photonmill::plan::Limits;
+use photonmill::plan::buffers::{ANOMALY_WORDS, PART_VALUES};
+use photonmill::plan::differences::difference_count;
+use photonmill::plan::scene::ScenePlan;
+use photonmill::plan::sensor::Sensor;
+use photonmill::rng::Rng;
+use photonmill::scene::built_in;
+use photonmill::scene::geometry::Geometry;
+use photonmill::scene::open_box::open_box;
+use photonmill::settings::scene::SceneSettings;
+use photonmill::settings::{Builder, RoomSettings};
+
+use crate::file;
+
+/// Of the paper's box, so small that it takes no time.
+pub fn box_settings() -> RoomSettings {
+    RoomSettings { photons: 101, rounds: 4, mesh: 2, builder: Builder::Cpu, rng: Rng::Philox, ..RoomSettings::default() }
+}
+
+/// Keeps what a run saves last.
+struct Latest(Option<SavedRun>);
+
+impl SaveRun for Latest {
+    fn save(&mut self, run: &SavedRun, _: bool) -> photonmill::error::Result<()> {
+        self.0 = Some(run.clone());
+        Ok(())
+    }
+}
+
+/// A part of a run of that box, which goes on with what there is of it.
+pub fn part_of_box(share: Share, resume: Option<SavedRun>) -> photonmill::error::Result<SavedRun> {
+    let (settings, never, mut latest) = (box_settings(), AtomicBool::new(false), Latest(None));
+    let resume = resume.map(|run| ("seed".into(), run));
+    let keep = Keep { scene: "open-box", share, resume, every: Duration::ZERO, save: Some(&mut latest), dealt: None };
+    room::run(None, &open_box(&settings), &settings, &mut Control { cancelled: &never, progress: &mut |_| {}, keep })?;
+    Ok(latest.0.expect("a run saves its end"))
+}
+
+/// A part of eight blocks of a picture of four pixels, as far as what it holds must fit.
+fn part_of_picture(share: Share) -> SavedRun {
+    let (scene, settings) = (built_in::by_name("cornell").expect("it is built in"), SceneSettings::default());
+    let geometry = Geometry::new(&scene).expect("it has triangles");
+    let sensor = Sensor::Picture { width: 2, height: 2 };
+    let plan = ScenePlan::new(&scene, &geometry, &settings, sensor, &Limits::of_host()).expect("it can be planned").film;
+    let (mut done, mut latest) = (Blocks::default(), LatestBlocks::default());
+    for number in (share.number..8).step_by(share.of as usize) {
+        done.insert(number);
+        latest.push(KeptBlock { number, values: (0..4 * PART_VALUES as u32).map(|k| ((5 * number + 7 * k) % 11) as f32).collect() });
+    }
+    let (blocks, rounds) = (u64::from(done.count()), done.count() * plan.rounds_per_block);
+    // Each block has left a sum of 7 or so.
+    let sums = || BlockSums { rounds, blocks: done.count(), sums: vec![7 * blocks; 12], squares: vec![50 * u128::from(blocks); 12] };
+    let mut fates = Fates { emitted: 4 * blocks, ..Fates::of_scene(4) };
+    fates.bounces[0].absorbed = 4 * blocks;
+    let mut anomalies = [0; ANOMALY_WORDS];
+    // Samples that met a surface.
+    anomalies[8] = 4 * rounds * plan.samples;
+    let one_hits = [0, u32::MAX, 0.5f32.to_bits(), 3f32.to_bits(), 0].into_iter().cycle().take(4 * HIT_KINDS as usize).collect();
+    let film = SceneFilm {
+        of_blocks: sums(),
+        of_surfaces: Some(sums()),
+        latest,
+        differences: Differences((0..difference_count(4) as u64).map(|k| k % 3).collect()),
+        one_hits,
+        part_totals: vec![3; 4],
+        anomalies,
+        class_counts: vec![1; 2 * RADIUS_CLASSES as usize],
+        stored: [1, 0, 1],
+        plan,
+    };
+    let identity = Identity::new("cornell", Hash::default(), &settings, Hash::default(), None, settings.math);
+    SavedRun { identity, share, wanted: 8, done, sensor: Some(sensor), fates: vec![fates; 2], film: film.into() }
+}
+
+/// Whole runs, a shard of each, and pairs of shards, one behind the other.
+pub fn runs() -> Vec<Vec<u8>> {
+    let of_box = |share| part_of_box(share, None).expect("the box can be run").to_bytes();
+    let of_picture = |share| part_of_picture(share).to_bytes();
+    let shard = |number| Share { number, of: 2 };
+    let whole = Share::default();
+    let pair = |of: &dyn Fn(Share) -> Vec<u8>| [of(shard(0)), of(shard(1))].concat();
+    vec![of_box(whole), of_picture(whole), of_box(shard(0)), of_picture(shard(0)), pair(&of_box), pair(&of_picture)]
+}
+
+/// What a file of photons is of.
+pub fn map_settings() -> SceneSettings {
+    SceneSettings { photons: 4, caustic_photons: 4, bounces: 3, ..SceneSettings::default() }
+}
+
+/// Photons of two rounds.
+pub fn photon_map() -> Vec<u8> {
+    let (scene, path) = (built_in::by_name("cornell").expect("it is built in"), file("seed.pm"));
+    let geometry = Geometry::new(&scene).expect("it has triangles");
+    let sensor = Sensor::Picture { width: 2, height: 2 };
+    let plan = ScenePlan::new(&scene, &geometry, &map_settings(), sensor, &Limits::of_host()).expect("it can be planned");
+    let write = || {
+        let mut file = File::create(&path)?;
+        let mut writer = MapWriter::new(&mut file, "cornell", &geometry, &plan, "none")?;
+        for _ in 0..2 {
+            for _ in plan.maps() {
+                writer.begin_map();
+                writer.add(&[MapPhoton { flux: Vec3::ONE, ..MapPhoton::default() }; 5])?;
+                let mut fates = Fates { emitted: 4, ..Fates::of_scene(3) };
+                fates.bounces[0].absorbed = 4;
+                fates.totals.get_or_insert_default().stored = 5;
+                writer.end_map(fates);
+            }
+            writer.end_round();
+        }
+        writer.finish()?;
+        std::fs::read(&path)
+    };
+    write().expect("the file can be written")
+}

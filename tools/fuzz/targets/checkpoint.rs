@@ -1,0 +1,65 @@
+//! Bytes of one saved run or of two -> read -> used as `merge` and `--resume` do: a run of use, or one line that says why not.
+
+#![no_main]
+
+use std::sync::LazyLock;
+
+use libfuzzer_sys::{fuzz_mutator, fuzz_target, fuzzer_mutate};
+use photonmill::engine::saved::{SavedFilm, SavedRun};
+use photonmill::output::colour::{Format, Tone};
+use photonmill::output::merge_report;
+use photonmill::output::show::Show;
+use photonmill::plan::sensor::Sensor;
+use photonmill_fuzz::change::Random;
+use photonmill_fuzz::sealed::{Run, mutate, two_files};
+use photonmill_fuzz::{mutation, refused, seeds};
+
+static SEEDS: LazyLock<Vec<Vec<u8>>> = LazyLock::new(seeds::runs);
+
+fuzz_target!(|input: &[u8]| {
+    let runs: Vec<SavedRun> = two_files::<Run>(input).into_iter().filter_map(read).collect();
+    runs.iter().for_each(use_run);
+    if let [run, other] = runs.as_slice()
+        && run.identity.differs_from(&other.identity).is_none()
+    {
+        let mut both = run.clone();
+        if both.merge(other).is_ok() {
+            use_run(&both);
+        }
+    }
+});
+
+fn read(file: &[u8]) -> Option<SavedRun> {
+    let refused = |line: String| assert!(!line.is_empty() && line.lines().count() == 1, "{line:?}");
+    SavedRun::from_bytes(file).map_err(refused).ok()
+}
+
+/// Writes, reports and shows a run as `merge` does, and goes on with it where it is of the paper's box.
+fn use_run(run: &SavedRun) {
+    let bytes = run.to_bytes();
+    assert_eq!(bytes, SavedRun::from_bytes(&bytes).expect("what was written can be read").to_bytes());
+    let _ = (run.missing(), run.emitted());
+    let SavedFilm::Scene(film) = &run.film else {
+        assert!(!merge_report::text(run, 1, None).is_empty());
+        return seeds::part_of_box(run.share, Some(run.clone())).map_or_else(|error| refused(&error), drop);
+    };
+    assert!(!merge_report::text(run, 1, Some(film)).is_empty() && !merge_report::json(run, film, &[]).is_empty());
+    (0..film.pixels()).for_each(|pixel| drop((film.mean(pixel), film.standard_error(pixel))));
+    if let Some(Sensor::Picture { width, height }) = run.sensor {
+        let show = Show { size: (width, height), exposure: None, tone: Tone::default() };
+        let _ = ([Format::Png, Format::Exr].map(|format| show.picture(film, format)), show.errors(film));
+    }
+}
+
+fuzz_mutator!(|data: &mut [u8], size: usize, max_size: usize, seed: u32| {
+    let mut random = Random(u64::from(seed));
+    let files = two_files::<Run>(&data[..size]);
+    // Where there is no second file, now and then a seed becomes one.
+    let which = usize::from(random.below(if files[1].is_empty() { 8 } else { 2 }) == 1);
+    let new = mutate::<Run>(files[which], &SEEDS, &mut random, fuzzer_mutate).map(|new| {
+        let mut files = files.map(<[u8]>::to_vec);
+        files[which] = new;
+        files.concat()
+    });
+    mutation::put(new, data, size, max_size, fuzzer_mutate)
+});
