@@ -1,6 +1,7 @@
 //! Timings as nested scopes, each with its time on the device, on the host, or both.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
@@ -29,7 +30,7 @@ pub enum Clock {
 /// One run of one scope, for the trace file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Span {
-    pub name: String,
+    pub name: Arc<str>,
     pub clock: Clock,
     /// Since the start of the run. Device spans are placed by the host's time of their submission.
     pub start: Duration,
@@ -40,7 +41,7 @@ pub struct Span {
 #[derive(Debug, Clone, Default)]
 pub struct Timings {
     rows: Vec<Row>,
-    by_name: HashMap<String, usize>,
+    by_name: HashMap<Arc<str>, usize>,
     spans: Vec<Span>,
     spans_left_out: u64,
 }
@@ -67,8 +68,9 @@ impl Timings {
     }
 
     fn row_mut(&mut self, name: &str) -> &mut Row {
-        let index = *self.by_name.entry(name.to_owned()).or_insert_with(|| {
+        let index = self.by_name.get(name).copied().unwrap_or_else(|| {
             self.rows.push(Row { name: name.to_owned(), count: 0, gpu_ms: None, wall_ms: None });
+            self.by_name.insert(name.into(), self.rows.len() - 1);
             self.rows.len() - 1
         });
         &mut self.rows[index]
@@ -89,7 +91,9 @@ impl Timings {
         };
         *sum = Some(sum.unwrap_or(0.0) + milliseconds);
         if self.spans.len() < MAX_SPANS {
-            self.spans.push(span);
+            // All spans of a scope share its name.
+            let name = self.by_name.get_key_value(&span.name).expect("the row is there").0.clone();
+            self.spans.push(Span { name, ..span });
         } else {
             self.spans_left_out += 1;
         }
@@ -163,12 +167,12 @@ impl HostClock {
         let result = body(self);
         let (start, duration) = (begin.duration_since(self.started), begin.elapsed());
         let name = self.open.pop().expect("pushed above");
-        self.timings.add(Span { name, clock: Clock::Wall, start, duration });
+        self.timings.add(Span { name: name.into(), clock: Clock::Wall, start, duration });
         result
     }
 
     pub fn finish(mut self) -> Timings {
-        let whole = Span { name: self.whole.to_owned(), clock: Clock::Wall, start: Duration::ZERO, duration: self.started.elapsed() };
+        let whole = Span { name: self.whole.into(), clock: Clock::Wall, start: Duration::ZERO, duration: self.started.elapsed() };
         self.timings.add(whole);
         self.timings
     }

@@ -229,7 +229,7 @@ fn timings_nest_and_count() {
             let waited: f64 = top.filter_map(|row| row.wall_ms).sum();
             assert!(waited <= wall, "{what}: waited {waited} ms of {wall}");
             // Spans of the trace file add up to the rows.
-            let spans = outcome.timings.spans().iter().filter(|span| span.clock == Clock::Gpu && span.name == "round");
+            let spans = outcome.timings.spans().iter().filter(|span| span.clock == Clock::Gpu && *span.name == *"round");
             let spans: f64 = spans.map(|span| span.duration.as_secs_f64() * 1e3).sum();
             let row = outcome.timings.row("round").unwrap().gpu_ms.unwrap_or(0.0);
             assert!((spans - row).abs() <= 1e-6 * row.max(1.0), "{spans} and {row}");

@@ -111,13 +111,17 @@ fn a_full_disk_costs_nothing_that_was_there() {
 
 const LONG: &str = "--size 12x12 --photons 1500 --caustic-photons 800 --block 1 -q --rounds 40";
 
+/// Has a run hand commands over after every block, also on a device that could do all of it at once.
+const STEP_BY_STEP: &str = "--checkpoint c.pms --every 1ms";
+
 /// Planted faults, and what the run says of each: how it goes on.
 fn assert_goes_on<'a>(line: &str, cases: impl IntoIterator<Item = (&'a str, &'a [&'a str])>) {
     let place = Place::new();
     let picture = |name: &str| std::fs::read(place.at(name)).unwrap();
     place.succeed(&format!("{line} -o whole.exr"));
     for (faults, said) in cases {
-        let output = place.command(&on_device(&format!("{line} -o a.exr"))).env("PHOTONMILL_FAULTS", faults).output().unwrap();
+        let output =
+            place.command(&on_device(&format!("{line} -o a.exr {STEP_BY_STEP}"))).env("PHOTONMILL_FAULTS", faults).output().unwrap();
         let stderr = text(&output.stderr);
         assert_eq!(output.status.code(), Some(0), "{faults}: {stderr}");
         let lines: Vec<&str> = stderr.lines().collect();
@@ -159,7 +163,7 @@ fn a_device_that_is_lost_for_good_leaves_a_checkpoint() {
     let place = Place::new();
     let line = format!("render cornell-spheres {LONG}");
     place.succeed(&format!("{line} -o whole.exr"));
-    let kept = on_device(&format!("{line} -o a.exr --checkpoint c.pms --every 1ms"));
+    let kept = on_device(&format!("{line} -o a.exr {STEP_BY_STEP}"));
     let output = place.command(&kept).env("PHOTONMILL_FAULTS", "vkQueueSubmit2@40+=lost").output().unwrap();
     let stderr = text(&output.stderr);
     assert_eq!((output.status.code(), stderr.lines().count()), (Some(1), 1), "{stderr}");
@@ -188,7 +192,7 @@ fn one_of_several_devices_that_fails_goes_on() {
     let place = Place::new();
     place.succeed(&format!("render cornell-spheres {LONG} -o whole.exr"));
     for (faults, said) in cases {
-        let line = format!("render cornell-spheres {LONG} -o a.exr --devices {number},{number}");
+        let line = format!("render cornell-spheres {LONG} -o a.exr --devices {number},{number} {STEP_BY_STEP}");
         let output = place.command(&line).env("PHOTONMILL_FAULTS", faults).output().unwrap();
         let stderr = text(&output.stderr);
         assert!(output.status.success() && stderr.lines().count() == said.len() && stderr.contains(said[0]), "{faults}: {stderr}");

@@ -250,8 +250,8 @@ fn no_dispatch_takes_long() {
     let dispatches: Vec<&Span> = lit.timings.spans().iter().filter(is_dispatch).collect();
     let gathers = dispatches.iter().filter(|span| span.name.contains("/gather/gather_visible_points"));
     let (count, total) = gathers.fold((0, Duration::ZERO), |(count, total), span| (count + 1, total + span.duration));
-    // On a machine that others use too, lavapipe's times are not its own.
-    let most = Duration::from_millis(if is_cpu { 200 } else { 50 });
+    // Of 50 ms; where others use the device too, as other tests do, times are not its own.
+    let most = Duration::from_millis(200);
     assert!(total > 10 * most && count > 20, "{total:?} in {count} pieces show nothing");
     // What is slow in which part of the picture is known to a slow device from the second round on.
     let first_round = dispatches.iter().find(|span| span.name.ends_with("/resolve")).unwrap().start;

@@ -121,14 +121,14 @@ impl Gpu {
         }
         let device = &self.context.device;
         // SAFETY: `info` is complete; the buffer is destroyed in Drop.
-        let raw = call("vkCreateBuffer", unsafe { device.create_buffer(&info, None) })?;
+        let raw = call("vkCreateBuffer", || unsafe { device.create_buffer(&info, None) })?;
         let mut buffer = AnyBuffer { name: name.to_owned(), memory, size_bytes, raw, allocation: None, context: self.context.clone() };
         // SAFETY: the buffer was just made.
         let requirements = unsafe { device.get_buffer_memory_requirements(raw) };
         let allocation = self.allocate(name, size_bytes, memory, requirements)?;
         // SAFETY: memory and offset come from the allocator for these requirements, and the allocation is
         // freed after the buffer.
-        call("vkBindBufferMemory", unsafe { device.bind_buffer_memory(raw, allocation.memory(), allocation.offset()) })?;
+        call("vkBindBufferMemory", || unsafe { device.bind_buffer_memory(raw, allocation.memory(), allocation.offset()) })?;
         buffer.allocation = Some(allocation);
         self.context.held().take(memory, size_bytes);
         self.context.set_name(raw, name);

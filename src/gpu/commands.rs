@@ -103,7 +103,7 @@ struct Pace {
 /// What is known of a scope.
 #[derive(Default)]
 struct Known {
-    /// That a unit of work took lately at most.
+    /// That a unit of work took lately at most; 0 as long as all of it took too little time to tell.
     seconds: f64,
     /// Work that was done between two submissions at most.
     most: u64,
@@ -113,6 +113,8 @@ struct Known {
 const PIECE_TIME: f64 = 0.025;
 /// Share of a plan's work per submission that is taken at once as long as nobody knows how long it takes.
 const FIRST_SHARE: u64 = 256;
+/// Less says nothing of a unit of work: it is the time of starting a dispatch that leaves most of a device idle.
+const LEAST_TIME: f64 = 0.002;
 /// How many times as much is dared as was ever done at once, as not all parts of a picture are alike.
 const GROWTH: u64 = 4;
 /// What is left of a time once another was measured: what is slow in one part of a picture comes again in the next round.
@@ -125,7 +127,7 @@ impl Pace {
     fn fits(&self, scope: &str, most: u64) -> u64 {
         let fits = self.known.get(scope).map_or(most / FIRST_SHARE, |known| {
             let at_once = known.most.max(most / FIRST_SHARE).saturating_mul(GROWTH);
-            at_once.min((PIECE_TIME / known.seconds) as u64)
+            if known.seconds > 0.0 { at_once.min((PIECE_TIME / known.seconds) as u64) } else { at_once }
         });
         fits.min(most).max(1)
     }
@@ -140,7 +142,8 @@ impl Pace {
         for (scope, work) in self.work.drain().filter(|(_, work)| *work > 0) {
             let Some(took) = took.get(scope.as_str()) else { continue };
             let known = self.known.entry(scope).or_default();
-            known.seconds = (took.as_secs_f64() / work as f64).max(MEMORY * known.seconds);
+            let took = took.as_secs_f64();
+            known.seconds = if took < LEAST_TIME { 0.0 } else { took / work as f64 }.max(MEMORY * known.seconds);
             known.most = known.most.max(work);
         }
     }
@@ -160,10 +163,10 @@ impl<'gpu> Commands<'gpu> {
         let timestamps = Timestamps::new(gpu)?;
         // SAFETY: all infos are complete; everything is destroyed in Drop.
         let (pool, command_buffer, fence) = unsafe {
-            let pool = call("vkCreateCommandPool", device.create_command_pool(&pool_info, None))?;
+            let pool = call("vkCreateCommandPool", || device.create_command_pool(&pool_info, None))?;
             let buffer_info = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(1);
-            let command_buffer = call("vkAllocateCommandBuffers", device.allocate_command_buffers(&buffer_info))?[0];
-            let fence = call("vkCreateFence", device.create_fence(&vk::FenceCreateInfo::default(), None))?;
+            let command_buffer = call("vkAllocateCommandBuffers", || device.allocate_command_buffers(&buffer_info))?[0];
+            let fence = call("vkCreateFence", || device.create_fence(&vk::FenceCreateInfo::default(), None))?;
             (pool, command_buffer, fence)
         };
         let mut commands = Commands {
@@ -197,7 +200,7 @@ impl<'gpu> Commands<'gpu> {
     fn begin(&mut self) -> Result<()> {
         let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
         // SAFETY: the last submission has ended, so the command buffer may be recorded again.
-        call("vkBeginCommandBuffer", unsafe { self.context.device.begin_command_buffer(self.command_buffer, &info) })?;
+        call("vkBeginCommandBuffer", || unsafe { self.context.device.begin_command_buffer(self.command_buffer, &info) })?;
         self.timestamps.forget();
         // The fence of the last submission made its writes available; this makes them visible here.
         self.barrier();
@@ -415,10 +418,10 @@ impl<'gpu> Commands<'gpu> {
         // SAFETY: everything recorded is alive; the fence is unsignalled, and waiting for it ends
         // all use of it and of the command buffer.
         let run = || unsafe {
-            call("vkEndCommandBuffer", device.end_command_buffer(self.command_buffer))?;
-            call("vkQueueSubmit2", device.queue_submit2(self.gpu.queue, &submission, self.fence))?;
-            call("vkWaitForFences", device.wait_for_fences(&[self.fence], true, u64::MAX))?;
-            call("vkResetFences", device.reset_fences(&[self.fence]))
+            call("vkEndCommandBuffer", || device.end_command_buffer(self.command_buffer))?;
+            call("vkQueueSubmit2", || device.queue_submit2(self.gpu.queue, &submission, self.fence))?;
+            call("vkWaitForFences", || device.wait_for_fences(&[self.fence], true, u64::MAX))?;
+            call("vkResetFences", || device.reset_fences(&[self.fence]))
         };
         run().inspect_err(|_| {
             // Nothing may be destroyed that is still in use, also on a device that fails; a lost one answers at once.
@@ -433,7 +436,7 @@ impl<'gpu> Commands<'gpu> {
         // SAFETY: the submission has ended, so its descriptor sets are free.
         unsafe {
             for pool in &self.descriptor_pools {
-                call("vkResetDescriptorPool", device.reset_descriptor_pool(*pool, vk::DescriptorPoolResetFlags::empty()))?;
+                call("vkResetDescriptorPool", || device.reset_descriptor_pool(*pool, vk::DescriptorPoolResetFlags::empty()))?;
             }
         }
         self.descriptor_sets.clear();
@@ -458,7 +461,7 @@ impl<'gpu> Commands<'gpu> {
         let mut took: HashMap<&str, Duration> = HashMap::new();
         if let Some(times) = self.timestamps.read(&timed)? {
             for (scope, (begin, duration)) in timed.iter().zip(times) {
-                self.timings.add(Span { name: scope.name.clone(), clock: Clock::Gpu, start: start + begin, duration });
+                self.timings.add(Span { name: scope.name.as_str().into(), clock: Clock::Gpu, start: start + begin, duration });
                 *took.entry(&scope.name).or_default() += duration;
             }
         } else {
@@ -468,7 +471,7 @@ impl<'gpu> Commands<'gpu> {
         self.pace.learn(&took);
         let outermost = timed.last().map(|scope| scope.name.split('/').next().unwrap_or_default().to_owned());
         if let Some(name) = outermost {
-            self.timings.add(Span { name, clock: Clock::Wall, start, duration: wall });
+            self.timings.add(Span { name: name.into(), clock: Clock::Wall, start, duration: wall });
         }
         Ok(())
     }
@@ -480,7 +483,7 @@ impl<'gpu> Commands<'gpu> {
     /// Ends the recording; `whole` names the row that spans all of it on the host's clock.
     pub fn finish(mut self, whole: &str) -> Timings {
         let mut timings = std::mem::take(&mut self.timings);
-        timings.add(Span { name: whole.to_owned(), clock: Clock::Wall, start: Duration::ZERO, duration: self.started.elapsed() });
+        timings.add(Span { name: whole.into(), clock: Clock::Wall, start: Duration::ZERO, duration: self.started.elapsed() });
         timings
     }
 
@@ -549,14 +552,14 @@ impl<'gpu> Commands<'gpu> {
                 match unsafe { device.allocate_descriptor_sets(&info) } {
                     Ok(sets) => return Ok(sets[0]),
                     Err(vk::Result::ERROR_OUT_OF_POOL_MEMORY | vk::Result::ERROR_FRAGMENTED_POOL) => self.descriptor_pool_in_use += 1,
-                    Err(code) => return call("vkAllocateDescriptorSets", Err(code)),
+                    Err(code) => return call("vkAllocateDescriptorSets", || Err(code)),
                 }
                 continue;
             }
             let sizes = [vk::DescriptorPoolSize::default().ty(vk::DescriptorType::STORAGE_BUFFER).descriptor_count(BUFFERS_PER_POOL)];
             let info = vk::DescriptorPoolCreateInfo::default().max_sets(SETS_PER_POOL).pool_sizes(&sizes);
             // SAFETY: `info` is complete; destroyed in Drop.
-            self.descriptor_pools.push(call("vkCreateDescriptorPool", unsafe { device.create_descriptor_pool(&info, None) })?);
+            self.descriptor_pools.push(call("vkCreateDescriptorPool", || unsafe { device.create_descriptor_pool(&info, None) })?);
         }
     }
 }
@@ -642,7 +645,7 @@ mod tests {
         learns(&mut pace, "a", 1, 1_000_000);
         assert_eq!((pace.fits("a", MOST), pace.fits("b", MOST)), (1, MOST / FIRST_SHARE));
         // Little that was fast says little of much.
-        learns(&mut pace, "c", 1 << 13, 0);
+        learns(&mut pace, "c", 1 << 13, 1);
         assert_eq!(pace.fits("c", MOST), GROWTH << 13);
         // A scope without work says nothing.
         learns(&mut pace, "b", 0, 1000);

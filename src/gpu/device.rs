@@ -79,7 +79,7 @@ pub(super) fn instance(validate: bool) -> Result<(ash::Entry, ash::Instance, Opt
     let mut extensions = Vec::new();
     if validate {
         // SAFETY: plain enumeration.
-        let present = call("vkEnumerateInstanceLayerProperties", unsafe { entry.enumerate_instance_layer_properties() })?;
+        let present = call("vkEnumerateInstanceLayerProperties", || unsafe { entry.enumerate_instance_layer_properties() })?;
         if !present.iter().any(|layer| layer.layer_name_as_c_str() == Ok(VALIDATION_LAYER)) {
             return Err(Error::NoValidationLayer);
         }
@@ -284,7 +284,7 @@ pub(super) fn create(instance: &ash::Instance, physical: vk::PhysicalDevice, fac
     }
     // SAFETY: all pointers in `info` are alive, and `facts` says that the features are there.
     unsafe {
-        let device = call("vkCreateDevice", instance.create_device(physical, &info, None))?;
+        let device = call("vkCreateDevice", || instance.create_device(physical, &info, None))?;
         let queue = device.get_device_queue(facts.queue_family, 0);
         Ok((device, queue))
     }

@@ -1,4 +1,4 @@
-//! Faults that are planted behind Vulkan calls, so that tests see what becomes of a run on a device that fails.
+//! Faults that are planted in place of Vulkan calls, so that tests see what becomes of a run on a device that fails.
 //!
 //! The variable `PHOTONMILL_FAULTS` of the environment lists them: `vkQueueSubmit2@20=lost` is a device that is lost in the 20th
 //! submission of the process, and `vkAllocateMemory@3+=device-memory` one without memory from the third allocation on.
@@ -52,7 +52,7 @@ impl Fault {
     }
 }
 
-/// What a call that went well is to be taken for.
+/// Whether a call, which is about to be made, fails in its place.
 pub(super) fn planted(call: &str) -> Result<(), vk::Result> {
     let Some(faults) = PLANTED.as_ref() else { return Ok(()) };
     let mut faults = faults.lock().unwrap_or_else(PoisonError::into_inner);

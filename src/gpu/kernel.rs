@@ -142,7 +142,7 @@ impl SetLayouts {
         let bindings: Vec<_> = numbers.iter().map(binding).collect();
         let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
         // SAFETY: `info` is complete; destroyed in Drop.
-        let layout = call("vkCreateDescriptorSetLayout", unsafe { self.context.device.create_descriptor_set_layout(&info, None) })?;
+        let layout = call("vkCreateDescriptorSetLayout", || unsafe { self.context.device.create_descriptor_set_layout(&info, None) })?;
         self.made.borrow_mut().insert(numbers, layout);
         Ok(layout)
     }
@@ -210,7 +210,7 @@ impl Gpu {
         let push = [vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::COMPUTE).size(PUSH_BYTES)];
         let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&set_layouts).push_constant_ranges(&push);
         // SAFETY: `info` is complete; destroyed with the pipeline.
-        let layout = call("vkCreatePipelineLayout", unsafe { self.context.device.create_pipeline_layout(&info, None) })?;
+        let layout = call("vkCreatePipelineLayout", || unsafe { self.context.device.create_pipeline_layout(&info, None) })?;
         Ok(Pipeline { raw: vk::Pipeline::null(), layout, set_layouts, context: self.context.clone() })
     }
 }
@@ -224,7 +224,7 @@ fn compile(
 ) -> Result<vk::Pipeline> {
     let info = vk::ShaderModuleCreateInfo::default().code(words);
     // SAFETY: the code comes from the GLSL compiler.
-    let shader = call("vkCreateShaderModule", unsafe { device.create_shader_module(&info, None) })?;
+    let shader = call("vkCreateShaderModule", || unsafe { device.create_shader_module(&info, None) })?;
     let offsets = (0..).step_by(size_of::<u32>());
     let entries: Vec<_> = constants
         .iter()
@@ -245,7 +245,7 @@ fn compile(
         device.destroy_shader_module(shader, None);
         made
     };
-    Ok(call("vkCreateComputePipelines", made)?[0])
+    Ok(call("vkCreateComputePipelines", || made)?[0])
 }
 
 /// Vulkan's pipeline cache, kept in the user's cache folder from run to run.
@@ -265,7 +265,7 @@ impl DiskCache {
         let content = path.as_ref().and_then(|path| std::fs::read(path).ok()).unwrap_or_default();
         let info = vk::PipelineCacheCreateInfo::default().initial_data(&content);
         // SAFETY: the driver validates the header of the data; destroyed in Drop.
-        let raw = call("vkCreatePipelineCache", unsafe { context.device.create_pipeline_cache(&info, None) })?;
+        let raw = call("vkCreatePipelineCache", || unsafe { context.device.create_pipeline_cache(&info, None) })?;
         Ok(DiskCache { raw, path, loaded_bytes: content.len(), context: context.clone() })
     }
 

@@ -112,9 +112,9 @@ impl Drop for Context {
     }
 }
 
-/// Turns a Vulkan result into an [`Error`] that names the call.
-pub(crate) fn call<T>(name: &'static str, result: ash::prelude::VkResult<T>) -> Result<T> {
-    result.and_then(|value| faults::planted(name).map(|()| value)).map_err(|code| match code {
+/// Calls Vulkan, and turns what fails into an [`Error`] that names the call.
+pub(crate) fn call<T>(name: &'static str, vulkan: impl FnOnce() -> ash::prelude::VkResult<T>) -> Result<T> {
+    faults::planted(name).and_then(|()| vulkan()).map_err(|code| match code {
         vk::Result::ERROR_DEVICE_LOST => Error::DeviceLost { call: name },
         vk::Result::ERROR_OUT_OF_DEVICE_MEMORY => Error::OutOfMemory { call: name, what: "the device's memory is full".into() },
         vk::Result::ERROR_OUT_OF_HOST_MEMORY => Error::OutOfMemory { call: name, what: "the host's memory is full".into() },

@@ -40,7 +40,7 @@ impl Timestamps {
             vk::QueryPool::null()
         } else {
             // SAFETY: `info` is complete; destroyed in Drop.
-            call("vkCreateQueryPool", unsafe { gpu.context.device.create_query_pool(&info, None) })?
+            call("vkCreateQueryPool", || unsafe { gpu.context.device.create_query_pool(&info, None) })?
         };
         Ok(Timestamps {
             pool,
@@ -90,7 +90,7 @@ impl Timestamps {
         let mut ticks = vec![0u64; self.used as usize];
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
         // SAFETY: `ticks` holds one 64-bit result a query.
-        call("vkGetQueryPoolResults", unsafe { self.context.device.get_query_pool_results(self.pool, 0, &mut ticks, flags) })?;
+        call("vkGetQueryPoolResults", || unsafe { self.context.device.get_query_pool_results(self.pool, 0, &mut ticks, flags) })?;
         let between = |from: u32, to: u32| elapsed(ticks[from as usize], ticks[to as usize], self.valid_bits, self.period_ns);
         Ok(Some(scopes.iter().map(|scope| (between(0, scope.begin), between(scope.begin, scope.end))).collect()))
     }

@@ -26,7 +26,7 @@ impl Messages {
             .pfn_user_callback(Some(keep))
             .user_data((&raw const *list).cast_mut().cast());
         // SAFETY: the callback gets the list, which lives as long as the messenger.
-        let messenger = call("vkCreateDebugUtilsMessengerEXT", unsafe { loader.create_debug_utils_messenger(&info, None) })?;
+        let messenger = call("vkCreateDebugUtilsMessengerEXT", || unsafe { loader.create_debug_utils_messenger(&info, None) })?;
         Ok(Messages { loader, messenger, list })
     }
 

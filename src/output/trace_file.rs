@@ -20,7 +20,7 @@ pub fn chrome_trace(timings: &Timings, device: &str) -> Vec<u8> {
             "tid": track(span.clock),
             "ts": span.start.as_secs_f64() * 1e6,
             "dur": span.duration.as_secs_f64() * 1e6,
-            "args": {"path": span.name},
+            "args": {"path": &*span.name},
         })
     }));
     let trace = json!({

@@ -134,7 +134,7 @@ fn runs_of(timings: &Timings) -> BTreeMap<&str, Vec<f64>> {
     let mut runs: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
     let mut unfinished: Vec<&str> = Vec::new();
     for span in timings.spans().iter().filter(|span| span.clock == Clock::Gpu && span.name.starts_with("round/")) {
-        let name = span.name.as_str();
+        let name = &*span.name;
         let ms = 1e3 * span.duration.as_secs_f64();
         unfinished.retain(|other| is_within(other, name) || is_within(name, other));
         match runs.entry(name).or_default() {
@@ -196,7 +196,7 @@ mod tests {
         let mut timings = Timings::default();
         for (name, ms) in spans {
             timings.count(name);
-            timings.add(Span { name: (*name).to_owned(), clock: Clock::Gpu, start: Duration::ZERO, duration: Duration::from_millis(*ms) });
+            timings.add(Span { name: (*name).into(), clock: Clock::Gpu, start: Duration::ZERO, duration: Duration::from_millis(*ms) });
         }
         timings
     }

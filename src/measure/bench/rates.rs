@@ -178,7 +178,7 @@ impl<'gpu> Bench<'_, 'gpu> {
         }
         let clock = if self.gpu.facts().timestamp_bits > 0 { Clock::Gpu } else { Clock::Wall };
         let spans = self.commands.timings().spans();
-        let of_name = spans.iter().rev().filter(|span| span.name == name && span.clock == clock).take(REPEATS);
+        let of_name = spans.iter().rev().filter(|span| *span.name == *name && span.clock == clock).take(REPEATS);
         let rates = of_name.map(|span| amount as f64 / span.duration.as_secs_f64().max(1e-9)).collect();
         Ok(Spread::of(rates).expect("something was measured"))
     }

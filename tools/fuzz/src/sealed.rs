@@ -44,8 +44,8 @@ impl Format for Run {
     /// Rounds are those of the blocks.
     fn mend(header: &mut Value, _: &[u8]) {
         let number = |value: &Value| value.as_u64().unwrap_or_default();
-        let blocks = header["done"].as_array().into_iter().flatten();
-        let blocks = blocks.map(|range| number(&range["end"]).saturating_sub(number(&range["start"]))).fold(0, u64::saturating_add);
+        let ranges = header["done"].as_array().into_iter().flatten();
+        let blocks = ranges.map(|range| number(&range["end"]).saturating_sub(number(&range["start"]))).fold(0, u64::saturating_add);
         let rounds_per_block = header.pointer("/film/Scene/plan/rounds_per_block").map_or(1, number);
         if let Some(rounds) = header.get_mut("rounds") {
             *rounds = json!(blocks.saturating_mul(rounds_per_block));
@@ -70,7 +70,7 @@ impl Format for Map {
 
     /// Checksums of photons are right.
     fn mend(header: &mut Value, arrays: &[u8]) {
-        for photons in header["rounds"].as_array_mut().into_iter().flatten().flat_map(|maps| maps.as_array_mut()).flatten() {
+        for photons in header.get_mut("rounds").and_then(Value::as_array_mut).into_iter().flatten().flat_map(|maps| maps.as_array_mut()).flatten() {
             let number = |name: &str| photons[name].as_u64().and_then(|number| usize::try_from(number).ok());
             let own = number("byte").zip(number("count")).and_then(|(byte, count)| {
                 let first = byte.checked_sub(Self::MAGIC.len())?;
@@ -89,23 +89,10 @@ pub fn two_files<F: Format>(input: &[u8]) -> [&[u8]; 2] {
     input.split_at(second).into()
 }
 
-/// Words that a header may hold, in other places.
-const WORDS: [&str; 14] = [
-    "",
-    "two\nlines",
-    "\u{1b}[31m\r",
-    "global",
-    "caustic",
-    "u32",
-    "u128",
-    "sums",
-    "NoMap",
-    "Blocks",
-    "ExtraRuns",
-    "relmse",
-    "photons",
-    "split",
-];
+/// Words and counts that a header may hold in other places.
+const WORDS: [&str; 12] =
+    ["", "two\nlines", "\u{1b}[31m\r", "global", "caustic", "u32", "u128", "sums", "NoMap", "Blocks", "relmse", "photons"];
+const COUNTS: [u64; 8] = [0, 1, 3, 1 << 31, u32::MAX as u64 - 1, u32::MAX as u64, 1 << 60, u64::MAX];
 
 /// The changed file; a seed in place of what is none; `None` now and then.
 pub fn mutate<F: Format>(file: &[u8], seeds: &[Vec<u8>], random: &mut Random, mutate_bytes: MutateBytes) -> Option<Vec<u8>> {
@@ -118,7 +105,9 @@ pub fn mutate<F: Format>(file: &[u8], seeds: &[Vec<u8>], random: &mut Random, mu
             let mut value = serde_json::from_slice(header).ok()?;
             match kind {
                 2..=4 => arrays = changed(arrays, random, mutate_bytes),
-                5 => say(&mut value, random),
+                5 => replace(&mut value, Value::is_string, &WORDS, random),
+                6 => replace(&mut value, Value::is_u64, &COUNTS, random),
+                7 => take(&mut value, F::parts(&random.pick(seeds))?.0, random)?,
                 _ => (0..=random.below(3)).for_each(|_| change(&mut value, random)),
             }
             if random.below(4) > 0 {
@@ -140,10 +129,21 @@ fn changed(mut arrays: Vec<u8>, random: &mut Random, mutate_bytes: MutateBytes) 
     arrays
 }
 
-/// Puts a word in the place of another.
-fn say(value: &mut Value, random: &mut Random) {
-    let places: Vec<String> = pointers(value).into_iter().filter(|place| value.pointer(place).is_some_and(Value::is_string)).collect();
+/// Puts another in the place of one that is not deep in a header, where there is most of what counts.
+fn replace<T: Clone + Into<Value>>(value: &mut Value, is_one: fn(&Value) -> bool, others: &[T], random: &mut Random) {
+    let is_place = |place: &String| value.pointer(place).is_some_and(is_one) && place.matches('/').count() <= 4;
+    let places: Vec<String> = pointers(value).into_iter().filter(is_place).collect();
     if let Some(old) = places.get(random.below(places.len())).and_then(|place| value.pointer_mut(place)) {
-        *old = json!(random.pick(&WORDS));
+        *old = random.pick(others).into();
     }
+}
+
+/// Takes a value, or all of a member, from another header.
+fn take(value: &mut Value, other: &[u8], random: &mut Random) -> Option<()> {
+    let other = serde_json::from_slice::<Value>(other).ok()?;
+    let place = random.pick(&pointers(&other));
+    let member = place.match_indices('/').nth(1).map_or(place.as_str(), |(end, _)| &place[..end]);
+    let place = if random.below(2) == 0 { member } else { &place };
+    *value.pointer_mut(place)? = other.pointer(place)?.clone();
+    Some(())
 }

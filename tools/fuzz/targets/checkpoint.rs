@@ -16,14 +16,18 @@ use photonmill_fuzz::{mutation, refused, seeds};
 
 static SEEDS: LazyLock<Vec<Vec<u8>>> = LazyLock::new(seeds::runs);
 
+static N: [std::sync::atomic::AtomicU64; 6] = [const { std::sync::atomic::AtomicU64::new(0) }; 6];
+fn n(k: usize) { let v = N[k].fetch_add(1, std::sync::atomic::Ordering::Relaxed); if k == 0 && v % 5000 == 4999 { eprintln!("STAT {N:?}"); } }
 fuzz_target!(|input: &[u8]| {
+    n(0);
     let runs: Vec<SavedRun> = two_files::<Run>(input).into_iter().filter_map(read).collect();
-    runs.iter().for_each(use_run);
+    runs.iter().for_each(|r| { n(1); use_run(r) });
+    if runs.len() == 2 { n(2); }
     if let [run, other] = runs.as_slice()
         && run.identity.differs_from(&other.identity).is_none()
     {
-        let mut both = run.clone();
-        if both.merge(other).is_ok() {
+        n(3); let mut both = run.clone();
+        if both.merge(other).is_ok() { n(4);
             use_run(&both);
         }
     }
@@ -41,10 +45,12 @@ fn use_run(run: &SavedRun) {
     let _ = (run.missing(), run.emitted());
     let SavedFilm::Scene(film) = &run.film else {
         assert!(!merge_report::text(run, 1, None).is_empty());
-        return seeds::part_of_box(run.share, Some(run.clone())).map_or_else(|error| refused(&error), drop);
+        return seeds::part_of_box(run.share, Some(run.clone())).map_or_else(|error| refused(&error), |_| n(5));
     };
     assert!(!merge_report::text(run, 1, Some(film)).is_empty() && !merge_report::json(run, film, &[]).is_empty());
-    (0..film.pixels()).for_each(|pixel| drop((film.mean(pixel), film.standard_error(pixel))));
+    for pixel in 0..film.pixels() {
+        let _ = (film.mean(pixel), film.standard_error(pixel));
+    }
     if let Some(Sensor::Picture { width, height }) = run.sensor {
         let show = Show { size: (width, height), exposure: None, tone: Tone::default() };
         let _ = ([Format::Png, Format::Exr].map(|format| show.picture(film, format)), show.errors(film));
