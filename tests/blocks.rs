@@ -17,8 +17,8 @@ use photonmill::settings::stop::Stop;
 struct Latest(Option<SavedRun>);
 
 impl SaveRun for Latest {
-    fn save(&mut self, run: &SavedRun, _: bool) -> Result<(), Error> {
-        self.0 = Some(run.clone());
+    fn save(&mut self, run: &std::sync::Arc<SavedRun>, _: bool) -> Result<(), Error> {
+        self.0 = Some(SavedRun::clone(run));
         Ok(())
     }
 }

@@ -752,8 +752,8 @@ fn compressed_views_of_any_bytes_are_read_or_refused() {
 struct Latest(Option<SavedRun>);
 
 impl SaveRun for Latest {
-    fn save(&mut self, run: &SavedRun, _: bool) -> photonmill::error::Result<()> {
-        self.0 = Some(run.clone());
+    fn save(&mut self, run: &std::sync::Arc<SavedRun>, _: bool) -> photonmill::error::Result<()> {
+        self.0 = Some(SavedRun::clone(run));
         Ok(())
     }
 }

@@ -1,6 +1,7 @@
 //! Runs on several devices: whichever does which block, the result is that of one device to the bit. Here all of them are one device,
 //! opened several times.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::Duration;
 
@@ -49,8 +50,8 @@ struct Came {
 struct All(Vec<SavedRun>);
 
 impl SaveRun for All {
-    fn save(&mut self, run: &SavedRun, _: bool) -> Result<(), Error> {
-        self.0.push(run.clone());
+    fn save(&mut self, run: &Arc<SavedRun>, _: bool) -> Result<(), Error> {
+        self.0.push(SavedRun::clone(run));
         Ok(())
     }
 }
@@ -113,7 +114,7 @@ impl Room {
         let job = Job {
             run: &run,
             film: |film| match film {
-                SavedFilm::Scene(film) => *film,
+                SavedFilm::Scene(film) => film,
                 SavedFilm::Room(_) => panic!("a scene was lit"),
             },
             error: &|film: &SceneFilm| film.error(plan.film.confidence),

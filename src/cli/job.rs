@@ -164,7 +164,7 @@ impl Job<'_> {
         let job = several_devices::Job {
             run: &run,
             film: |film| match film {
-                SavedFilm::Scene(film) => *film,
+                SavedFilm::Scene(film) => film,
                 SavedFilm::Room(_) => unreachable!("a scene was lit"),
             },
             error: &|film: &SceneFilm| film.error(plan.film.confidence),

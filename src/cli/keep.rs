@@ -1,6 +1,7 @@
 //! Runs that are kept: checkpoints, shards, and going on with what a file holds.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use clap::Args;
@@ -104,7 +105,7 @@ impl<'a> Keeper<'a> {
 
 impl SaveRun for Keeper<'_> {
     /// Writes what is due. A checkpoint that cannot be written is told of, and does not end the run.
-    fn save(&mut self, run: &SavedRun, is_last: bool) -> Result<()> {
+    fn save(&mut self, run: &Arc<SavedRun>, is_last: bool) -> Result<()> {
         if let Some(file) = self.checkpoint.as_ref().filter(|_| is_last || self.written[0].elapsed() >= self.every) {
             let result = write_synced(file, &run.to_bytes());
             if let (Err(error), false) = (&result, is_last) {

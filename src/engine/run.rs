@@ -11,7 +11,7 @@ use super::error_bound::FilmError;
 use super::identity::Identity;
 use super::nonfinite_values::NonfiniteValues;
 use super::saved::{SavedFilm, SavedRun};
-use super::watch::{Control, End, Progress, Watch};
+use super::watch::{Control, End, Later, Progress, Watch};
 use crate::constants::KEPT_BLOCKS;
 use crate::error::{Error, Result};
 use crate::gpu::check::strict_math;
@@ -112,7 +112,7 @@ pub trait Recorder {
 /// What is lit: the paper's box or a scene, on a device or on the CPU.
 pub trait World {
     type Recorder: Recorder;
-    type Film: Clone + Into<SavedFilm>;
+    type Film: Clone + Into<SavedFilm> + Send + 'static;
 
     /// Records a part of the round under way, and tells `state` of its photons. Fails with [`Error::Interrupted`] where the round
     /// was cut short and nothing of it counts.
@@ -123,8 +123,9 @@ pub trait World {
     fn is_full(&self, recorder: &Self::Recorder) -> bool;
     /// Runs what is recorded and counts the fates of its photons.
     fn collect(&mut self, recorder: &mut Self::Recorder, state: &mut RunState) -> Result<()>;
-    /// What all whole blocks have left, or where there is none, all photons so far.
-    fn film(&mut self, recorder: &mut Self::Recorder, state: &RunState) -> Result<Self::Film>;
+    /// What all whole blocks have left, or where there is none, all photons so far. It is copied from the device, and made of the copies
+    /// when it is wanted, by whom it may be.
+    fn film(&mut self, recorder: &mut Self::Recorder, state: &RunState) -> Result<Later<Self::Film>>;
     fn error(&self, film: &Self::Film) -> FilmError;
     /// Light that limits kept from a film.
     fn losses(&self, film: &Self::Film, fates: &[Fates]) -> Losses;
@@ -200,9 +201,9 @@ pub fn run<W: World, Plan: Clone>(
             }
         }
     }
-    let film = world.film(&mut recorder, &state)?;
+    let film = world.film(&mut recorder, &state)?();
     if let Some(save) = control.keep.save.as_mut().filter(|_| !state.done.is_empty()) {
-        save.save(&state.saved_run(film.clone().into()), true)?;
+        save.save(&Arc::new(state.to_be_saved()(film.clone().into())), true)?;
     }
     let nonfinite_values = world.nonfinite_values(&mut recorder)?;
     let device = state.task.device;
@@ -315,18 +316,12 @@ impl<'a> RunState<'a> {
         if self.watch.has_photons(self.emitted) { End::Photons } else { End::Rounds }
     }
 
-    /// The run as far as whole blocks are done.
-    fn saved_run(&self, film: SavedFilm) -> SavedRun {
-        let Task { identity, sensor, .. } = &self.task;
-        SavedRun {
-            identity: identity.clone().expect("what is kept has an identity"),
-            share: self.share,
-            wanted: self.wanted(),
-            done: self.done.clone(),
-            sensor: *sensor,
-            fates: self.fates_of_blocks.clone(),
-            film,
-        }
+    /// The run as far as whole blocks are done, for its film.
+    fn to_be_saved(&self) -> impl FnOnce(SavedFilm) -> SavedRun + Send + use<> {
+        let identity = self.task.identity.clone().expect("what is kept has an identity");
+        let (share, wanted, sensor) = (self.share, self.wanted(), self.task.sensor);
+        let (done, fates) = (self.done.clone(), self.fates_of_blocks.clone());
+        move |film| SavedRun { identity, share, wanted, done, sensor, fates, film }
     }
 
     /// When the run's time is up.
@@ -429,16 +424,21 @@ impl<'a> RunState<'a> {
         }
         self.collect(world, recorder, false)?;
         let whole = self.is_between_blocks();
-        if whole && self.dealt.is_none() && self.watch.is_due(self.blocks()) {
-            let film = world.film(recorder, self)?;
-            self.watch.look(&world.error(&film), world.losses(&film, self.fates()).relative);
-            self.watch.check_error(self.task.bounces)?;
-        }
-        if saves {
-            let film = world.film(recorder, self)?;
-            control.keep.save.iter_mut().try_for_each(|save| save.save(&self.saved_run(film.clone().into()), false))?;
-            self.saved = Instant::now();
-            self.hands_over = false;
+        let looks = whole && self.dealt.is_none() && self.watch.is_due(self.blocks());
+        if looks || saves {
+            let mut film = world.film(recorder, self)?;
+            if looks {
+                let made = film();
+                self.watch.look(&world.error(&made), world.losses(&made, self.fates()).relative);
+                self.watch.check_error(self.task.bounces)?;
+                film = Box::new(|| made);
+            }
+            if let Some(save) = control.keep.save.as_mut().filter(|_| saves) {
+                let saved_run = self.to_be_saved();
+                save.save_later(Box::new(move || saved_run(film().into())))?;
+                self.saved = Instant::now();
+                self.hands_over = false;
+            }
         }
         self.submissions = recorder.counts()[1];
         (control.progress)(&self.progress());

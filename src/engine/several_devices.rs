@@ -19,7 +19,7 @@ use super::identity::Identity;
 use super::nonfinite_values::NonfiniteValues;
 use super::run::RunResult;
 use super::saved::{SavedFilm, SavedRun};
-use super::watch::{Control, End, Keep, Progress, SaveRun, Watch, looks};
+use super::watch::{Control, End, Keep, Later, Progress, SaveRun, Watch, looks};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::ledger::{Fates, Ledger, Losses};
@@ -32,7 +32,7 @@ type RunOnOne<'a, Plan, Film> = dyn Fn(&Gpu, Stop, &mut Control) -> Result<RunRe
 pub struct Job<'a, Plan, Film> {
     /// Runs on one device until a goal is reached, or as long as it is dealt blocks.
     pub run: &'a RunOnOne<'a, Plan, Film>,
-    pub film: fn(SavedFilm) -> Film,
+    pub film: fn(&SavedFilm) -> &Film,
     pub error: &'a dyn Fn(&Film) -> FilmError,
     pub losses: &'a dyn Fn(&Film, &[Fates]) -> Losses,
     /// Told of a device that failed, why, and what is done about it.
@@ -86,7 +86,7 @@ pub fn until_done<T>(gpu: &mut Gpu, failed: &dyn Fn(&Gpu, &Error, Remedy), mut w
 struct Notes<'a> {
     outer: Option<&'a mut dyn SaveRun>,
     wants_identity: bool,
-    latest: Option<SavedRun>,
+    latest: Option<Arc<SavedRun>>,
 }
 
 impl SaveRun for Notes<'_> {
@@ -98,7 +98,7 @@ impl SaveRun for Notes<'_> {
         self.outer.iter_mut().for_each(|outer| outer.begins(identity));
     }
 
-    fn save(&mut self, run: &SavedRun, is_last: bool) -> Result<()> {
+    fn save(&mut self, run: &Arc<SavedRun>, is_last: bool) -> Result<()> {
         self.latest = (!is_last).then(|| run.clone());
         self.outer.iter_mut().try_for_each(|outer| outer.save(run, is_last))
     }
@@ -109,15 +109,17 @@ enum Event<Plan, Film> {
     Begins(Box<Identity>),
     Progress(Box<Progress>),
     /// What it has done before so many looks.
-    Saved(usize, Box<SavedRun>),
+    Saved(usize, Arc<SavedRun>),
     Ended(Box<Result<RunResult<Plan, Film>>>),
 }
 
-/// Hands over what a device has done.
+/// Hands over what a device has done, in its order, while the device goes on.
 struct HandOver<'a, Plan, Film> {
     device: usize,
     dealer: &'a Dealer,
     events: Sender<(usize, Event<Plan, Film>)>,
+    /// To who makes what is handed over of the copies, and how many looks it is before.
+    later: Sender<(usize, Later<SavedRun>)>,
 }
 
 impl<Plan, Film> SaveRun for HandOver<'_, Plan, Film> {
@@ -126,9 +128,15 @@ impl<Plan, Film> SaveRun for HandOver<'_, Plan, Film> {
         let _ = self.events.send((self.device, Event::Begins(Box::new(identity.clone()))));
     }
 
-    fn save(&mut self, run: &SavedRun, is_last: bool) -> Result<()> {
-        let looks = if is_last { usize::MAX } else { self.dealer.looks_behind(self.device) };
-        let _ = self.events.send((self.device, Event::Saved(looks, Box::new(run.clone()))));
+    fn save(&mut self, run: &Arc<SavedRun>, is_last: bool) -> Result<()> {
+        assert!(is_last, "what is under way is saved later");
+        let run = SavedRun::clone(run);
+        let _ = self.later.send((usize::MAX, Box::new(|| run)));
+        Ok(())
+    }
+
+    fn save_later(&mut self, run: Later<SavedRun>) -> Result<()> {
+        let _ = self.later.send((self.dealer.looks_behind(self.device), run));
         Ok(())
     }
 }
@@ -138,7 +146,7 @@ struct Known<Plan, Film> {
     identity: Option<Identity>,
     progress: Progress,
     /// What it had done before so many looks, in their order; `None`: nothing.
-    saved: Vec<(usize, Option<SavedRun>)>,
+    saved: Vec<(usize, Option<Arc<SavedRun>>)>,
     result: Option<RunResult<Plan, Film>>,
     is_over: bool,
 }
@@ -150,7 +158,7 @@ enum Outcome<Plan, Film> {
     Failed {
         device: usize,
         error: Error,
-        base: Option<Box<SavedRun>>,
+        base: Option<Arc<SavedRun>>,
     },
 }
 
@@ -185,11 +193,11 @@ where
         let is_further = so_far.as_deref().map_or(0, count) > resumed.as_ref().map_or(0, |(_, run)| count(run));
         failures = if is_further { 1 } else { failures + 1 };
         let file = resumed.as_ref().map(|(path, _)| path.clone()).unwrap_or_default();
-        base = so_far.map(|run| (file, *run)).or(resumed);
+        base = so_far.map(|run| (file, Arc::unwrap_or_clone(run))).or(resumed);
         let remedy = if failures > MOST_FAILURES { None } else { mend(&mut gpus[device], &error) };
         if remedy.is_none() && gpus.len() == 1 {
-            if let (Some(save), Some((_, run))) = (control.keep.save.as_mut(), &base) {
-                save.save(run, true)?;
+            if let (Some(save), Some((_, run))) = (control.keep.save.as_mut(), base) {
+                save.save(&Arc::new(run), true)?;
             }
             return Err(error);
         }
@@ -221,7 +229,7 @@ impl<Plan, Film> Job<'_, Plan, Film> {
         let stop = Stop { seconds: self.stop.seconds.map(|seconds| (seconds - spent.as_secs_f64()).max(0.0)), ..self.stop };
         match (self.run)(gpu, stop, &mut Control { cancelled: control.cancelled, progress: &mut *control.progress, keep }) {
             Ok(result) => Outcome::Ended(Box::new(result)),
-            Err(error) => Outcome::Failed { device: 0, error, base: notes.latest.map(Box::new) },
+            Err(error) => Outcome::Failed { device: 0, error, base: notes.latest },
         }
     }
 }
@@ -242,7 +250,7 @@ struct Attempt<'a, Plan, Film> {
     /// The next look.
     look: usize,
     /// All of it at the last look.
-    base: Option<SavedRun>,
+    base: Option<Arc<SavedRun>>,
     end: Option<End>,
     /// When it was saved last, and whether it is about to be.
     saved: Instant,
@@ -266,7 +274,9 @@ impl<Plan: Send, Film: Clone + Send> Together<'_, Plan, Film> {
         let mut order: Vec<u32> = (share.number..self.blocks).step_by(share.of as usize).filter(|block| !done.contains(*block)).collect();
         order.truncate(most.saturating_sub(done.count()) as usize);
         let all = order.len() as u32;
-        let dealer = Arc::new(Dealer::new(order, gpus.len(), looks(done.count()).map(|look| look - done.count())));
+        // Nobody looks where no error decides; what is done is noted from time to time all the same.
+        let looks = job.stop.error.into_iter().flat_map(|_| looks(done.count())).map(|look| look - done.count());
+        let dealer = Arc::new(Dealer::new(order, gpus.len(), looks));
         let cancelled = AtomicBool::new(false);
         let (events, received) = channel();
         let mut attempt = Attempt {
@@ -275,7 +285,7 @@ impl<Plan: Send, Film: Clone + Send> Together<'_, Plan, Film> {
             watch: Watch::new(job.stop, job.alpha, job.rounds_per_block, self.started),
             most_rounds: (done.count() + all) * job.rounds_per_block,
             look: 0,
-            base: resume.as_ref().map(|(_, run)| run.clone()),
+            base: resume.as_ref().map(|(_, run)| Arc::new(run.clone())),
             end: None,
             saved: Instant::now(),
             saves: false,
@@ -291,12 +301,22 @@ impl<Plan: Send, Film: Clone + Send> Together<'_, Plan, Film> {
             for (device, gpu) in gpus.iter_mut().enumerate() {
                 let (dealer, events, cancelled, resume) = (&dealer, events.clone(), &cancelled, &resume);
                 scope.spawn(move || {
-                    let mut hand_over = HandOver { device, dealer, events: events.clone() };
+                    let (later, copies) = channel::<(usize, Later<SavedRun>)>();
+                    let saved = events.clone();
+                    let maker = scope.spawn(move || {
+                        for (looks, make) in copies {
+                            let _ = saved.send((device, Event::Saved(looks, Arc::new(make()))));
+                        }
+                    });
+                    let mut hand_over = HandOver { device, dealer, events: events.clone(), later };
                     let tell = |progress: &Progress| drop(events.send((device, Event::Progress(Box::new(progress.clone())))));
                     let resume = if device == 0 { resume.lock().unwrap_or_else(PoisonError::into_inner).take() } else { None };
                     let dealt = Some((dealer.clone(), device));
                     let keep = Keep { scene, share, resume, every: Duration::MAX, save: Some(&mut hand_over), dealt };
                     let result = run(gpu, no_goal, &mut Control { cancelled, progress: &mut { tell }, keep });
+                    // All that was handed over comes before the end.
+                    drop(hand_over);
+                    maker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
                     let _ = events.send((device, Event::Ended(Box::new(result))));
                 });
             }
@@ -305,11 +325,11 @@ impl<Plan: Send, Film: Clone + Send> Together<'_, Plan, Film> {
         })?;
         let base = attempt.base.take();
         if let Some((device, error)) = attempt.failed.take() {
-            return Ok(Outcome::Failed { device, error, base: base.map(Box::new) });
+            return Ok(Outcome::Failed { device, error, base });
         }
         let run = match attempt.end {
             Some(End::Error) => base,
-            _ => attempt.merged(usize::MAX - 1)?,
+            _ => attempt.merged(usize::MAX - 1),
         };
         let run = run.filter(|run| !run.done.is_empty()).ok_or(Error::Interrupted)?;
         let is_whole = run.done.count() == done.count() + all;
@@ -361,7 +381,8 @@ impl<Plan: Send, Film: Clone + Send> Together<'_, Plan, Film> {
                 // Blocks under way are done, so that none is missing before the last.
                 attempt.end = Some(End::Time);
             }
-            if control.keep.save.is_some() && !attempt.saves && attempt.saved.elapsed() >= control.keep.every {
+            let every = if control.keep.save.is_some() { control.keep.every.min(NOTED_EVERY) } else { NOTED_EVERY };
+            if !attempt.saves && attempt.saved.elapsed() >= every {
                 attempt.dealer.look_now();
                 attempt.saves = true;
             }
@@ -373,7 +394,7 @@ impl<Plan: Send, Film: Clone + Send> Together<'_, Plan, Film> {
     /// Looks as far as all devices have handed over what they had done before.
     fn look(&self, attempt: &mut Attempt<Plan, Film>, control: &mut Control) -> Result<()> {
         while attempt.end.is_none() && attempt.look < attempt.dealer.looks_dealt() && attempt.is_known(attempt.look) {
-            let run = attempt.merged(attempt.look)?;
+            let run = attempt.merged(attempt.look);
             attempt.look += 1;
             attempt.forget();
             let Some(run) = run else {
@@ -383,15 +404,13 @@ impl<Plan: Send, Film: Clone + Send> Together<'_, Plan, Film> {
             };
             let blocks = run.done.count();
             if attempt.watch.is_due(blocks) {
-                let film = (self.job.film)(run.film.clone());
-                attempt.watch.look(&(self.job.error)(&film), (self.job.losses)(&film, &run.fates).relative);
+                let film = (self.job.film)(&run.film);
+                attempt.watch.look(&(self.job.error)(film), (self.job.losses)(film, &run.fates).relative);
                 attempt.watch.check_error(self.job.bounces)?;
                 attempt.end = attempt.watch.end(blocks, 0);
             }
-            if let Some(save) = control.keep.save.as_mut() {
-                save.save(&run, false)?;
-                (attempt.saved, attempt.saves) = (Instant::now(), false);
-            }
+            control.keep.save.iter_mut().try_for_each(|save| save.save(&run, false))?;
+            (attempt.saved, attempt.saves) = (Instant::now(), false);
             attempt.base = Some(run);
         }
         Ok(())
@@ -405,7 +424,7 @@ impl<Plan: Send, Film: Clone + Send> Together<'_, Plan, Film> {
     }
 
     /// The result of all, in place of that of the first device.
-    fn result(&self, attempt: Attempt<Plan, Film>, run: SavedRun, end: End) -> RunResult<Plan, Film> {
+    fn result(&self, attempt: Attempt<Plan, Film>, run: Arc<SavedRun>, end: End) -> RunResult<Plan, Film> {
         let mut results = attempt.devices.into_iter().filter_map(|device| device.result);
         let mut result = results.next().expect("a device has ended well");
         let mut traced = result.ledger().emitted + result.left_out;
@@ -418,12 +437,12 @@ impl<Plan: Send, Film: Clone + Send> Together<'_, Plan, Film> {
             result.nonfinite_values = NonfiniteValues::both(result.nonfinite_values, other.nonfinite_values);
             result.more_devices.extend(other.device);
         }
-        let film = (self.job.film)(run.film);
+        let film = (self.job.film)(&run.film).clone();
         RunResult {
             left_out: traced.saturating_sub(run.fates.iter().map(|fates| fates.emitted).sum()),
             losses: (self.job.losses)(&film, &run.fates),
             film,
-            fates: run.fates,
+            fates: run.fates.clone(),
             end,
             ..result
         }
@@ -435,7 +454,7 @@ impl<Plan, Film> Attempt<'_, Plan, Film> {
         let own = &mut self.devices[device];
         match event {
             Event::Progress(progress) => own.progress = *progress,
-            Event::Saved(looks, run) => own.saved.push((looks, Some(*run).filter(|run| !run.done.is_empty()))),
+            Event::Saved(looks, run) => own.saved.push((looks, Some(run).filter(|run| !run.done.is_empty()))),
             Event::Begins(identity) => {
                 own.identity = Some(*identity);
                 let known: Vec<&Identity> = self.devices.iter().filter_map(|device| device.identity.as_ref()).collect();
@@ -467,18 +486,20 @@ impl<Plan, Film> Attempt<'_, Plan, Film> {
     }
 
     /// What all had done before a look, added up.
-    fn merged(&self, look: usize) -> Result<Option<SavedRun>> {
-        let mut all: Option<SavedRun> = None;
+    fn merged(&self, look: usize) -> Option<Arc<SavedRun>> {
+        let mut all: Option<Arc<SavedRun>> = None;
         for run in self.devices.iter().filter_map(|device| device.at(look)?.as_ref()) {
             let Some(sum) = &mut all else {
                 all = Some(run.clone());
                 continue;
             };
+            // Copied where it is known as it is.
+            let sum = Arc::make_mut(sum);
             let share = sum.share;
             sum.merge(run).expect("each block is dealt once");
             sum.share = share;
         }
-        Ok(all)
+        all
     }
 
     /// Drops what no later look needs.
@@ -495,7 +516,7 @@ impl<Plan, Film> Known<Plan, Film> {
     }
 
     /// What it had done before a look, if that is known.
-    fn at(&self, look: usize) -> Option<&Option<SavedRun>> {
+    fn at(&self, look: usize) -> Option<&Option<Arc<SavedRun>>> {
         self.saved.iter().find(|(looks, _)| *looks > look).map(|(_, run)| run)
     }
 }

@@ -24,6 +24,9 @@ pub struct Control<'a> {
     pub keep: Keep<'a>,
 }
 
+/// Made when it is wanted.
+pub type Later<T> = Box<dyn FnOnce() -> T + Send>;
+
 /// Takes a run as far as whole blocks are done.
 pub trait SaveRun {
     /// Whether it must know what the run computes.
@@ -35,7 +38,12 @@ pub trait SaveRun {
     fn begins(&mut self, _: &Identity) {}
 
     /// `is_last`: the run has ended. An error ends it.
-    fn save(&mut self, run: &SavedRun, is_last: bool) -> Result<()>;
+    fn save(&mut self, run: &Arc<SavedRun>, is_last: bool) -> Result<()>;
+
+    /// The same while the run is under way, which may go on before it is saved.
+    fn save_later(&mut self, run: Later<SavedRun>) -> Result<()> {
+        self.save(&Arc::new(run()), false)
+    }
 }
 
 /// What of a run is kept, gone on with, and shared.
@@ -140,6 +148,9 @@ pub enum End {
 /// quarter, as each is one more chance to stop too early; they are the same in every run.
 const FIRST_LOOK: u32 = 16;
 
+/// Between two looks that decide nothing: each takes a tenth of a second in a picture of 512 x 512.
+const LOOK_FOR_PEOPLE: Duration = Duration::from_secs(2);
+
 fn next_look(look: u32) -> u32 {
     look + (look / 4).max(1)
 }
@@ -158,6 +169,7 @@ pub struct Watch {
     started: Instant,
     /// In blocks.
     next_look: u32,
+    looked: Instant,
     /// The latest look.
     seen: Option<Look>,
 }
@@ -180,7 +192,7 @@ struct Look {
 impl Watch {
     /// Of a run that began at `started`.
     pub fn new(stop: Stop, alpha: f64, rounds_per_block: u32, started: Instant) -> Watch {
-        Watch { stop, alpha, rounds_per_block, started, next_look: FIRST_LOOK, seen: None }
+        Watch { stop, alpha, rounds_per_block, started, next_look: FIRST_LOOK, looked: started, seen: None }
     }
 
     /// Looks at no film of fewer blocks: those that were done before have been looked at.
@@ -190,7 +202,9 @@ impl Watch {
 
     /// Whether the film should be read after so many blocks.
     pub fn is_due(&self, blocks: u32) -> bool {
-        blocks >= self.next_look
+        // Where no error ends the run, people look, and need not do so often.
+        let is_wanted = self.stop.error.is_some() || self.looked.elapsed() >= LOOK_FOR_PEOPLE;
+        blocks >= self.next_look && is_wanted
     }
 
     /// Whether the run must be looked at now, as it may have done enough.
@@ -210,6 +224,7 @@ impl Watch {
         let bias = error.bias.map_or([0.0; 3], |bias| [bias.lower, bias.relative, bias.upper]);
         self.seen = Some(Look { rounds, noise, unknown: unknown.relative, unseen, bias, lost });
         self.next_look = next_look(blocks);
+        self.looked = Instant::now();
     }
 
     /// Noise, bias, what is unknown and what is unseen together at the latest look.

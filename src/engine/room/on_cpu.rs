@@ -14,6 +14,7 @@ use crate::engine::nonfinite_values::{NonfiniteValues, What};
 use crate::engine::room::film::RoomFilm;
 use crate::engine::run::{self, RunState, World};
 use crate::engine::saved::{SavedFilm, SavedRun};
+use crate::engine::watch::Later;
 use crate::error::{Error, Result};
 use crate::ledger::{Fates, Losses};
 use crate::photon::Photon;
@@ -109,13 +110,13 @@ impl World for RoomOnCpu<'_> {
         Ok(())
     }
 
-    fn film(&mut self, _: &mut HostClock, state: &RunState) -> Result<RoomFilm> {
+    fn film(&mut self, _: &mut HostClock, state: &RunState) -> Result<Later<RoomFilm>> {
         let mut film = RoomFilm { emitted: state.emitted(), ..self.film.clone() };
         if state.rounds() == 0 {
             self.flush();
             film.sums.copy_from_slice(&self.sums);
         }
-        Ok(film)
+        Ok(Box::new(|| film))
     }
 
     fn error(&self, film: &RoomFilm) -> FilmError {

@@ -14,6 +14,7 @@ use crate::engine::room::resources::{RoomResources, RoundBuffers};
 use crate::engine::room::{estimate, index, trace};
 use crate::engine::run::{self, RunState, World};
 use crate::engine::saved::SavedFilm;
+use crate::engine::watch::Later;
 use crate::engine::{Control, tallies};
 use crate::error::Result;
 use crate::gpu::{Commands, Constants, Gpu, Module};
@@ -88,7 +89,7 @@ impl<'a> World for RoomOnGpu<'a> {
         Ok(())
     }
 
-    fn film(&mut self, commands: &mut Commands<'a>, state: &RunState) -> Result<RoomFilm> {
+    fn film(&mut self, commands: &mut Commands<'a>, state: &RunState) -> Result<Later<RoomFilm>> {
         let RoomOnGpu { resources, plan, .. } = self;
         let mut film = RoomFilm { emitted: state.emitted(), ..RoomFilm::new(plan) };
         let count = film.sums.len();
@@ -98,7 +99,7 @@ impl<'a> World for RoomOnGpu<'a> {
             resources.rounds.as_ref().filter(|_| state.rounds() > 0)
         else {
             film.sums = commands.read(&resources.film, count)?;
-            return Ok(film);
+            return Ok(Box::new(|| film));
         };
         let sums = commands.copy_out(totals, count)?;
         let (low, high) = (commands.copy_out(low_squares, count)?, commands.copy_out(high_squares, count)?);
@@ -110,7 +111,7 @@ impl<'a> World for RoomOnGpu<'a> {
         for (slot, number) in &state.kept {
             film.latest.push(KeptBlock { number: *number, values: values[*slot as usize * kept..][..kept].to_vec() });
         }
-        Ok(film)
+        Ok(Box::new(|| film))
     }
 
     fn error(&self, film: &RoomFilm) -> FilmError {

@@ -4,6 +4,8 @@ use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
+use rayon::prelude::*;
+
 use super::film::SceneFilm;
 use super::identity::identity;
 use super::losses::losses;
@@ -17,6 +19,7 @@ use crate::engine::film::{BlockSums, KeptBlock, LatestBlocks, halves, wide};
 use crate::engine::nonfinite_values::NonfiniteValues;
 use crate::engine::run::{self, RunState, Task, World};
 use crate::engine::saved::SavedFilm;
+use crate::engine::watch::Later;
 use crate::engine::{Control, tallies, totals};
 use crate::error::Result;
 use crate::gpu::kernels::*;
@@ -207,7 +210,7 @@ impl<'a> World for SceneOnGpu<'a> {
         Ok(())
     }
 
-    fn film(&mut self, commands: &mut Commands<'a>, state: &RunState) -> Result<SceneFilm> {
+    fn film(&mut self, commands: &mut Commands<'a>, state: &RunState) -> Result<Later<SceneFilm>> {
         let SceneResources { film_sums, film_squares, surface_sums, surface_squares, latest_blocks, class_counts, .. } = &self.resources;
         let SceneResources { differences, sums_of_block, surface_sums_of_block, one_hits, part_totals, anomalies, of_blocks, .. } =
             &self.resources;
@@ -237,29 +240,33 @@ impl<'a> World for SceneOnGpu<'a> {
             let fates = &state.fates()[usize::from(map.caustic_only)];
             stored[if map.caustic_only { HIT_CAUSTIC_PHOTON } else { HIT_GLOBAL_PHOTON } as usize] = fates.ledger().stored;
         }
-        let of_blocks = |sums: Vec<u64>, squares: Vec<u64>| BlockSums {
-            rounds: if is_whole { state.blocks() * plan.rounds_per_block } else { state.rounds() },
-            blocks: state.blocks(),
-            sums,
-            squares: squares.chunks_exact(2).map(|words| wide(words[0], words[1])).collect(),
-        };
-        let values = latest.take();
-        let mut latest = LatestBlocks::default();
-        for (slot, number) in &state.kept {
-            latest.push(KeptBlock { number: *number, values: values[*slot as usize * kept..][..kept].to_vec() });
-        }
-        Ok(SceneFilm {
-            plan: plan.clone(),
-            of_blocks: of_blocks(sums.take(), squares.take()),
-            of_surfaces: plan.sees_light.then(|| of_blocks(of_surfaces.take(), squares_of_surfaces.take())),
-            latest,
-            differences: Differences(differences.take()),
-            one_hits: one_hits.take(),
-            part_totals: part_totals.take(),
-            anomalies: anomalies.take().try_into().expect("so many words were read"),
-            class_counts: class_counts.take(),
-            stored,
-        })
+        let (blocks, numbers, plan) = (state.blocks(), state.kept.clone(), plan.clone());
+        let rounds = if is_whole { blocks * plan.rounds_per_block } else { state.rounds() };
+        Ok(Box::new(move || {
+            let of_blocks = |sums: Vec<u64>, squares: Vec<u64>| BlockSums {
+                rounds,
+                blocks,
+                sums,
+                squares: squares.par_chunks_exact(2).map(|words| wide(words[0], words[1])).collect(),
+            };
+            let values = latest.take();
+            let mut latest = LatestBlocks::default();
+            for (slot, number) in numbers {
+                latest.push(KeptBlock { number, values: values[slot as usize * kept..][..kept].to_vec() });
+            }
+            SceneFilm {
+                of_blocks: of_blocks(sums.take(), squares.take()),
+                of_surfaces: plan.sees_light.then(|| of_blocks(of_surfaces.take(), squares_of_surfaces.take())),
+                plan,
+                latest,
+                differences: Differences(differences.take()),
+                one_hits: one_hits.take(),
+                part_totals: part_totals.take(),
+                anomalies: anomalies.take().try_into().expect("so many words were read"),
+                class_counts: class_counts.take(),
+                stored,
+            }
+        }))
     }
 
     fn error(&self, film: &SceneFilm) -> FilmError {

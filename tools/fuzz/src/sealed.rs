@@ -70,7 +70,8 @@ impl Format for Map {
 
     /// Checksums of photons are right.
     fn mend(header: &mut Value, arrays: &[u8]) {
-        for photons in header.get_mut("rounds").and_then(Value::as_array_mut).into_iter().flatten().flat_map(|maps| maps.as_array_mut()).flatten() {
+        let rounds = header.get_mut("rounds").and_then(Value::as_array_mut);
+        for photons in rounds.into_iter().flatten().filter_map(Value::as_array_mut).flatten() {
             let number = |name: &str| photons[name].as_u64().and_then(|number| usize::try_from(number).ok());
             let own = number("byte").zip(number("count")).and_then(|(byte, count)| {
                 let first = byte.checked_sub(Self::MAGIC.len())?;
@@ -93,6 +94,8 @@ pub fn two_files<F: Format>(input: &[u8]) -> [&[u8]; 2] {
 const WORDS: [&str; 12] =
     ["", "two\nlines", "\u{1b}[31m\r", "global", "caustic", "u32", "u128", "sums", "NoMap", "Blocks", "relmse", "photons"];
 const COUNTS: [u64; 8] = [0, 1, 3, 1 << 31, u32::MAX as u64 - 1, u32::MAX as u64, 1 << 60, u64::MAX];
+/// Bits of elements of arrays: counts, infinity, and what is no number.
+const EXTREMES: [u32; 6] = [0, 1 << 31, u32::MAX, 0x7f7f_ffff, 0x7f80_0000, 0x7fc0_0000];
 
 /// The changed file; a seed in place of what is none; `None` now and then.
 pub fn mutate<F: Format>(file: &[u8], seeds: &[Vec<u8>], random: &mut Random, mutate_bytes: MutateBytes) -> Option<Vec<u8>> {
@@ -119,13 +122,17 @@ pub fn mutate<F: Format>(file: &[u8], seeds: &[Vec<u8>], random: &mut Random, mu
     Some(F::pack(&header, &arrays))
 }
 
-/// Mostly of the same length, without which they fit no header.
+/// Mostly of the same length, without which they fit no header: words of extreme values, or libFuzzer's own changes.
 fn changed(mut arrays: Vec<u8>, random: &mut Random, mutate_bytes: MutateBytes) -> Vec<u8> {
     let length = arrays.len();
-    if length == 0 || random.below(4) == 0 {
-        return grown(arrays, mutate_bytes);
+    match random.below(4) {
+        kind if kind == 0 || length < 4 => arrays = grown(arrays, mutate_bytes),
+        1 => _ = mutate_bytes(&mut arrays, length, length),
+        _ => {
+            let (first, word) = (random.below(length / 4) * 4, random.pick(&EXTREMES).to_le_bytes());
+            arrays[first..].chunks_exact_mut(4).take(1 << random.below(5)).for_each(|old| old.copy_from_slice(&word));
+        }
     }
-    mutate_bytes(&mut arrays, length, length);
     arrays
 }
 

@@ -1,6 +1,7 @@
 //! Files of runs and of photons, small and made without a device: what fuzzing begins with.
 
 use std::fs::File;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
@@ -41,8 +42,8 @@ pub fn box_settings() -> RoomSettings {
 struct Latest(Option<SavedRun>);
 
 impl SaveRun for Latest {
-    fn save(&mut self, run: &SavedRun, _: bool) -> photonmill::error::Result<()> {
-        self.0 = Some(run.clone());
+    fn save(&mut self, run: &Arc<SavedRun>, _: bool) -> photonmill::error::Result<()> {
+        self.0 = Some(SavedRun::clone(run));
         Ok(())
     }
 }
