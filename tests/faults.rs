@@ -236,10 +236,7 @@ fn memory_is_kept_to() {
         assert!(chunk("a.json") < chunk("whole.json"));
     }
     place.assert_refused([
-        (
-            on_device("render cornell-spheres --size 1000x1000 -q -o b.exr --memory 8M"),
-            ["--memory 8M", "MiB of device memory"].as_slice(),
-        ),
+        (on_device("render cornell-spheres --size 1000x1000 -q -o b.exr --memory 8M"), ["--memory 8M", "MiB of device memory"].as_slice()),
         (on_device(&format!("{line} -o b.exr --memory 1023K")), ["--memory 1023K", "1 MiB or more"].as_slice()),
         (on_device(&format!("{line} -o b.exr --memory lots")), ["--memory lots", "512M"].as_slice()),
         (on_device(&format!("{line} -o b.exr --memory -1G")), ["--memory", "512M"].as_slice()),
