@@ -91,7 +91,7 @@ fn a_small_bench_reports_every_pass_and_target() {
 #[test]
 fn the_roofline_counts_every_dispatch() {
     let _alone = alone();
-    let Some(gpu) = device() else { return };
+    let Some(gpu) = counting_device() else { return };
     let never = AtomicBool::new(false);
     let rates = rates_of(&gpu);
     let check = |what: &str, timed: &Timed| {

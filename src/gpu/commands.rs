@@ -95,6 +95,8 @@ impl Interrupt<'_> {
 /// long.
 #[derive(Default)]
 struct Pace {
+    /// Nothing is learnt, and all that a plan allows is done at once.
+    by_plan: bool,
     /// Since the last submission.
     work: HashMap<String, u64>,
     known: HashMap<String, Known>,
@@ -125,6 +127,9 @@ const SUBMISSION_TIME: f64 = 0.1;
 impl Pace {
     /// Units of work of a scope that may be done at once, where a plan allows so many.
     fn fits(&self, scope: &str, most: u64) -> u64 {
+        if self.by_plan {
+            return most;
+        }
         let fits = self.known.get(scope).map_or(most / FIRST_SHARE, |known| {
             let at_once = known.most.max(most / FIRST_SHARE).saturating_mul(GROWTH);
             if known.seconds > 0.0 { at_once.min((PIECE_TIME / known.seconds) as u64) } else { at_once }
@@ -139,7 +144,7 @@ impl Pace {
 
     /// Takes what scopes took in a submission.
     fn learn(&mut self, took: &HashMap<&str, Duration>) {
-        for (scope, work) in self.work.drain().filter(|(_, work)| *work > 0) {
+        for (scope, work) in self.work.drain().filter(|(_, work)| *work > 0 && !self.by_plan) {
             let Some(took) = took.get(scope.as_str()) else { continue };
             let known = self.known.entry(scope).or_default();
             let took = took.as_secs_f64();
@@ -186,7 +191,7 @@ impl<'gpu> Commands<'gpu> {
             hazards: Hazards::default(),
             staging: Vec::new(),
             work: 0,
-            pace: Pace::default(),
+            pace: Pace { by_plan: gpu.options.by_plan, ..Pace::default() },
             interrupt: None,
             dispatch_count: 0,
             submission_count: 0,

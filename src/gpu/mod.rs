@@ -54,6 +54,8 @@ pub struct Options {
     pub warm_up: bool,
     /// Bytes that all buffers of the device may take together; `None` for half of its memory.
     pub memory: Option<u64>,
+    /// Split work by the plan alone and not by the time that it takes, so that dispatches and submissions can be counted.
+    pub by_plan: bool,
     /// Behave as on a device without timestamps.
     pub without_timestamps: bool,
     /// Behave as on a device without 64-bit atomics.

@@ -66,6 +66,11 @@ pub fn device() -> Option<Device> {
     device_with(Options::default())
 }
 
+/// The same for tests that count dispatches, which then do not depend on how busy the machine is.
+pub fn counting_device() -> Option<Device> {
+    device_with(Options { by_plan: true, ..Options::default() })
+}
+
 /// The same with some of its abilities masked off.
 pub fn device_with(options: Options) -> Option<Device> {
     open(options).map(Device)

@@ -63,15 +63,26 @@ fn push_for_all_points(plan: &RoomPlan, photon_count: u32) -> GatherPush {
     }
 }
 
-/// Runs of points, none so long that its dispatch would exceed a submission's work or the groups that
-/// the device allows along x. `lanes` invocations share a point.
-fn point_ranges(commands: &Commands, plan: &RoomPlan, tests_per_point: u64, lanes: u32) -> impl Iterator<Item = (u32, u32)> + use<> {
+/// Records all points in pieces, none so long that its dispatch would keep the device busy for long or exceed the groups that it
+/// allows along x. `lanes` invocations share a point.
+fn in_pieces(
+    commands: &mut Commands,
+    plan: &RoomPlan,
+    tests_per_point: u64,
+    lanes: u32,
+    mut record: impl FnMut(&mut Commands, u32, u32) -> Result<()>,
+) -> Result<()> {
     let (group_size, lanes) = (u64::from(plan.settings.group_size), u64::from(lanes));
     // Invocations are numbered in 32 bits.
     let most_groups = u64::from(commands.facts().work_group_count_x).min(u64::from(u32::MAX) / group_size);
-    let groups = (commands.paced(plan.pair_tests_per_submission) / tests_per_point.max(1) * lanes / group_size).clamp(1, most_groups);
-    let (points, step) = (plan.points.len(), (groups * group_size / lanes).max(1) as usize);
-    (0..points).step_by(step).map(move |first| (first as u32, points.min(first + step) as u32))
+    let (mut first, points) = (0, plan.points.len() as u64);
+    while first < points {
+        let groups = commands.paced(plan.pair_tests_per_submission) / tests_per_point.max(1) * lanes / group_size;
+        let end = points.min(first + (groups.clamp(1, most_groups) * group_size / lanes).max(1));
+        record(commands, first as u32, end as u32)?;
+        first = end;
+    }
+    Ok(())
 }
 
 /// Adds a chunk to the film.
@@ -89,7 +100,7 @@ fn gather_brute(commands: &mut Commands, resources: &RoomResources, plan: &RoomP
     let whole = push_for_all_points(plan, photon_count);
     let slice_count = whole.photon_capacity.div_ceil(GATHER_SLICE);
     let tests_per_point = u64::from(GATHER_SLICE);
-    for (first_point, end_point) in point_ranges(commands, plan, tests_per_point, 1) {
+    in_pieces(commands, plan, tests_per_point, 1, |commands, first_point, end_point| {
         let point_count = end_point - first_point;
         let tests_per_slice = u64::from(point_count) * tests_per_point;
         let slices_at_once = (commands.paced(plan.pair_tests_per_submission) / tests_per_slice).clamp(1, u64::from(MAX_GROUPS)) as u32;
@@ -104,8 +115,8 @@ fn gather_brute(commands: &mut Commands, resources: &RoomResources, plan: &RoomP
             }
             add_work(commands, plan, u64::from(slices) * tests_per_slice)?;
         }
-    }
-    Ok(())
+        Ok(())
+    })
 }
 
 /// Every point tests the photons of the grid cells in reach.
@@ -119,7 +130,7 @@ fn gather_grid(commands: &mut Commands, resources: &RoomResources, index: &Index
     }
     let tests_per_point = plan.work.tests_per_point(photon_count);
     let group_size = plan.settings.group_size;
-    for (first_point, end_point) in point_ranges(commands, plan, tests_per_point, plan.lanes) {
+    in_pieces(commands, plan, tests_per_point, plan.lanes, |commands, first_point, end_point| {
         let capacity = (end_point - first_point) * plan.lanes;
         let extent = if plan.slices_candidates {
             let size = DispatchSizePush::new(0, capacity, group_size);
@@ -134,9 +145,8 @@ fn gather_grid(commands: &mut Commands, resources: &RoomResources, index: &Index
         } else {
             commands.dispatch(GatherGridTwoWords { room, film, cells, sorted_photons }, &push, extent)?;
         }
-        add_work(commands, plan, u64::from(end_point - first_point) * tests_per_point)?;
-    }
-    Ok(())
+        add_work(commands, plan, u64::from(end_point - first_point) * tests_per_point)
+    })
 }
 
 /// Moves what a round left on the film to the sums and squares of all rounds, of which there are several.

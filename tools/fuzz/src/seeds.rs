@@ -25,18 +25,13 @@ use photonmill::plan::differences::difference_count;
 use photonmill::plan::scene::ScenePlan;
 use photonmill::plan::sensor::Sensor;
 use photonmill::rng::Rng;
-use photonmill::scene::built_in;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::open_box::open_box;
+use photonmill::scene::{Scene, Surface, built_in};
 use photonmill::settings::scene::SceneSettings;
 use photonmill::settings::{Builder, RoomSettings};
 
 use crate::file;
-
-/// Of the paper's box, so small that it takes no time.
-pub fn box_settings() -> RoomSettings {
-    RoomSettings { photons: 101, rounds: 4, mesh: 2, builder: Builder::Cpu, rng: Rng::Philox, ..RoomSettings::default() }
-}
 
 /// Keeps what a run saves last.
 struct Latest(Option<SavedRun>);
@@ -48,19 +43,26 @@ impl SaveRun for Latest {
     }
 }
 
-/// A part of a run of that box, which goes on with what there is of it.
+/// A part of a run of the paper's box, so small that it takes no time; it goes on with what there is of it.
 pub fn part_of_box(share: Share, resume: Option<SavedRun>) -> photonmill::error::Result<SavedRun> {
-    let (settings, never, mut latest) = (box_settings(), AtomicBool::new(false), Latest(None));
+    let settings = RoomSettings { photons: 101, rounds: 4, mesh: 2, builder: Builder::Cpu, rng: Rng::Philox, ..RoomSettings::default() };
+    let (never, mut latest) = (AtomicBool::new(false), Latest(None));
     let resume = resume.map(|run| ("seed".into(), run));
     let keep = Keep { scene: "open-box", share, resume, every: Duration::ZERO, save: Some(&mut latest), dealt: None };
     room::run(None, &open_box(&settings), &settings, &mut Control { cancelled: &never, progress: &mut |_| {}, keep })?;
     Ok(latest.0.expect("a run saves its end"))
 }
 
+/// A box with a mirror for a wall, so that photons make a caustic map too.
+pub fn scene() -> (Scene, Geometry) {
+    let mut scene = built_in::by_name("cornell").expect("it is built in");
+    scene.materials[2].surface = Surface::Mirror;
+    Geometry::new(&scene).map(|geometry| (scene, geometry)).expect("it has triangles")
+}
+
 /// A part of eight blocks of a picture of four pixels, as far as what it holds must fit.
 fn part_of_picture(share: Share) -> SavedRun {
-    let (scene, settings) = (built_in::by_name("cornell").expect("it is built in"), SceneSettings::default());
-    let geometry = Geometry::new(&scene).expect("it has triangles");
+    let ((scene, geometry), settings) = (scene(), SceneSettings::default());
     let sensor = Sensor::Picture { width: 2, height: 2 };
     let plan = ScenePlan::new(&scene, &geometry, &settings, sensor, &Limits::of_host()).expect("it can be planned").film;
     let (mut done, mut latest) = (Blocks::default(), LatestBlocks::default());
@@ -89,7 +91,7 @@ fn part_of_picture(share: Share) -> SavedRun {
         stored: [1, 0, 1],
         plan,
     };
-    let identity = Identity::new("cornell", Hash::default(), &settings, Hash::default(), None, settings.math);
+    let identity = Identity::new(&scene.name, Hash::default(), &settings, Hash::default(), None, settings.math);
     SavedRun { identity, share, wanted: 8, done, sensor: Some(sensor), fates: vec![fates; 2], film: film.into() }
 }
 
@@ -103,20 +105,15 @@ pub fn runs() -> Vec<Vec<u8>> {
     vec![of_box(whole), of_picture(whole), of_box(shard(0)), of_picture(shard(0)), pair(&of_box), pair(&of_picture)]
 }
 
-/// What a file of photons is of.
-pub fn map_settings() -> SceneSettings {
-    SceneSettings { photons: 4, caustic_photons: 4, bounces: 3, ..SceneSettings::default() }
-}
-
-/// Photons of two rounds.
+/// A file of photons of two rounds.
 pub fn photon_map() -> Vec<u8> {
-    let (scene, path) = (built_in::by_name("cornell").expect("it is built in"), file("seed.pm"));
-    let geometry = Geometry::new(&scene).expect("it has triangles");
+    let ((scene, geometry), path) = (scene(), file("seed.pm"));
+    let settings = SceneSettings { photons: 4, caustic_photons: 4, bounces: 3, ..SceneSettings::default() };
     let sensor = Sensor::Picture { width: 2, height: 2 };
-    let plan = ScenePlan::new(&scene, &geometry, &map_settings(), sensor, &Limits::of_host()).expect("it can be planned");
+    let plan = ScenePlan::new(&scene, &geometry, &settings, sensor, &Limits::of_host()).expect("it can be planned");
     let write = || {
         let mut file = File::create(&path)?;
-        let mut writer = MapWriter::new(&mut file, "cornell", &geometry, &plan, "none")?;
+        let mut writer = MapWriter::new(&mut file, &scene.name, &geometry, &plan, "none")?;
         for _ in 0..2 {
             for _ in plan.maps() {
                 writer.begin_map();

@@ -12,8 +12,8 @@ use photonmill::output::photon_map;
 use photonmill::plan::Limits;
 use photonmill::plan::scene::ScenePlan;
 use photonmill::plan::sensor::Sensor;
+use photonmill::scene::Scene;
 use photonmill::scene::geometry::Geometry;
-use photonmill::scene::{Scene, built_in};
 use photonmill::settings::scene::SceneSettings;
 use photonmill_fuzz::change::Random;
 use photonmill_fuzz::sealed::{Map, mutate};
@@ -23,10 +23,7 @@ static FILE: LazyLock<PathBuf> = LazyLock::new(|| file("a.pm"));
 static CLOUD: LazyLock<PathBuf> = LazyLock::new(|| file("a.ply"));
 static SEEDS: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| vec![seeds::photon_map()]);
 /// What the seed's photons are of.
-static SCENE: LazyLock<(Scene, Geometry)> = LazyLock::new(|| {
-    let scene = built_in::by_name("cornell").expect("it is built in");
-    Geometry::new(&scene).map(|geometry| (scene, geometry)).expect("it has triangles")
-});
+static SCENE: LazyLock<(Scene, Geometry)> = LazyLock::new(seeds::scene);
 
 fuzz_target!(|bytes: &[u8]| {
     std::fs::write(&*FILE, bytes).expect("the file can be written");

@@ -1,6 +1,6 @@
 //! Density estimation over the kd-tree: with all photons within the radius, or with the nearest of them.
 
-use super::{adds_in_one_word, point_ranges, push_for_all_points};
+use super::{adds_in_one_word, in_pieces, push_for_all_points};
 use crate::constants::GATHER_SLICE;
 use crate::engine::room::index::add_work;
 use crate::engine::room::resources::{RoomResources, SearchBuffers, TreeBuffers};
@@ -39,7 +39,7 @@ fn gather_radius(commands: &mut Commands, resources: &RoomResources, tree: &Tree
     let TreeBuffers { wall_begins, planes, tree_photons, longest, .. } = tree;
     let whole = push_for_all_points(plan, photon_count);
     let tests_per_point = plan.work.tests_per_point(photon_count);
-    for (first_point, end_point) in point_ranges(commands, plan, tests_per_point, 1) {
+    in_pieces(commands, plan, tests_per_point, 1, |commands, first_point, end_point| {
         let size = DispatchSizePush::new(0, end_point - first_point, plan.settings.group_size);
         commands.dispatch(SliceCount { longest, dispatch_args }, &size, Extent::Groups(1, 1))?;
         let push = GatherPush { first_point, end_point, ..whole };
@@ -49,9 +49,8 @@ fn gather_radius(commands: &mut Commands, resources: &RoomResources, tree: &Tree
         } else {
             commands.dispatch(GatherTreeTwoWords { room, film, wall_begins, planes, tree_photons }, &push, extent)?;
         }
-        add_work(commands, plan, u64::from(end_point - first_point) * tests_per_point)?;
-    }
-    Ok(())
+        add_work(commands, plan, u64::from(end_point - first_point) * tests_per_point)
+    })
 }
 
 /// Every point searches for its nearest photons, all of them its own invocation's. How long a search is depends on
@@ -69,7 +68,7 @@ fn gather_nearest(
     let TreeBuffers { wall_begins, planes, tree_photons, tree_origins, .. } = tree;
     let SearchBuffers { nearest, searches, unfinished, .. } = buffers;
     let tests_per_point = plan.work.tests_per_point(photon_count).min(u64::from(GATHER_SLICE));
-    for (first, last) in point_ranges(commands, plan, tests_per_point, 1) {
+    in_pieces(commands, plan, tests_per_point, 1, |commands, first, last| {
         for first_point in (first..last).step_by(searches.count() as usize) {
             let end_point = last.min(first_point + searches.count() as u32);
             let mut push = NearestPush {
@@ -82,6 +81,7 @@ fn gather_nearest(
             };
             loop {
                 commands.fill(unfinished, 0, 1, 0);
+                commands.add_work(u64::from(end_point - first_point) * tests_per_point);
                 let extent = Extent::Items(u64::from(end_point - first_point));
                 if adds_in_one_word(plan, commands.facts()) {
                     let kernel = NearestU64 { room, film, wall_begins, planes, tree_photons, tree_origins, nearest, searches, unfinished };
@@ -97,6 +97,6 @@ fn gather_nearest(
                 push.is_first = 0;
             }
         }
-    }
-    Ok(())
+        Ok(())
+    })
 }
