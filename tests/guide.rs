@@ -46,12 +46,14 @@ fn commands(text: &str) -> Vec<String> {
 }
 
 /// Commands that start so are not run, and why.
-const NOT_RUN: [(&str, &str); 10] = [
+const NOT_RUN: [(&str, &str); 12] = [
     ("tools/setup && tools/test", "runs this test"),
     ("tools/test", "runs this test"),
     ("tools/bench/run ", "writes into the repository"),
     ("tools/bench_peers", "installs other programs"),
     ("tools/fuzz/run ", "needs a nightly toolchain"),
+    ("tools/faults", "takes half an hour; `tests/faults.rs` has short forms"),
+    ("tools/soak ", "takes an hour"),
     ("tools/sanitize", "needs a nightly toolchain"),
     ("tools/sample_models ", "needs a collection of files"),
     ("tools/blender/test_addon.py", "needs Blender's Python module"),

@@ -348,7 +348,7 @@ fn effects_are_missed(gpu: &Gpu, scene: &Scene, effects: &[Effect]) {
 /// Passes, buffers and pipelines are those of the plan.
 #[test]
 fn what_is_dropped_is_not_there() {
-    let Some(gpu) = device() else { return };
+    let Some(gpu) = counting_device() else { return };
     let cornell = scene("cornell");
     // So few bounces are one segment, whatever the device.
     let small = || SceneSettings { bounces: 8, ..small() };
