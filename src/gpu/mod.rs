@@ -9,6 +9,7 @@ pub mod device;
 mod faults;
 pub mod kernel;
 mod mapped_file;
+mod pace;
 mod reconvergence;
 mod specialize;
 pub mod timestamps;
