@@ -181,6 +181,7 @@ fn headers_that_contradict_themselves_are_refused() {
         ("/rounds/0", serde_json::json!([]), "contradicts itself"),
         ("/rounds", serde_json::json!([]), "contradicts itself"),
         ("/maps", serde_json::json!([]), "contradicts itself"),
+        ("/maps/0/name", "other".into(), "contradicts itself"),
         ("/maps/0/watts", 0.into(), "contradicts itself"),
         ("/maps/0/flux_gain", (-1).into(), "contradicts itself"),
         ("/unit_metres", "wide".into(), "has a header that is not understood"),

@@ -170,7 +170,10 @@ impl Header {
             starts && ends && counts && crc32.len() as u64 == count.div_ceil(PIECE as u64)
         };
         let numbers = |map: &MapOfRound| [map.watts, map.flux_scale, map.flux_gain].iter().all(|value| value.is_finite() && *value > 0.0);
-        if self.maps.is_empty() || self.maps.len() > 2 || !self.maps.iter().all(numbers) {
+        // A map is looked up by its name.
+        let names: Vec<&str> = self.maps.iter().map(|map| map.name.as_str()).collect();
+        let are_known = matches!(names[..], ["global" | "caustic"] | ["global", "caustic"]);
+        if !are_known || !self.maps.iter().all(numbers) {
             return Some("its maps");
         }
         if self.rounds.is_empty() || self.rounds.iter().any(|maps| maps.len() != self.maps.len()) {
