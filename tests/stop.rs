@@ -445,10 +445,10 @@ fn a_run_ends_at_its_time_or_its_error_whichever_comes_first() {
 
 /// Of the ten scenes, how far the number of rounds predicted at a tenth of the run is off at its end: rounds and not seconds, which
 /// on a busy machine are anybody's guess. Runs of 60 rounds, by which wanted errors are chosen, have `times` that error.
-fn predictions(gpu: &Gpu, alpha: f64, times: f64) -> Vec<f64> {
+fn predictions(gpu: &Gpu, photons: u32, alpha: f64, times: f64) -> Vec<f64> {
     let mut off = Vec::new();
     for name in SCENES {
-        let settings = |error, seed| SceneSettings { alpha, ..settings(error, seed) };
+        let settings = |error, seed| SceneSettings { photons, caustic_photons: photons, alpha, ..settings(error, seed) };
         let first = watched(gpu, name, &SceneSettings { rounds: 60, stop: Stop::default(), ..settings(1.0, 3) }).0;
         let wanted = (watched_error(&first) / times).min(1.0);
         if wanted < 1e-5 {
@@ -457,9 +457,9 @@ fn predictions(gpu: &Gpu, alpha: f64, times: f64) -> Vec<f64> {
         let (lit, told) = watched(gpu, name, &settings(wanted, 5));
         assert_eq!(lit.end, End::Error, "{name}: {} rounds", lit.film.rounds);
         let end = f64::from(lit.film.rounds);
-        let tenth = told.iter().find(|progress| progress.done as f64 >= 0.1 * end).unwrap();
+        let tenth = told.iter().find(|progress| progress.done as f64 >= 0.1 * end && progress.seconds_left.is_some()).unwrap();
         let a_round = tenth.seconds / tenth.done as f64;
-        let predicted = tenth.done as f64 + tenth.seconds_left.map_or(f64::INFINITY, |left| left / a_round);
+        let predicted = tenth.done as f64 + tenth.seconds_left.unwrap() / a_round;
         println!("{name}: {predicted:.0} rounds predicted after {}, {end} done", tenth.done);
         off.push((predicted / end - 1.0).abs());
     }
@@ -473,7 +473,7 @@ fn predictions(gpu: &Gpu, alpha: f64, times: f64) -> Vec<f64> {
 fn the_end_is_predicted_at_a_tenth_of_the_run() {
     let Some(gpu) = device() else { return };
     // About 350 rounds, or 150 where most of it is unseen.
-    let off = predictions(&gpu, 1.0, 2.4);
+    let off = predictions(&gpu, 300, 1.0, 2.4);
     assert!(off[off.len() * 9 / 10 - 1] <= 0.2, "{off:?}");
     // The paper's line, of which progress is told in photons.
     let wanted = bound_in_box(&in_box(Some(&gpu), None, 60, 1000).0) / 3.4;
@@ -486,10 +486,11 @@ fn the_end_is_predicted_at_a_tenth_of_the_run() {
     assert!((predicted / end - 1.0).abs() <= 0.2, "the box: {predicted} of {end}");
 }
 
-/// With bias, which falls with a radius that shrinks.
+/// With bias, which falls with a radius that shrinks: within a factor of 1.5 in 9 of 10 scenes.
 #[test]
+#[ignore = "half a thousand rounds of ten scenes: a minute on a software device"]
 fn the_end_of_noise_and_bias_is_predicted_at_a_tenth_of_the_run() {
     let Some(gpu) = device() else { return };
-    let off = predictions(&gpu, SceneSettings::default().alpha, 1.6);
+    let off = predictions(&gpu, 5000, SceneSettings::default().alpha, 2.0);
     assert!(off[off.len() * 9 / 10 - 1] <= 0.5, "{off:?}");
 }

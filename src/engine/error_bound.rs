@@ -38,6 +38,14 @@ pub struct ErrorPlaces {
     pub of_parts: [f64; PART_COUNT as usize],
 }
 
+impl ErrorPlaces {
+    /// The share of caustics and indirect light, which come from maps.
+    pub fn of_maps(&self) -> f64 {
+        let [_, _, caustic, indirect] = self.of_parts;
+        caustic + indirect
+    }
+}
+
 impl FilmError {
     /// The relative error that the film has not more of, with this confidence: of its noise (see [`error_bound`]), and of what
     /// nothing has reached. Infinite where that is all there is.

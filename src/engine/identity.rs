@@ -57,7 +57,8 @@ impl Identity {
             let remedy = "devices of different makes need --math strict in all parts of a run";
             return Some(format!("is of {}, not of {}; {remedy}", name(other), name(self)));
         }
-        (self.plan != other.plan).then(|| "was planned otherwise, as another version or driver does; begin the run anew".to_owned())
+        let otherwise = "was planned otherwise, as another version or driver does, or more than 65536 rounds; begin the run anew";
+        (self.plan != other.plan).then(|| otherwise.to_owned())
     }
 }
 

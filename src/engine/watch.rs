@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
+use super::bias::Bias;
 use super::blocks::{Dealer, Share};
 use super::error_bound::{FilmError, bound_of_both, error_bound};
 use super::identity::Identity;
@@ -180,11 +181,13 @@ struct Look {
     rounds: u32,
     /// As it was found, and its bound.
     noise: [f64; 2],
+    /// The share of the noise's square in light from maps.
+    of_maps: f64,
     unknown: f64,
     /// What is too rare to have been seen.
     unseen: f64,
-    /// Lower end, estimate and upper end, as far as the film tells the bias; else 0.
-    bias: [f64; 3],
+    /// As far as the film tells it.
+    bias: Option<Bias>,
     /// What limits have kept from the result ([`crate::ledger::Losses`]).
     lost: f64,
 }
@@ -221,8 +224,8 @@ impl Watch {
     pub fn look(&mut self, error: &FilmError, lost: f64) {
         let FilmError { rounds, blocks, noise, freedom, ref unknown, unseen, .. } = *error;
         let noise = [noise, error_bound(noise, freedom, self.stop.confidence)];
-        let bias = error.bias.map_or([0.0; 3], |bias| [bias.lower, bias.relative, bias.upper]);
-        self.seen = Some(Look { rounds, noise, unknown: unknown.relative, unseen, bias, lost });
+        let of_maps = error.places.map_or(1.0, |places| places.of_maps());
+        self.seen = Some(Look { rounds, noise, of_maps, unknown: unknown.relative, unseen, bias: error.bias, lost });
         self.next_look = next_look(blocks);
         self.looked = Instant::now();
     }
@@ -231,7 +234,7 @@ impl Watch {
     fn error(&self) -> Option<(u32, f64)> {
         self.seen.map(|look| {
             let Look { rounds, noise, unknown, unseen, lost, .. } = look;
-            (rounds, bound_of_both(noise, self.bias(&look).map(|bias| bias + lost)).hypot(unknown).hypot(unseen))
+            (rounds, bound_of_both(noise, self.bias(&look, rounds.into()).map(|bias| bias + lost)).hypot(unknown).hypot(unseen))
         })
     }
 
@@ -249,8 +252,10 @@ impl Watch {
                 100.0 * look.lost
             ));
         }
-        let [lower, _, upper] = look.bias;
-        if self.alpha == 1.0 && lower > wanted {
+        if let Some(Bias { lower, upper, .. }) = look.bias
+            && self.alpha == 1.0
+            && lower > wanted
+        {
             return refused(format!(
                 "cannot be reached: the bias of the radius alone is {:.2} % to {:.2} %, and the radius never shrinks; use a smaller --radius",
                 100.0 * lower,
@@ -260,10 +265,18 @@ impl Watch {
         Ok(())
     }
 
-    /// The bias at a look and its bound: of the first round's radius as extra runs told it, which is a bound, or as the film does.
-    fn bias(&self, look: &Look) -> [f64; 2] {
-        let [_, found, most] = look.bias;
-        self.stop.bias.map_or([found, most], |bias| [bias * mean_squared_radius(self.alpha, look.rounds); 2])
+    /// The bias after so many rounds and its bound: of the first round's radius as extra runs told it, which is a bound, or as the film did
+    /// at a look.
+    fn bias(&self, look: &Look, rounds: f64) -> [f64; 2] {
+        let square = |rounds: f64| mean_squared_radius(self.alpha, rounds as u32);
+        match (self.stop.bias, look.bias) {
+            (Some(bias), _) => [bias * square(rounds); 2],
+            (None, Some(Bias { relative, upper, .. })) if rounds == f64::from(look.rounds) => [relative, upper],
+            (None, Some(bias)) => {
+                bias.expected(square(rounds) / square(look.rounds.into()), (f64::from(look.rounds) / rounds).powf(self.alpha))
+            }
+            (None, None) => [0.0; 2],
+        }
     }
 
     pub fn has_photons(&self, photons: u64) -> bool {
@@ -310,15 +323,17 @@ impl Watch {
         }
     }
 
-    /// Rounds after which the error will be what is wanted: the square of the noise falls as 1 / rounds, the bias as
-    /// rounds^(alpha - 1), what nothing has reached as 1 / (rounds and area of the discs), and what is unseen as 1 / rounds.
+    /// Rounds after which the error will be what is wanted: the square of the noise falls as 1 / rounds, and that of light from maps as
+    /// rounds^-alpha (Knaus and Zwicker 2011); the bias as the radii's mean square, what nothing has reached as 1 / (rounds and area of
+    /// the discs), and what is unseen as 1 / rounds.
     fn rounds_wanted(&self, wanted: f64, look: Look, most: f64) -> f64 {
-        let Look { rounds, noise, unknown, unseen, lost, .. } = look;
-        let (at, bias) = (f64::from(rounds), self.bias(&look));
+        let Look { rounds, noise, of_maps, unknown, unseen, lost, .. } = look;
+        let at = f64::from(rounds);
         let error = |rounds: f64| {
             let unknown = unknown * (at / rounds).powf(self.alpha);
-            let noise = noise.map(|noise| noise * (at / rounds).sqrt());
-            let bias = bias.map(|bias| bias * (at / rounds).powf(1.0 - self.alpha) + lost);
+            let quieter = (1.0 - of_maps) * at / rounds + of_maps * (at / rounds).powf(self.alpha);
+            let noise = noise.map(|noise| noise * quieter.sqrt());
+            let bias = self.bias(&look, rounds).map(|bias| bias + lost);
             bound_of_both(noise, bias).hypot(unknown).hypot(unseen * at / rounds)
         };
         let (mut less, mut more) = (at.min(most), most);
