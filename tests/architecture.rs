@@ -33,6 +33,7 @@ const LINE: &[&[&str]] = &[
     &["engine::bias_batches"],
     &["engine::run"],
     &["engine::several_devices"],
+    &["engine::retry"],
     &["engine::room", "engine::scene"],
     &["engine::choose_builder"],
     &["output", "verify::selfcheck"],

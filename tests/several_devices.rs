@@ -7,10 +7,11 @@ use std::time::Duration;
 
 use crate::common::prelude::*;
 use photonmill::engine::End;
+use photonmill::engine::retry::{Remedy, run_on};
 use photonmill::engine::saved::{SavedFilm, SavedRun};
 use photonmill::engine::scene::losses::losses;
 use photonmill::engine::scene::{self, RunResult, SceneFilm, View, trial};
-use photonmill::engine::several_devices::{Job, Remedy, run_on};
+use photonmill::engine::several_devices::Work;
 use photonmill::engine::watch::{Keep, SaveRun};
 use photonmill::ledger::Fates;
 use photonmill::settings::stop::Stop;
@@ -111,7 +112,7 @@ impl Room {
             lit
         };
         let given_up = AtomicU32::new(0);
-        let job = Job {
+        let work = Work {
             run: &run,
             film: |film| match film {
                 SavedFilm::Scene(film) => film,
@@ -119,10 +120,6 @@ impl Room {
             },
             error: &|film: &SceneFilm| film.error(plan.film.confidence),
             losses: &|film: &SceneFilm, fates: &[Fates]| losses(&self.geometry, &plan, fates, film),
-            failed: &|_: &Gpu, _: &Error, remedy: Remedy| {
-                assert_eq!(remedy, Remedy::GivenUp);
-                given_up.fetch_add(1, Ordering::Relaxed);
-            },
             can_go_on: true,
             stop: plan.settings.stop,
             alpha: plan.settings.alpha,
@@ -130,6 +127,10 @@ impl Room {
             rounds_per_block: plan.film.rounds_per_block,
             bounces: plan.settings.bounces,
             photons_per_round: plan.maps().map(|map| u64::from(map.photons)).sum(),
+        };
+        let failed = &|_: &Gpu, _: &Error, remedy: Remedy| {
+            assert_eq!(remedy, Remedy::GivenUp);
+            given_up.fetch_add(1, Ordering::Relaxed);
         };
         let (cancelled, mut all) = (AtomicBool::new(false), All::default());
         let mut progress = |progress: &engine::Progress| {
@@ -140,7 +141,7 @@ impl Room {
         let resume = trouble.resume.clone().map(|run| (PathBuf::from("a file"), run));
         let keep = Keep { scene: &self.scene.name, resume, every: Duration::ZERO, save: Some(&mut all), ..Keep::default() };
         let mut control = Control { cancelled: &cancelled, progress: &mut progress, keep };
-        let lit = run_on(&mut gpus, &job, &mut control)?;
+        let lit = run_on(&mut gpus, &work, failed, &mut control)?;
         Ok(Came { lit, given_up: given_up.into_inner(), saved: all.0 })
     }
 }

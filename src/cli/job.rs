@@ -9,11 +9,12 @@ use super::keep::Keeper;
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::stop::{StopArgs, bias_before, check_bias, goals, rounds_after, up_to};
 use super::{complain, device_failed};
+use crate::engine::retry::{run_on, until_done};
 use crate::engine::saved::SavedFilm;
 use crate::engine::scene::losses::losses;
 use crate::engine::scene::map_file::MapFile;
 use crate::engine::scene::{self, RunResult, SceneFilm, View};
-use crate::engine::several_devices::{self, until_done};
+use crate::engine::several_devices::Work;
 use crate::engine::{self, Control};
 use crate::error::Result;
 use crate::gpu::Gpu;
@@ -161,7 +162,7 @@ impl Job<'_> {
             scene::light_from(gpu, view, plan, map, control)
         };
         let photons_per_round = plan.maps().map(|map| u64::from(map.photons)).sum();
-        let job = several_devices::Job {
+        let work = Work {
             run: &run,
             film: |film| match film {
                 SavedFilm::Scene(film) => film,
@@ -169,7 +170,6 @@ impl Job<'_> {
             },
             error: &|film: &SceneFilm| film.error(plan.film.confidence),
             losses: &|film: &SceneFilm, fates: &[Fates]| losses(geometry, plan, fates, film),
-            failed: &device_failed,
             can_go_on: true,
             stop: plan.settings.stop,
             alpha: plan.settings.alpha,
@@ -178,7 +178,7 @@ impl Job<'_> {
             bounces: plan.settings.bounces,
             photons_per_round,
         };
-        let mut lit = several_devices::run_on(gpus, &job, control)?;
+        let mut lit = run_on(gpus, &work, &device_failed, control)?;
         // With its goals, which no device had.
         lit.plan.settings.stop = plan.settings.stop;
         Ok(lit)

@@ -32,8 +32,8 @@ use std::path::PathBuf;
 
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 
+use crate::engine::retry::Remedy;
 use crate::engine::run::RunResult;
-use crate::engine::several_devices::Remedy;
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Options};
 use crate::output::destination::Destination;

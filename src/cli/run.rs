@@ -20,10 +20,11 @@ use crate::engine;
 use crate::engine::Control;
 use crate::engine::choose_builder::{Choice, choose_builder};
 use crate::engine::replay::PhotonName;
+use crate::engine::retry::{run_on, until_done};
 use crate::engine::room::film::{RoomFilm, estimate_walls};
 use crate::engine::room::{self, RunResult};
 use crate::engine::saved::SavedFilm;
-use crate::engine::several_devices::{self, until_done};
+use crate::engine::several_devices::Work;
 use crate::error::{Result, require};
 use crate::gpu::Gpu;
 use crate::ledger::Fates;
@@ -302,7 +303,7 @@ fn light(gpus: &mut Vec<Gpu>, scene: &RoomScene, settings: &RoomSettings, contro
     let weights = OnceCell::new();
     let run =
         |gpu: &Gpu, stop: Stop, control: &mut Control| room::run(Some(gpu), scene, &RoomSettings { stop, ..settings.clone() }, control);
-    let job = several_devices::Job {
+    let work = Work {
         run: &run,
         film: |film| match film {
             SavedFilm::Room(film) => film,
@@ -310,7 +311,6 @@ fn light(gpus: &mut Vec<Gpu>, scene: &RoomScene, settings: &RoomSettings, contro
         },
         error: &|film: &RoomFilm| room::error(film, scene, &plan, &weights),
         losses: &|_: &RoomFilm, fates: &[Fates]| room::losses(&plan, fates),
-        failed: &device_failed,
         can_go_on: settings.sums == Sums::Integer,
         stop: settings.stop,
         // The paper's radius never shrinks, and its rounds are independent.
@@ -320,7 +320,7 @@ fn light(gpus: &mut Vec<Gpu>, scene: &RoomScene, settings: &RoomSettings, contro
         bounces: settings.bounces,
         photons_per_round: settings.photons.into(),
     };
-    let outcome = several_devices::run_on(gpus, &job, control)?;
+    let outcome = run_on(gpus, &work, &device_failed, control)?;
     // With its goals, which no device had.
     Ok(RunResult { plan: RoomPlan { settings: settings.clone(), ..outcome.plan }, ..outcome })
 }

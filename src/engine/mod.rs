@@ -15,6 +15,7 @@ pub mod nonfinite_values;
 pub mod planned;
 pub mod prefix_sum;
 pub mod replay;
+pub mod retry;
 pub mod room;
 pub mod run;
 pub mod saved;

@@ -1,12 +1,11 @@
-//! A run on one device or several, to its end, whatever becomes of the devices. Each takes the next block when it is done with one, and
-//! integer sums make one film of all, to the bits of a run on one device.
+//! A run on several devices. Each takes the next block when it is done with one, and integer sums make one film of all, to the bits of a
+//! run on one device.
 //!
 //! Whether the run ends is decided where a run on one device would: after so many blocks, in the order in which they were dealt. Before
 //! a device takes its first block beyond such a look, it hands over what it has. Once all have, these add up to the blocks before the
 //! look and no others; what was done since is left out if the run ends there.
 //!
-//! A device that is lost is opened anew, and one whose memory is full goes on with less; where that is of no use it is given up, and the
-//! others go on. All of them go on from the last look; one device alone, from what it has noted of itself.
+//! One attempt ends when a device fails, with what all had done at the last look; [`super::retry`] makes the next.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -25,18 +24,16 @@ use crate::gpu::Gpu;
 use crate::ledger::{Fates, Ledger, Losses};
 use crate::settings::stop::Stop;
 
-/// Runs a job on one device.
+/// Does some work on one device.
 type RunOnOne<'a, Plan, Film> = dyn Fn(&Gpu, Stop, &mut Control) -> Result<RunResult<Plan, Film>> + Sync + 'a;
 
 /// What is run, in either world.
-pub struct Job<'a, Plan, Film> {
+pub struct Work<'a, Plan, Film> {
     /// Runs on one device until a goal is reached, or as long as it is dealt blocks.
     pub run: &'a RunOnOne<'a, Plan, Film>,
     pub film: fn(&SavedFilm) -> &Film,
     pub error: &'a dyn Fn(&Film) -> FilmError,
     pub losses: &'a dyn Fn(&Film, &[Fates]) -> Losses,
-    /// Told of a device that failed, why, and what is done about it.
-    pub failed: &'a dyn Fn(&Gpu, &Error, Remedy),
     /// Whether what is done can be gone on with: sums of floats cannot.
     pub can_go_on: bool,
     pub stop: Stop,
@@ -47,62 +44,8 @@ pub struct Job<'a, Plan, Film> {
     pub photons_per_round: u64,
 }
 
-/// What is done about a device that failed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Remedy {
-    OpenedAnew,
-    LessMemory,
-    GivenUp,
-}
-
-/// A device that fails more often without having done anything in between is not worth it.
-const MOST_FAILURES: u32 = 4;
-/// Between two times at which a run on one device is noted, in memory.
-const NOTED_EVERY: Duration = Duration::from_secs(10);
-
-/// Makes a device that failed fit for the same work; `None` where that cannot be.
-fn mend(gpu: &mut Gpu, error: &Error) -> Option<Remedy> {
-    match error {
-        Error::DeviceLost { .. } => gpu.reopen().is_ok().then_some(Remedy::OpenedAnew),
-        Error::OutOfMemory { .. } => gpu.use_less_memory().then_some(Remedy::LessMemory),
-        _ => None,
-    }
-}
-
-/// Does what can be done again from its start until a device is fit for it.
-pub fn until_done<T>(gpu: &mut Gpu, failed: &dyn Fn(&Gpu, &Error, Remedy), mut work: impl FnMut(&Gpu) -> Result<T>) -> Result<T> {
-    for failures in 1.. {
-        let error = match work(gpu) {
-            Err(error) if failures <= MOST_FAILURES => error,
-            done => return done,
-        };
-        let Some(remedy) = mend(gpu, &error) else { return Err(error) };
-        failed(gpu, &error, remedy);
-    }
-    unreachable!("failures are counted")
-}
-
-/// Notes a run on one device in memory, and hands it on to whoever keeps it.
-struct Notes<'a> {
-    outer: Option<&'a mut dyn SaveRun>,
-    wants_identity: bool,
-    latest: Option<Arc<SavedRun>>,
-}
-
-impl SaveRun for Notes<'_> {
-    fn wants_identity(&self) -> bool {
-        self.wants_identity
-    }
-
-    fn begins(&mut self, identity: &Identity) {
-        self.outer.iter_mut().for_each(|outer| outer.begins(identity));
-    }
-
-    fn save(&mut self, run: &Arc<SavedRun>, is_last: bool) -> Result<()> {
-        self.latest = (!is_last).then(|| run.clone());
-        self.outer.iter_mut().try_for_each(|outer| outer.save(run, is_last))
-    }
-}
+/// Between two times at which a run is noted, in memory.
+pub const NOTED_EVERY: Duration = Duration::from_secs(10);
 
 /// What a device says.
 enum Event<Plan, Film> {
@@ -152,7 +95,7 @@ struct Known<Plan, Film> {
 }
 
 /// How some devices ended together.
-enum Outcome<Plan, Film> {
+pub enum Outcome<Plan, Film> {
     Ended(Box<RunResult<Plan, Film>>),
     /// One failed; the others were stopped. With what all had done at the last look.
     Failed {
@@ -165,80 +108,11 @@ enum Outcome<Plan, Film> {
 /// Between two looks at the clock and at what the user wants.
 const PAUSE: Duration = Duration::from_millis(20);
 
-/// Runs a job on one device or several to its end.
-pub fn run_on<Plan, Film>(gpus: &mut Vec<Gpu>, job: &Job<Plan, Film>, control: &mut Control) -> Result<RunResult<Plan, Film>>
-where
-    Plan: Send,
-    Film: Clone + Send,
-{
-    let blocks = job.rounds.div_ceil(job.rounds_per_block);
-    let started = Instant::now();
-    // Another scene's file is to be refused; what was noted of this run is known to be its own.
-    let wants_identity = control.keep.save.is_some() || control.keep.resume.is_some();
-    let is_shared = control.keep.share.count(blocks) > 1;
-    let mut base = control.keep.resume.take();
-    let mut failures = 0;
-    loop {
-        let resumed = base.clone();
-        let outcome = if is_shared && gpus.len() > 1 {
-            Together { job, started, blocks }.run(gpus, base, control)?
-        } else {
-            job.alone(&gpus[0], base, started.elapsed(), is_shared && job.can_go_on, wants_identity, control)
-        };
-        let (device, error, so_far) = match outcome {
-            Outcome::Ended(result) => return Ok(*result),
-            Outcome::Failed { device, error, base } => (device, error, base),
-        };
-        let count = |run: &SavedRun| run.done.count();
-        let is_further = so_far.as_deref().map_or(0, count) > resumed.as_ref().map_or(0, |(_, run)| count(run));
-        failures = if is_further { 1 } else { failures + 1 };
-        let file = resumed.as_ref().map(|(path, _)| path.clone()).unwrap_or_default();
-        base = so_far.map(|run| (file, Arc::unwrap_or_clone(run))).or(resumed);
-        let remedy = if failures > MOST_FAILURES { None } else { mend(&mut gpus[device], &error) };
-        if remedy.is_none() && gpus.len() == 1 {
-            if let (Some(save), Some((_, run))) = (control.keep.save.as_mut(), base) {
-                save.save(&Arc::new(run), true)?;
-            }
-            return Err(error);
-        }
-        (job.failed)(&gpus[device], &error, remedy.unwrap_or(Remedy::GivenUp));
-        if remedy.is_none() {
-            gpus.remove(device);
-            failures = 0;
-        }
-    }
-}
-
-impl<Plan, Film> Job<'_, Plan, Film> {
-    /// Runs on one device; of its time some is `spent`.
-    fn alone(
-        &self,
-        gpu: &Gpu,
-        resume: Option<(std::path::PathBuf, SavedRun)>,
-        spent: Duration,
-        notes_itself: bool,
-        wants_identity: bool,
-        control: &mut Control,
-    ) -> Outcome<Plan, Film> {
-        let Keep { scene, share, every, save, .. } = &mut control.keep;
-        let every = if save.is_some() { (*every).min(NOTED_EVERY) } else { NOTED_EVERY };
-        let is_used = notes_itself || save.is_some();
-        let mut notes = Notes { outer: save.as_mut().map(|save| &mut **save as &mut dyn SaveRun), wants_identity, latest: None };
-        let save = is_used.then_some(&mut notes as &mut dyn SaveRun);
-        let keep = Keep { scene, share: *share, resume, every, save, dealt: None };
-        let stop = Stop { seconds: self.stop.seconds.map(|seconds| (seconds - spent.as_secs_f64()).max(0.0)), ..self.stop };
-        match (self.run)(gpu, stop, &mut Control { cancelled: control.cancelled, progress: &mut *control.progress, keep }) {
-            Ok(result) => Outcome::Ended(Box::new(result)),
-            Err(error) => Outcome::Failed { device: 0, error, base: notes.latest },
-        }
-    }
-}
-
 /// One attempt.
-struct Together<'a, Plan, Film> {
-    job: &'a Job<'a, Plan, Film>,
-    started: Instant,
-    blocks: u32,
+pub struct Together<'a, Plan, Film> {
+    pub work: &'a Work<'a, Plan, Film>,
+    pub started: Instant,
+    pub blocks: u32,
 }
 
 /// How far an attempt has come.
@@ -263,27 +137,32 @@ struct Attempt<'a, Plan, Film> {
 }
 
 impl<Plan: Send, Film: Clone + Send> Together<'_, Plan, Film> {
-    fn run(&self, gpus: &mut [Gpu], resume: Option<(std::path::PathBuf, SavedRun)>, control: &mut Control) -> Result<Outcome<Plan, Film>> {
-        let job = self.job;
+    pub fn run(
+        &self,
+        gpus: &mut [Gpu],
+        resume: Option<(std::path::PathBuf, SavedRun)>,
+        control: &mut Control,
+    ) -> Result<Outcome<Plan, Film>> {
+        let work = self.work;
         let share = control.keep.share;
         let done = resume.as_ref().map(|(_, run)| run.done.clone()).unwrap_or_default();
-        let most = job.stop.photons.map_or(self.blocks, |photons| {
-            let of_block = (job.photons_per_round * u64::from(job.rounds_per_block)).max(1);
+        let most = work.stop.photons.map_or(self.blocks, |photons| {
+            let of_block = (work.photons_per_round * u64::from(work.rounds_per_block)).max(1);
             photons.div_ceil(of_block).min(u64::from(self.blocks)) as u32
         });
         let mut order: Vec<u32> = (share.number..self.blocks).step_by(share.of as usize).filter(|block| !done.contains(*block)).collect();
         order.truncate(most.saturating_sub(done.count()) as usize);
         let all = order.len() as u32;
         // Nobody looks where no error decides; what is done is noted from time to time all the same.
-        let looks = job.stop.error.into_iter().flat_map(|_| looks(done.count())).map(|look| look - done.count());
+        let looks = work.stop.error.into_iter().flat_map(|_| looks(done.count())).map(|look| look - done.count());
         let dealer = Arc::new(Dealer::new(order, gpus.len(), looks));
         let cancelled = AtomicBool::new(false);
         let (events, received) = channel();
         let mut attempt = Attempt {
             devices: gpus.iter().map(|_| Known::new()).collect(),
             dealer: &dealer,
-            watch: Watch::new(job.stop, job.alpha, job.rounds_per_block, self.started),
-            most_rounds: (done.count() + all) * job.rounds_per_block,
+            watch: Watch::new(work.stop, work.alpha, work.rounds_per_block, self.started),
+            most_rounds: (done.count() + all) * work.rounds_per_block,
             look: 0,
             base: resume.as_ref().map(|(_, run)| Arc::new(run.clone())),
             end: None,
@@ -295,8 +174,8 @@ impl<Plan: Send, Film: Clone + Send> Together<'_, Plan, Film> {
         };
         attempt.watch.go_on(done.count());
         let scene = control.keep.scene;
-        let (resume, run) = (Mutex::new(resume), job.run);
-        let no_goal = Stop { error: None, seconds: None, photons: None, ..job.stop };
+        let (resume, run) = (Mutex::new(resume), work.run);
+        let no_goal = Stop { error: None, seconds: None, photons: None, ..work.stop };
         std::thread::scope(|scope| {
             for (device, gpu) in gpus.iter_mut().enumerate() {
                 let (dealer, events, cancelled, resume) = (&dealer, events.clone(), &cancelled, &resume);
@@ -335,7 +214,7 @@ impl<Plan: Send, Film: Clone + Send> Together<'_, Plan, Film> {
         let is_whole = run.done.count() == done.count() + all;
         let end = match attempt.end {
             Some(End::Error) => End::Error,
-            _ if is_whole && job.stop.photons.is_some_and(|photons| run.emitted() >= photons) => End::Photons,
+            _ if is_whole && work.stop.photons.is_some_and(|photons| run.emitted() >= photons) => End::Photons,
             _ if is_whole => End::Rounds,
             end => end.unwrap_or(End::Cancelled),
         };
@@ -404,9 +283,9 @@ impl<Plan: Send, Film: Clone + Send> Together<'_, Plan, Film> {
             };
             let blocks = run.done.count();
             if attempt.watch.is_due(blocks) {
-                let film = (self.job.film)(&run.film);
-                attempt.watch.look(&(self.job.error)(film), (self.job.losses)(film, &run.fates).relative);
-                attempt.watch.check_error(self.job.bounces)?;
+                let film = (self.work.film)(&run.film);
+                attempt.watch.look(&(self.work.error)(film), (self.work.losses)(film, &run.fates).relative);
+                attempt.watch.check_error(self.work.bounces)?;
                 attempt.end = attempt.watch.end(blocks, 0);
             }
             control.keep.save.iter_mut().try_for_each(|save| save.save(&run, false))?;
@@ -420,7 +299,7 @@ impl<Plan: Send, Film: Clone + Send> Together<'_, Plan, Film> {
         let all = || attempt.devices.iter().map(|device| &device.progress);
         let rounds: u64 = all().map(|progress| progress.done).sum();
         let ledger = all().fold(Ledger::default(), |sum, progress| sum.plus(&progress.ledger));
-        attempt.watch.progress(rounds as f64, attempt.most_rounds, self.job.photons_per_round, ledger)
+        attempt.watch.progress(rounds as f64, attempt.most_rounds, self.work.photons_per_round, ledger)
     }
 
     /// The result of all, in place of that of the first device.
@@ -437,10 +316,10 @@ impl<Plan: Send, Film: Clone + Send> Together<'_, Plan, Film> {
             result.nonfinite_values = NonfiniteValues::both(result.nonfinite_values, other.nonfinite_values);
             result.more_devices.extend(other.device);
         }
-        let film = (self.job.film)(&run.film).clone();
+        let film = (self.work.film)(&run.film).clone();
         RunResult {
             left_out: traced.saturating_sub(run.fates.iter().map(|fates| fates.emitted).sum()),
-            losses: (self.job.losses)(&film, &run.fates),
+            losses: (self.work.losses)(&film, &run.fates),
             film,
             fates: run.fates.clone(),
             end,
