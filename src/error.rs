@@ -76,7 +76,7 @@ pub enum Error {
     Device { call: &'static str, reason: String },
 
     /// The device is gone, or its driver has reset it.
-    #[error("{}; the system's log says why; with --checkpoint a run can be gone on with", self.what())]
+    #[error("{}; the system's log says why; a run with --checkpoint can go on from its file with --resume", self.what())]
     DeviceLost { call: &'static str },
 
     /// Memory of the device or of the host ran out.

@@ -33,10 +33,11 @@ pub fn some_of(names: impl ExactSizeIterator<Item = impl ToString>) -> String {
     first.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }
 }
 
-/// Why the system refuses a file.
+/// Why the system refuses a file, or a name for one.
 pub fn refusal(error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::NotFound => "there is no such file".to_owned(),
+        io::ErrorKind::AlreadyExists => "something of this name is there".to_owned(),
         kind => kind.to_string(),
     }
 }

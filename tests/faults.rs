@@ -253,3 +253,64 @@ fn memory_is_kept_to() {
         ("--variant cpu --memory 1G -o b.png".to_owned(), ["--memory", "--variant cpu"].as_slice()),
     ]);
 }
+
+/// Nothing that is read, and nothing that is no file, is lost to an output; what is asked for and cannot be had is told of.
+#[test]
+fn inputs_and_pipes_stay_what_they_are() {
+    let Some(_) = device() else { return };
+    let place = Place::new();
+    place.succeed(&format!("render cornell {SMALL} --rounds 2 --shard 1/2 -o s.png --checkpoint 1.pms"));
+    place.succeed(&format!("render cornell {SMALL} --rounds 2 --shard 2/2 -o s.png --checkpoint 2.pms"));
+    place.succeed("map cornell --photons 500 --rounds 2 -q -o m.pm");
+    std::fs::write(place.at("p.csv"), "0.5 0.1 0.5 0 1 0\n").unwrap();
+    assert!(Command::new("mkfifo").arg(place.at("pipe")).status().unwrap().success());
+    let read = "it is also read";
+    let no_file = "it is no file that could be replaced as a whole; name a file";
+    for (line, expected) in [
+        ("render cornell --size 8x8 --map m.pm -o y.exr --checkpoint m.pm".into(), read),
+        ("render cornell --size 8x8 --map m.pm -o y.exr --json ./m.pm".into(), read),
+        (format!("render cornell {SMALL} -o 1.exr --resume 1.pms --trace 1.pms"), read),
+        ("probe cornell --points p.csv -o p.csv".into(), read),
+        ("probe cornell --points p.csv -o q.csv --checkpoint p.csv".into(), read),
+        ("map info m.pm --json m.pm".into(), read),
+        ("merge 1.pms 2.pms --checkpoint 2.pms".into(), read),
+        ("map cornell -o pipe".into(), no_file),
+        ("map export m.pm -o pipe.ply".into(), no_file),
+        (format!("render cornell {SMALL} -o y.exr --checkpoint pipe"), no_file),
+        ("merge 1.pms 2.pms --checkpoint pipe".into(), no_file),
+        (format!("bake cornell {} -o d --checkpoint d", SMALL.replace("--size 8x8 ", "")), "--checkpoint writes it too"),
+    ] {
+        if line.contains("pipe.ply") {
+            std::fs::rename(place.at("pipe"), place.at("pipe.ply")).unwrap();
+        }
+        let refusal = place.refusal(&line).unwrap_or_else(|why| panic!("{line}: {why}"));
+        assert!(refusal.contains(expected), "{line}: {refusal}");
+        if line.contains("pipe.ply") {
+            std::fs::rename(place.at("pipe.ply"), place.at("pipe")).unwrap();
+        }
+    }
+    let (_, stderr) = place.succeed("render cornell --size 8x8 --photons 500 --time 1ms -q -o y.exr --checkpoint none.pms");
+    assert!(stderr.contains("warning: --checkpoint none.pms: is not written, as no block of rounds was done"), "{stderr}");
+    place.succeed("merge 1.pms 2.pms -o both.exr --checkpoint both.pms");
+    let (_, stderr) = place.succeed(&format!("render cornell {SMALL} --rounds 1 -o y.exr --resume both.pms"));
+    assert!(stderr.contains("--rounds 1 is less than the 2 rounds of --resume, all of which are kept"), "{stderr}");
+}
+
+#[test]
+fn devices_and_faults_that_there_are_not_are_refused() {
+    let Some(_) = device() else { return };
+    let place = Place::new();
+    let refusal = place.refusal(&format!("render cornell {SMALL} -o y.exr --devices 0,99")).unwrap();
+    assert!(refusal.starts_with("photonmill: --devices 0,99: there is no device 99;"), "{refusal}");
+    // Numbers in a device's name are not its number.
+    for number in ["15", "99"] {
+        let output = place.run(&format!("render cornell {SMALL} -o y.exr --device {number}"));
+        assert_eq!(output.status.code(), Some(2), "{}", text(&output.stderr));
+    }
+    for faults in ["x", "vkQueueSubmit2@", "vkQueueSubmit2@20=foo", "vkQueueSubmit2@0=lost", ","] {
+        let output = place.command(&on_device("render cornell -o y.exr")).env("PHOTONMILL_FAULTS", faults).output().unwrap();
+        let stderr = text(&output.stderr);
+        assert_eq!((output.status.code(), stderr.lines().count()), (Some(2), 1), "{faults}: {stderr}");
+        assert!(stderr.starts_with("photonmill: PHOTONMILL_FAULTS ") && stderr.contains("must be CALL@N=FAULT"), "{faults}: {stderr}");
+    }
+}

@@ -283,7 +283,7 @@ fn the_program_makes_reads_and_exports_files() {
     }
     place.assert_refused([
         ("map cornell", ["required", "-o", "photonmill map"]),
-        ("map cornell -o -", ["-o", "-", "must be a file"]),
+        ("map cornell -o -", ["-o", "-", "name a file"]),
         ("map cornell -o map.pm --rounds 0", ["--rounds", "0", "from 1"]),
         ("map cornell -o none/map.pm", ["-o", "none/map.pm", "no folder"]),
         (

@@ -63,7 +63,8 @@ pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
     let reports = args.report.open()?;
     let mut keeper = args.transport.keep.open(&args.transport.stop)?;
     let report_files = [reports.destinations(), keeper.destinations()].concat();
-    check_distinct(&report_files)?;
+    check_distinct(&[report_files.as_slice(), &[folder.itself()]].concat())?;
+    keeper.check_not_read(&report_files, args.transport.inputs().chain([args.scene.path()]))?;
     let name = args.scene.scene.as_str();
     let is_built_in = built_in::by_name(name).is_some();
     if let Some(Atlas::Size(size)) = args.atlas.filter(|_| is_built_in) {

@@ -93,13 +93,19 @@ impl Job<'_> {
         let Job { scene, geometry, sensor, camera, phases, map, point, .. } = *self;
         let is_picture = matches!(sensor, Sensor::Picture { .. });
         let mut settings = self.settings.in_whole_blocks(is_picture);
-        if let Some(most) = map.map(MapFile::rounds).filter(|most| settings.rounds > *most) {
-            settings.rounds = most - most % settings.rounds_per_block(is_picture);
+        let block = settings.rounds_per_block(is_picture);
+        let of_map = map.map(MapFile::rounds).filter(|most| settings.rounds > *most);
+        if let Some(most) = of_map {
+            settings.rounds = most - most % block;
         }
         let settings = &settings;
-        if settings.rounds != self.settings.rounds {
-            let block = settings.rounds_per_block(is_picture);
-            reporter.note(&format!("--rounds {} is taken as {}: whole blocks of {block}", self.settings.rounds, settings.rounds));
+        if of_map.unwrap_or(self.settings.rounds) != settings.rounds {
+            let wanted = of_map.map_or(format!("--rounds {} is", self.settings.rounds), |most| format!("the {most} rounds of --map are"));
+            reporter.note(&format!("{wanted} taken as {}: whole blocks of {block}", settings.rounds));
+        }
+        let done = keeper.rounds_done(block);
+        if done > settings.rounds {
+            complain(&format!("warning: --rounds {} is less than the {done} rounds of --resume, all of which are kept", settings.rounds));
         }
         let view = View { geometry, camera, phases };
         let plan = until_done(&mut gpus[0], &device_failed, |gpu| scene::trial::plan(gpu, scene, &view, settings, sensor))?;

@@ -1,6 +1,6 @@
 //! Runs that are kept: checkpoints, shards, and going on with what a file holds.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -13,7 +13,8 @@ use crate::engine::blocks::Share;
 use crate::engine::saved::SavedRun;
 use crate::engine::watch::{Keep, SaveRun};
 use crate::error::{Error, Result, require};
-use crate::output::destination::{Destination, write_synced};
+use crate::output::destination::{Destination, check_not_read, write_synced};
+use crate::text::refusal;
 
 #[derive(Args)]
 #[command(next_help_heading = "When to stop")]
@@ -41,8 +42,11 @@ pub(super) struct Keeper<'a> {
     snapshot: Option<Snapshot<'a>>,
     /// When each of the two was written last.
     written: [Instant; 2],
-    /// Why the latest checkpoint is not there.
+    /// Whether there is a checkpoint of this run, and why the latest is not there.
+    has_checkpoint: bool,
     failed: Option<Error>,
+    /// Whether the latest snapshot could not be written.
+    lacks_snapshot: bool,
 }
 
 /// A picture of a run that is under way, written again and again.
@@ -57,10 +61,7 @@ const USUAL_EVERY: f64 = 30.0;
 impl KeepArgs {
     /// Fails now where the file could not be written later, or what is to be gone on with cannot be read.
     pub(super) fn open<'a>(&self, stop: &StopArgs) -> Result<Keeper<'a>> {
-        let checkpoint = self.checkpoint.as_ref().map(|path| Destination::open("--checkpoint", path)).transpose()?;
-        if let Some(stream) = checkpoint.as_ref().filter(|file| file.is_standard_output()) {
-            return Err(Error::setting("--checkpoint", stream.path().display(), "must be a file, which is written again and again"));
-        }
+        let checkpoint = self.checkpoint.as_ref().map(|path| Destination::open_file("--checkpoint", path)).transpose()?;
         let every = self.every.unwrap_or(USUAL_EVERY);
         require((0.001..=1e6).contains(&every), "--every", every, "must be from 1ms to 1000000s")?;
         if let Some(shard) = self.shard {
@@ -69,20 +70,43 @@ impl KeepArgs {
         let resume = self.resume.as_ref().map(|path| Ok((path.clone(), read("--resume", path)?))).transpose()?;
         let every = Duration::from_secs_f64(every);
         let written = [Instant::now(); 2];
-        Ok(Keeper { checkpoint, every, resume, share: self.shard.unwrap_or_default(), snapshot: None, written, failed: None })
+        Ok(Keeper {
+            checkpoint,
+            every,
+            resume,
+            share: self.shard.unwrap_or_default(),
+            snapshot: None,
+            written,
+            has_checkpoint: false,
+            failed: None,
+            lacks_snapshot: false,
+        })
     }
 }
 
 /// A file of a run.
 pub(super) fn read(option: &'static str, path: &PathBuf) -> Result<SavedRun> {
     let refuse = |reason: String| Error::setting(option, path.display(), reason);
-    let bytes = std::fs::read(path).map_err(|error| refuse(format!("cannot be read ({}); name a file of --checkpoint", error.kind())))?;
+    let bytes =
+        std::fs::read(path).map_err(|error| refuse(format!("cannot be read ({}); name a file of --checkpoint", refusal(&error))))?;
     SavedRun::from_bytes(&bytes).map_err(refuse)
 }
 
 impl<'a> Keeper<'a> {
     pub(super) fn set_snapshot(&mut self, snapshot: Option<Snapshot<'a>>) {
         self.snapshot = snapshot;
+    }
+
+    /// Refuses outputs in files that are read. A checkpoint may take the place of the one that the run goes on with.
+    pub(super) fn check_not_read<'b>(&self, outputs: &[Destination], inputs: impl IntoIterator<Item = &'b Path>) -> Result<()> {
+        let others: Vec<Destination> = outputs.iter().filter(|output| Some(*output) != self.checkpoint.as_ref()).cloned().collect();
+        check_not_read(outputs, inputs)?;
+        check_not_read(&others, self.resume.iter().map(|(path, _)| path.as_path()))
+    }
+
+    /// Of the run that is gone on with, whose blocks have so many.
+    pub(super) fn rounds_done(&self, block: u32) -> u32 {
+        self.resume.as_ref().map_or(0, |(_, run)| run.done.count() * block)
     }
 
     pub(super) fn destinations(&self) -> Vec<Destination> {
@@ -97,8 +121,11 @@ impl<'a> Keeper<'a> {
         Keep { scene, share, resume, every: every.unwrap_or_default(), save: every.map(|_| self as &mut dyn SaveRun), dealt: None }
     }
 
-    /// Fails where the last checkpoint is not there.
+    /// Fails where the last checkpoint is not there; says so where there is none, as no block of rounds was done.
     pub(super) fn finish(self) -> Result<()> {
+        if let Some(file) = self.checkpoint.filter(|_| !self.has_checkpoint && self.failed.is_none()) {
+            complain(&format!("warning: --checkpoint {}: is not written, as no block of rounds was done", file.path().display()));
+        }
         self.failed.map_or(Ok(()), Err)
     }
 }
@@ -108,16 +135,19 @@ impl SaveRun for Keeper<'_> {
     fn save(&mut self, run: &Arc<SavedRun>, is_last: bool) -> Result<()> {
         if let Some(file) = self.checkpoint.as_ref().filter(|_| is_last || self.written[0].elapsed() >= self.every) {
             let result = write_synced(file, &run.to_bytes());
-            if let (Err(error), false) = (&result, is_last) {
+            if let (Err(error), false, None) = (&result, is_last, &self.failed) {
                 complain(&format!("warning: {error}; the run goes on"));
             }
+            self.has_checkpoint |= result.is_ok();
             self.failed = result.err();
             self.written[0] = Instant::now();
         }
         if let Some(snapshot) = self.snapshot.as_mut().filter(|snapshot| !is_last && self.written[1].elapsed() >= snapshot.every) {
-            if let Err(error) = (snapshot.write)(run) {
+            let result = (snapshot.write)(run);
+            if let (Err(error), false) = (&result, self.lacks_snapshot) {
                 complain(&format!("warning: {error}; the run goes on"));
             }
+            self.lacks_snapshot = result.is_err();
             self.written[1] = Instant::now();
         }
         Ok(())

@@ -1,6 +1,6 @@
 //! `photonmill map`: the photons of a scene as a file, what such a file holds, and its photons for other programs.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
 use clap::{ArgMatches, Args, Command, FromArgMatches, Subcommand};
@@ -21,7 +21,7 @@ use crate::engine::scene::{View, trial};
 use crate::engine::watch::Keep;
 use crate::error::{Error, Result, require};
 use crate::gpu::Gpu;
-use crate::output::destination::{Destination, write_all};
+use crate::output::destination::{Destination, check_not_read, write_all};
 use crate::output::photon_map;
 use crate::plan::scene::ScenePlan;
 use crate::plan::sensor::Sensor;
@@ -138,7 +138,8 @@ fn make(args: &MakeArgs, cancelled: &AtomicBool) -> Result<End> {
     // Of a block each: rounds know nothing of each other.
     let settings = SceneSettings { rounds: args.rounds.unwrap_or(usual.rounds), block: Some(1), ..usual };
     settings.validate()?;
-    let output = a_file(&args.output)?;
+    let output = Destination::open_file("-o", &args.output)?;
+    check_not_read(std::slice::from_ref(&output), [args.scene.path()])?;
     let reporter = ProgressReporter::new(&args.progress);
     let scene = args.scene.open(&reporter)?;
     let camera = camera(&scene, args.camera.as_deref())?;
@@ -148,7 +149,7 @@ fn make(args: &MakeArgs, cancelled: &AtomicBool) -> Result<End> {
     let mut gpu = args.device.open(&reporter)?;
     let view = View { geometry: &geometry, camera: Some(&camera), phases: &[] };
     let sensor = Sensor::Picture { width, height };
-    let trial = until_done(&mut gpu, &device_failed, |gpu| trial::plan(gpu, &scene, &view, &settings, sensor))?.trial;
+    let trial = until_done(&mut gpu, &device_failed, |gpu| trial::find(gpu, &scene, &view, &settings, sensor))?;
     // No picture is made, so that its buffers need no room.
     let sensor = Sensor::Picture { width: 1, height: 1 };
     let plan_of = |gpu: &Gpu| ScenePlan::with_trial(&scene, &geometry, &settings, sensor, &engine::limits(gpu.facts()), trial.clone());
@@ -183,15 +184,9 @@ fn make(args: &MakeArgs, cancelled: &AtomicBool) -> Result<End> {
     failed.map_or(Ok(if filled.is_cancelled { End::Cancelled } else { End::Finished }), Err)
 }
 
-/// A file that is written piece by piece.
-fn a_file(path: &Path) -> Result<Destination> {
-    let output = Destination::open("-o", path)?;
-    require(!output.is_standard_output(), "-o", "-", "must be a file: its beginning is known at its end")?;
-    Ok(output)
-}
-
 fn info(args: &MapInfoArgs) -> Result<()> {
     let json = optional_file("--json", args.json.json.as_ref())?;
+    check_not_read(json.as_slice(), [args.file.as_path()])?;
     let map = MapFile::open("FILE", &args.file)?;
     match json {
         Some(json) => write_all([(json, photon_map::json(&map.header))]),
@@ -202,7 +197,8 @@ fn info(args: &MapInfoArgs) -> Result<()> {
 fn export(args: &ExportArgs) -> Result<()> {
     let is_ply = args.output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("ply"));
     require(is_ply, "-o", args.output.display(), "must end in .ply")?;
-    let output = a_file(&args.output)?;
+    let output = Destination::open_file("-o", &args.output)?;
+    check_not_read(std::slice::from_ref(&output), [args.file.as_path()])?;
     let map = MapFile::open("FILE", &args.file)?;
     let rounds = args.rounds.unwrap_or(map.rounds());
     require(

@@ -13,7 +13,7 @@ use crate::engine::saved::{SavedFilm, SavedRun};
 use crate::engine::scene::SceneFilm;
 use crate::error::{Error, Result, require};
 use crate::output::colour::{Format, Tone};
-use crate::output::destination::{Destination, check_distinct, write_all, write_synced};
+use crate::output::destination::{Destination, check_distinct, check_not_read, write_all, write_synced};
 use crate::output::merge_report;
 use crate::output::show::Show;
 use crate::plan::sensor::Sensor;
@@ -56,9 +56,10 @@ pub(super) fn run(args: &MergeArgs) -> Result<()> {
     let picture = optional_file("-o", args.output.as_ref())?;
     let errors = optional_file("--error-image", args.error_image.as_ref())?;
     let json = optional_file("--json", args.json.json.as_ref())?;
-    let checkpoint = optional_file("--checkpoint", args.checkpoint.as_ref())?;
+    let checkpoint = args.checkpoint.as_ref().map(|path| Destination::open_file("--checkpoint", path)).transpose()?;
     let all: Vec<Destination> = [&picture, &errors, &json, &checkpoint].into_iter().flatten().cloned().collect();
     check_distinct(&all)?;
+    check_not_read(&all, args.files.iter().map(PathBuf::as_path))?;
 
     let Merged { run, parts } = merge(&args.files)?;
     let missing = missing(&run, &parts);

@@ -154,6 +154,11 @@ impl DevicesOfRunArgs {
                 if gpus.is_empty() { all.iter().filter(usable).map(|facts| facts.index).take(1).collect() } else { gpus }
             }
         };
+        if let Some(DeviceNumbers::These(numbers)) = &self.devices {
+            let count = Gpu::list()?.len();
+            let absent = |number: &usize| format!("there is no device {number}; `photonmill devices` lists those available");
+            numbers.iter().try_for_each(|number| require(*number < count, "--devices", number, absent(number)))?;
+        }
         let options = |number: &usize| Options { device: Some(number.to_string()), ..self.one.options() };
         let opened: Vec<Result<Gpu>> = std::thread::scope(|scope| {
             let threads: Vec<_> = numbers.iter().map(|number| scope.spawn(move || Gpu::open(&options(number)))).collect();

@@ -58,6 +58,7 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
     let mut keeper = args.transport.keep.open(&args.transport.stop)?;
     let all = [vec![output.clone()], reports.destinations(), keeper.destinations()].concat();
     check_distinct(&all)?;
+    keeper.check_not_read(&all, args.transport.inputs().chain([args.points.as_path(), args.scene.path()]))?;
     let points = read_points(&args.points)?;
 
     let reporter = ProgressReporter::new(&args.messages.progress);

@@ -114,6 +114,7 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     let files = [&picture, &errors].into_iter().flatten().cloned().collect();
     let all: Vec<Destination> = [files, reports.destinations(), keeper.destinations()].concat();
     check_distinct(&all)?;
+    keeper.check_not_read(&all, args.picture.inputs())?;
 
     let reporter = ProgressReporter::new(&args.messages.progress);
     let subject = args.picture.open(&settings, &reporter)?;

@@ -249,6 +249,11 @@ fn most_rounds(stop: &Stop, photons: u32) -> Option<u32> {
 }
 
 impl SceneArgs {
+    /// Of the scene's file, or the name of a built-in one.
+    pub(super) fn path(&self) -> &Path {
+        Path::new(&self.scene)
+    }
+
     /// The scene; prints its warnings.
     pub(super) fn open(&self, reporter: &ProgressReporter) -> Result<Scene> {
         if let Some(time) = self.at {
@@ -353,6 +358,11 @@ impl PhotonArgs {
 
 impl TransportArgs {
     /// The file that photons are taken from.
+    /// Files that are read.
+    pub(super) fn inputs(&self) -> impl Iterator<Item = &Path> {
+        self.map.iter().map(PathBuf::as_path)
+    }
+
     pub(super) fn map(&self) -> Result<Option<MapFile>> {
         let Some(map) = self.map.as_ref().map(|path| MapFile::open("--map", path)).transpose()? else { return Ok(None) };
         if let Some(rounds) = self.rounds.filter(|rounds| *rounds > map.rounds()) {
@@ -391,6 +401,11 @@ impl TransportArgs {
 }
 
 impl PictureArgs {
+    /// Files that are read.
+    pub(super) fn inputs(&self) -> impl Iterator<Item = &Path> {
+        self.transport.inputs().chain([self.scene.path()])
+    }
+
     pub(super) fn settings(&self, map: Option<&MapFile>) -> SceneSettings {
         let usual = self.transport.settings(map);
         SceneSettings { part: self.part.map_or(usual.part, Part::from), ..usual }

@@ -127,7 +127,7 @@ pub(super) fn parse_bytes(text: &str) -> Parsed<u64> {
     let units = [("K", 10), ("M", 20), ("G", 30), ("T", 40)];
     let short = text.strip_suffix("iB").unwrap_or(text);
     let (number, bits) = units.iter().find_map(|(name, bits)| Some((short.strip_suffix(name)?, *bits))).unwrap_or((short, 0));
-    let allowed = format!("must be {} MiB or more, as bytes or with K, M, G or T behind the number: 512M, 2G", LEAST_MEMORY >> 20);
+    let allowed = format!("must be from {}M to 900000T, as bytes or with K, M, G or T behind the number: 512M, 2G", LEAST_MEMORY >> 20);
     let bytes = number.trim().parse::<f64>().ok().map(|number| number * (1u64 << bits) as f64);
     bytes.filter(|bytes| (LEAST_MEMORY as f64..1e18).contains(bytes)).map(|bytes| bytes as u64).ok_or(allowed)
 }

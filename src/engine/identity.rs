@@ -42,7 +42,11 @@ impl Identity {
     /// Why a file of `other` does not go with this, if it does not: what differs, and the remedy.
     pub fn differs_from(&self, other: &Identity) -> Option<String> {
         let names = self.settings.keys().chain(other.settings.keys().filter(|name| !self.settings.contains_key(*name)));
-        let value = |identity: &Identity, name: &str| identity.settings.get(name).map_or("nothing".into(), Value::to_string);
+        let value = |identity: &Identity, name: &str| match identity.settings.get(name) {
+            None => "nothing".to_owned(),
+            Some(Value::Null) => "as usual".to_owned(),
+            Some(value) => value.to_string(),
+        };
         for name in names {
             let (own, others) = (value(self, name), value(other, name));
             if own != others {

@@ -309,7 +309,7 @@ impl Watch {
             Some(wanted) => self.seen.map(|seen| self.rounds_wanted(wanted, seen, most)),
             None => Some(most),
         };
-        let by_rounds = by_error.map(|by_error| a_round * (by_error.min(by_photons).min(most) - rounds).max(0.0));
+        let by_rounds = by_error.filter(|_| rounds > 0.0).map(|by_error| a_round * (by_error.min(by_photons).min(most) - rounds).max(0.0));
         let by_time = self.stop.seconds.map(|limit| (limit - seconds).max(0.0));
         Progress {
             done: rounds as u64,

@@ -129,8 +129,10 @@ pub(super) fn choose(instance: &ash::Instance, wanted: Option<&str>) -> Result<F
 
 /// The device of that index, else the one whose name holds `wanted`.
 fn named<'a>(devices: &'a [Found], wanted: &str) -> Result<&'a Found> {
-    let by_index = wanted.parse().ok().and_then(|index: usize| devices.iter().find(|(_, facts)| facts.index == index));
-    let holds = |facts: &DeviceFacts| !wanted.is_empty() && facts.name.to_lowercase().contains(&wanted.to_lowercase());
+    let index: Option<usize> = wanted.parse().ok();
+    let by_index = index.and_then(|index| devices.iter().find(|(_, facts)| facts.index == index));
+    // A number is no part of a name.
+    let holds = |facts: &DeviceFacts| !wanted.is_empty() && index.is_none() && facts.name.to_lowercase().contains(&wanted.to_lowercase());
     let by_name: Vec<&Found> = devices.iter().filter(|(_, facts)| holds(facts)).collect();
     match (by_index, by_name.as_slice()) {
         (Some(device), _) => Ok(device),

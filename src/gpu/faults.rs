@@ -7,12 +7,29 @@ use std::sync::{LazyLock, Mutex, PoisonError};
 
 use ash::vk;
 
+use crate::error::{Error, Result};
+
 /// What the environment asks for; without it, no call looks further.
-static PLANTED: LazyLock<Option<Mutex<Vec<Fault>>>> = LazyLock::new(|| {
-    let text = std::env::var("PHOTONMILL_FAULTS").ok()?;
-    let faults = text.split(',').map(|fault| fault.parse().unwrap_or_else(|()| panic!("PHOTONMILL_FAULTS: cannot be read: {fault}")));
-    Some(Mutex::new(faults.collect()))
-});
+static PLANTED: LazyLock<Option<Mutex<Vec<Fault>>>> =
+    LazyLock::new(|| asked_for().ok().filter(|faults| !faults.is_empty()).map(Mutex::new));
+
+const VARIABLE: &str = "PHOTONMILL_FAULTS";
+
+fn asked_for() -> Result<Vec<Fault>> {
+    let text = std::env::var(VARIABLE).unwrap_or_default();
+    let read = |fault: &str| {
+        fault.parse().map_err(|()| {
+            let allowed = "must be CALL@N=FAULT, or CALL@N+=FAULT from the N-th call on: a Vulkan call, N from 1, and lost, device-memory or host-memory";
+            Error::setting(VARIABLE, fault, allowed)
+        })
+    };
+    text.split(',').filter(|_| !text.is_empty()).map(read).collect()
+}
+
+/// Refuses a list that cannot be read.
+pub(super) fn check() -> Result<()> {
+    asked_for().map(drop)
+}
 
 /// A call of this name fails, at its `at`-th time, or from then on.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -27,7 +44,7 @@ struct Fault {
 impl std::str::FromStr for Fault {
     type Err = ();
 
-    fn from_str(text: &str) -> Result<Fault, ()> {
+    fn from_str(text: &str) -> std::result::Result<Fault, ()> {
         let (call, rest) = text.split_once('@').ok_or(())?;
         let (at, code) = rest.split_once('=').ok_or(())?;
         let code = match code {
@@ -36,7 +53,7 @@ impl std::str::FromStr for Fault {
             "host-memory" => vk::Result::ERROR_OUT_OF_HOST_MEMORY,
             _ => return Err(()),
         };
-        let number = at.trim_end_matches('+').parse().map_err(|_| ())?;
+        let number = at.strip_suffix('+').unwrap_or(at).parse().ok().filter(|number| *number > 0).ok_or(())?;
         Ok(Fault { call: call.to_owned(), at: number, stays: at.ends_with('+'), code, calls: 0 })
     }
 }
@@ -53,7 +70,7 @@ impl Fault {
 }
 
 /// Whether a call, which is about to be made, fails in its place.
-pub(super) fn planted(call: &str) -> Result<(), vk::Result> {
+pub(super) fn planted(call: &str) -> std::result::Result<(), vk::Result> {
     let Some(faults) = PLANTED.as_ref() else { return Ok(()) };
     let mut faults = faults.lock().unwrap_or_else(PoisonError::into_inner);
     // All of them count, whichever strikes.
@@ -73,7 +90,7 @@ mod tests {
         };
         assert_eq!(strikes("a@2=lost"), [false, false, true, false, false]);
         assert_eq!(strikes("a@2+=host-memory"), [false, false, true, true, true]);
-        for text in ["a", "a@=lost", "a@2", "a@2=gone", "a@x=lost"] {
+        for text in ["a", "a@=lost", "a@2", "a@2=gone", "a@x=lost", "a@0=lost", ""] {
             assert!(text.parse::<Fault>().is_err(), "{text}");
         }
     }

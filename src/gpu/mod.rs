@@ -131,6 +131,7 @@ pub const LEAST_MEMORY: u64 = 1 << 20;
 impl Gpu {
     /// Opens a device and runs the start-up check on it.
     pub fn open(options: &Options) -> Result<Gpu> {
+        faults::check()?;
         let (entry, instance, messages) = device::instance(options.validate).map_err(|error| match (error, &options.device) {
             (Error::NoVulkan { reason }, Some(wanted)) => {
                 Error::DeviceAbsent { wanted: wanted.clone(), present: format!("none ({reason})") }

@@ -5,13 +5,14 @@
 
 use std::collections::HashMap;
 use std::fs::File;
-use std::io::Write;
+use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use tempfile::NamedTempFile;
 
 use crate::error::{Error, Result};
+use crate::text::refusal;
 
 /// A file that will be written.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -48,21 +49,29 @@ impl Destination {
         if !folder.is_dir() {
             return Err(destination.refuse(format!("there is no folder {}", folder.display())));
         }
-        check_name(&target).map_err(|error| destination.refuse(error.kind()))?;
-        temporary_in(folder).map_err(|error| destination.refuse(error.kind()))?;
+        check_name(&target).map_err(|error| destination.refuse(refusal(&error)))?;
+        temporary_in(folder).map_err(|error| destination.refuse(refusal(&error)))?;
         Ok(destination)
+    }
+
+    /// The same of a file that is replaced as a whole, piece by piece or again and again: a pipe or a device cannot be.
+    pub fn open_file(option: &'static str, path: &Path) -> Result<Destination> {
+        let destination = Destination::open(option, path)?;
+        let target = destination.target();
+        let is_file = !destination.is_standard_output() && (!target.exists() || target.is_file());
+        if is_file { Ok(destination) } else { Err(destination.refuse("it is no file that could be replaced as a whole; name a file")) }
     }
 
     /// Begins a file that is written piece by piece, and appears once it is whole.
     pub fn stage(&self) -> Result<Staged> {
-        let file = temporary_in(parent(&self.target())).map_err(|error| self.refuse(error.kind()))?;
+        let file = temporary_in(parent(&self.target())).map_err(|error| self.refuse(refusal(&error)))?;
         *STAGED.lock().unwrap_or_else(PoisonError::into_inner) = Some(file.path().to_owned());
         Ok(Staged { destination: self.clone(), file })
     }
 
     /// Why it could not be written.
     pub fn failed(&self, error: &std::io::Error) -> Error {
-        self.refuse(error.kind())
+        self.refuse(refusal(error))
     }
 
     pub fn is_standard_output(&self) -> bool {
@@ -75,6 +84,17 @@ impl Destination {
 
     fn refuse(&self, reason: impl ToString) -> Error {
         Error::Output { option: self.option, path: self.path.clone(), reason: reason.to_string() }
+    }
+
+    /// The same of a file that is in another folder now.
+    fn saved(&self, error: &std::io::Error, folder: PathBuf) -> Error {
+        Error::Saved { option: self.option, path: self.path.clone(), reason: refusal(error), folder }
+    }
+
+    /// Where it stands in a folder that takes what could not be written.
+    fn place_elsewhere(&self) -> PathBuf {
+        let option = if self.option == "-o" { "output" } else { self.option.trim_start_matches('-') };
+        Path::new(option).join(self.path.file_name().unwrap_or_default())
     }
 
     /// The file by the one name that all of its names lead to.
@@ -108,15 +128,20 @@ impl Folder {
         let nearest = path.ancestors().find(|ancestor| ancestor.is_dir()).unwrap_or(Path::new("."));
         // A name that is too long is refused only by the folder that is to hold it, which may not be there yet.
         for name in path.iter().filter(|_| !path.exists()) {
-            check_name(&nearest.join(name)).map_err(|error| refuse(error.kind().to_string()))?;
+            check_name(&nearest.join(name)).map_err(|error| refuse(refusal(&error)))?;
         }
         // Making a folder asks for the same right as making a file.
-        temporary_in(nearest).map_err(|error| refuse(error.kind().to_string()))?;
+        temporary_in(nearest).map_err(|error| refuse(refusal(&error)))?;
         Ok(folder)
     }
 
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// The folder itself, which no file may be.
+    pub fn itself(&self) -> Destination {
+        Destination { option: self.option, path: self.path.clone() }
     }
 
     /// A file in the folder.
@@ -155,7 +180,8 @@ pub fn check_not_read<'a>(destinations: &[Destination], inputs: impl IntoIterato
 pub fn write_synced(destination: &Destination, content: &[u8]) -> Result<()> {
     let mut staged = destination.stage()?;
     staged.file().write_all(content).map_err(|error| destination.failed(&error))?;
-    staged.finish()
+    // Written again and again: what cannot be written now may be later.
+    staged.end(false)
 }
 
 /// A file under another name.
@@ -179,20 +205,37 @@ impl Staged {
         self.file.as_file_mut()
     }
 
-    /// On the disk, and then by its own name.
+    /// On the disk, and then by its own name; where its folder is gone, in another.
     pub fn finish(self) -> Result<()> {
+        self.end(true)
+    }
+
+    fn end(self, saves: bool) -> Result<()> {
         let Staged { destination, file } = self;
         let target = destination.target();
-        let finish = || -> std::io::Result<()> {
-            file.as_file().sync_all()?;
-            file.persist(&target).map_err(|refused| refused.error)?;
+        let finish = || {
+            file.as_file().sync_all().map_err(|error| (error, None))?;
+            file.persist(&target).map_err(|refused| (refused.error, Some(refused.file)))?;
             // The new name too.
-            File::open(parent(&target))?.sync_all()
+            File::open(parent(&target)).and_then(|folder| folder.sync_all()).map_err(|error| (error, None))
         };
-        let finished = finish().map_err(|error| destination.refuse(error.kind()));
+        let finished = finish().map_err(|(error, file)| match file.filter(|_| saves).map(|file| elsewhere(&destination, file)) {
+            Some(Ok(folder)) => destination.saved(&error, folder),
+            _ => destination.refuse(refusal(&error)),
+        });
         STAGED.lock().unwrap_or_else(PoisonError::into_inner).take();
         finished
     }
+}
+
+/// Copies a file that is whole, and whose folder is gone, into a new folder.
+fn elsewhere(destination: &Destination, mut file: NamedTempFile) -> std::io::Result<PathBuf> {
+    let folder = tempfile::Builder::new().prefix("photonmill-").tempdir()?;
+    let path = folder.path().join(destination.place_elsewhere());
+    std::fs::create_dir_all(parent(&path))?;
+    file.seek(SeekFrom::Start(0))?;
+    std::io::copy(file.as_file_mut(), &mut File::create(&path)?)?;
+    Ok(folder.keep())
 }
 
 /// Writes every file, or none: all are there under temporary names before the first gets its own. If one cannot be
@@ -235,14 +278,14 @@ fn write_or_save(files: impl IntoIterator<Item = (Destination, Vec<u8>)>, places
         }
     }
     if let Some((destination, content, error)) = failed {
-        let refused = destination.refuse(error.kind());
+        let refused = destination.refuse(refusal(&error));
         let staged = staged.map(|(destination, file)| (destination, std::fs::read(file.path()).unwrap_or_default()));
         written = Err(save(staged.chain([(destination, content)]).chain(files), places, refused));
     }
     for (destination, content) in streams {
         match std::io::stdout().write_all(&content) {
             // A reader that has gone away, as `head` does, has seen enough.
-            Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => return Err(destination.refuse(error.kind())),
+            Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => return Err(destination.refuse(refusal(&error))),
             _ => {}
         }
     }
@@ -267,8 +310,7 @@ fn save(files: impl Iterator<Item = (Destination, Vec<u8>)>, places: &[PathBuf],
     let mut places = places.iter();
     let mut folder: Option<PathBuf> = None;
     for (destination, content) in files {
-        let option = if destination.option == "-o" { "output" } else { destination.option.trim_start_matches('-') };
-        let name = Path::new(option).join(destination.path.file_name().unwrap_or_default());
+        let name = destination.place_elsewhere();
         let put = |folder: &Path| {
             let path = folder.join(&name);
             std::fs::create_dir_all(parent(&path)).and_then(|()| std::fs::write(&path, &content))
@@ -370,6 +412,20 @@ mod tests {
         assert_eq!(std::fs::read_dir(parent.path()).unwrap().count(), 0);
         write_all(vec![(folder.file("c"), b"d".to_vec())]).unwrap();
         assert_eq!(std::fs::read(folder.path().join("c")).unwrap(), b"d");
+    }
+
+    #[test]
+    fn a_file_whose_folder_goes_away_is_saved_in_another() {
+        let parent = tempfile::tempdir().unwrap();
+        let folder = parent.path().join("a");
+        std::fs::create_dir(&folder).unwrap();
+        let destination = Destination::open_file("-o", &folder.join("photons.pm")).unwrap();
+        let mut staged = destination.stage().unwrap();
+        staged.file().write_all(b"photons").unwrap();
+        std::fs::rename(&folder, parent.path().join("b")).unwrap();
+        let Err(Error::Saved { folder, .. }) = staged.finish() else { panic!("nothing was saved") };
+        assert_eq!(std::fs::read(folder.join("output/photons.pm")).unwrap(), b"photons");
+        std::fs::remove_dir_all(folder).unwrap();
     }
 
     #[test]

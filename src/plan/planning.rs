@@ -57,9 +57,13 @@ impl ScenePlan {
                 return Ok(plan);
             }
             if chunk <= LEAST_CHUNK {
+                // As much as is enough in any case.
+                let boundless = Limits { memory_bytes: u64::MAX, ..*limits };
+                let in_pieces = SceneSettings { chunk: Some(LEAST_CHUNK.min(settings.chunk.unwrap_or(LEAST_CHUNK))), ..settings.clone() };
+                let all = ScenePlan::with_maps_within(scene, geometry, &in_pieces, sensor, limits, &boundless, trial)?.bytes;
                 let needed = format!(
                     "is less than the {} MiB of device memory that the run needs even in small pieces; ask for a smaller picture, or choose another --device",
-                    plan.bytes.div_ceil(1 << 20)
+                    all.max(plan.bytes).div_ceil(1 << 20)
                 );
                 return Err(Error::setting("--memory", format!("{}M", limits.memory_bytes >> 20), needed));
             }

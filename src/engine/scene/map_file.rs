@@ -23,6 +23,7 @@ use crate::photon::MapPhoton;
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::scene::geometry::Geometry;
 use crate::settings::scene::{Illumination, SceneSettings};
+use crate::text::refusal;
 
 /// The first bytes of a file, and the last.
 const MAGIC: &[u8; 16] = b"photonmill map\r\n";
@@ -288,7 +289,7 @@ impl MapFile {
 
     /// Fails with what is wrong with the file.
     fn read(option: &'static str, path: &Path) -> std::result::Result<MapFile, String> {
-        let unreadable = |error: std::io::Error| format!("cannot be read ({}); name a file of photonmill map", error.kind());
+        let unreadable = |error: std::io::Error| format!("cannot be read ({}); name a file of photonmill map", refusal(&error));
         let file = File::open(path).map_err(unreadable)?;
         if !file.metadata().is_ok_and(|facts| facts.is_file()) {
             return Err("is no file; name a file of photonmill map".into());

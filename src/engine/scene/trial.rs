@@ -64,15 +64,22 @@ pub(super) fn photons_wanted(map: &MapPlan, share: f64) -> f64 {
 /// The plan of a run, its default radii and its choice of lights by a trial round.
 pub fn plan(gpu: &Gpu, scene: &Scene, view: &View, settings: &SceneSettings, sensor: Sensor) -> Result<ScenePlan> {
     let limits = engine::limits(gpu.facts());
-    let plan = ScenePlan::new(scene, view.geometry, settings, sensor, &limits)?;
+    let trial = find(gpu, scene, view, settings, sensor)?;
+    ScenePlan::with_trial(scene, view.geometry, settings, sensor, &limits, trial)
+}
+
+/// What a trial finds, where one is needed. The run itself need not fit on the device.
+pub fn find(gpu: &Gpu, scene: &Scene, view: &View, settings: &SceneSettings, sensor: Sensor) -> Result<Option<Trial>> {
+    let limits = engine::limits(gpu.facts());
+    let boundless = Limits { buffer_bytes: u64::MAX, memory_bytes: u64::MAX, ..limits };
+    let plan = ScenePlan::new(scene, view.geometry, settings, sensor, &boundless)?;
     // Whatever part of the picture is asked for, so that all parts have the same photons.
     let chooses_lights = !light_tree::is_one_lamp(view.geometry);
     if plan.maps().all(|map| map.radius_from == RadiusFrom::User) && !chooses_lights && plan.openings().is_empty() {
-        return Ok(plan);
+        return Ok(None);
     }
     let lights = chooses_lights.then(|| LightTree::new(view.geometry));
-    let trial = run(gpu, scene, view, &plan, lights, &limits)?;
-    ScenePlan::with_trial(scene, view.geometry, settings, sensor, &limits, Some(trial))
+    run(gpu, scene, view, &plan, lights, &limits).map(Some)
 }
 
 fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, lights: Option<LightTree>, limits: &Limits) -> Result<Trial> {
