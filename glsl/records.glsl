@@ -607,6 +607,8 @@ struct ViewPush {
     // Distance of the plane in focus along the view.
     float focus;
     uint emitter_count;
+    // Width of a pixel's filter over the distance between pixels.
+    float footprint;
     // Film units in 1 W/m2/sr.
     float film_scale;
     // Largest sum of one pass, film units.

@@ -25,6 +25,11 @@ pub fn echo(typed: impl Display) -> String {
     format!("{}...{}", part(&letters[..MOST_ECHOED - END]), part(&letters[letters.len() - END..]))
 }
 
+/// Text from a file, as it may be printed.
+pub fn one_line(text: &str) -> String {
+    echo(text.replace(|letter: char| letter.is_control(), " "))
+}
+
 /// The first few of some names.
 pub fn some_of(names: impl ExactSizeIterator<Item = impl ToString>) -> String {
     const MOST: usize = 5;
@@ -49,6 +54,11 @@ mod tests {
     #[test]
     fn counts_have_the_right_number() {
         assert_eq!([0, 1, 2, 11].map(|count| counted(count, "round")), ["0 rounds", "1 round", "2 rounds", "11 rounds"]);
+    }
+
+    #[test]
+    fn text_from_files_is_one_line() {
+        assert_eq!(one_line("a\nb\u{1b}[2Jc"), "a b [2Jc");
     }
 
     #[test]

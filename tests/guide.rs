@@ -93,7 +93,8 @@ fn short(arguments: &[&str]) -> Vec<String> {
     // Photons of a file are as many as they are.
     let photons = [("--photons", "500")].into_iter().filter(|_| !arguments.contains(&"--map"));
     let of_run: Vec<_> = photons.chain([("--rounds", if has_blocks { "8" } else { "2" })]).collect();
-    let only_if_there = [("--error", "60%"), ("--samples", "2"), ("--counters", "2")];
+    // There is one device at least.
+    let only_if_there = [("--error", "60%"), ("--samples", "2"), ("--counters", "2"), ("--devices", "0,0")];
     let there: Vec<_> = only_if_there.into_iter().filter(|(option, _)| arguments.contains(option)).collect();
     let more: &[(&str, &str)] = match arguments.first() {
         Some(&"render") => &[("--size", "16x12")],

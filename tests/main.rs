@@ -49,6 +49,7 @@ mod overlap;
 mod packing;
 mod paranoid;
 mod photons;
+mod pilot;
 mod plates;
 mod primitives;
 mod radiosity;

@@ -169,6 +169,7 @@ fn headers_that_contradict_themselves_are_refused() {
         MapFile::open("--map", file.path())
     };
     assert!(with("/scene", "another name".into()).is_ok());
+    assert_eq!(with("/program", "two\nlines".into()).unwrap().header.program, "two lines");
     let cases = [
         ("/format", 2.into(), "is of format 2"),
         ("/rounds/0/0/count", 1.into(), "contradicts itself"),

@@ -22,7 +22,7 @@ void main()
     uint pixel = pixel_in_tiles(place_in_order, push.width, push.height);
     uint number = item % SAMPLES;
     vec4 u = stratified_start(number, pixel, push.draws);
-    vec2 place = vec2(pixel % push.width, pixel / push.width) + 0.5 + filter_offsets(u.xy);
+    vec2 place = vec2(pixel % push.width, pixel / push.width) + 0.5 + push.footprint * filter_offsets(u.xy);
     vec2 picture = vec2(divide(2.0 * place.x, push.width) - 1.0, 1.0 - divide(2.0 * place.y, push.height));
     vec3 origin = push.eye;
     vec3 way = push.forward + picture.x * push.right + picture.y * push.up;

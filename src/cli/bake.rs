@@ -14,6 +14,7 @@ use super::{End, complain, say_beside};
 use crate::bake::pages::{Atlas, MIN_PAGE, Pages};
 use crate::bake::{self, IntoFile, Layout, MAX_SIDE, PHASE_COUNT, TexelEstimate, Written};
 use crate::engine::scene::RunResult;
+use crate::engine::scene::pilot::Free;
 use crate::error::{Error, Result};
 use crate::output::colour::ColourPicture;
 use crate::output::destination::{Folder, check_distinct, write_all};
@@ -110,6 +111,7 @@ pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
         camera: None,
         phases: &phases,
         map: map.as_ref(),
+        free: Free::default(),
         point: "texel",
     };
     let mut gpus = args.device.open(&reporter)?;

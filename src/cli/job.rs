@@ -10,9 +10,10 @@ use super::progress::{ProgressArgs, ProgressReporter};
 use super::stop::{StopArgs, bias_before, check_bias, goals, rounds_after, up_to};
 use super::{complain, device_failed};
 use crate::engine::retry::{run_on, until_done};
-use crate::engine::saved::SavedFilm;
+use crate::engine::saved::{SavedFilm, SavedRun};
 use crate::engine::scene::losses::losses;
 use crate::engine::scene::map_file::MapFile;
+use crate::engine::scene::pilot::Free;
 use crate::engine::scene::{self, RunResult, SceneFilm, View};
 use crate::engine::several_devices::Work;
 use crate::engine::{self, Control};
@@ -51,6 +52,8 @@ pub(super) struct Job<'a> {
     pub(super) phases: &'a [Vec<Receiver>],
     /// Photons that need not be traced.
     pub(super) map: Option<&'a MapFile>,
+    /// What a pilot may choose.
+    pub(super) free: Free,
     /// What results are of: pixel, texel or point.
     pub(super) point: &'static str,
 }
@@ -92,22 +95,23 @@ impl Job<'_> {
     ) -> Result<RunResult> {
         let Job { scene, geometry, sensor, camera, phases, map, point, .. } = *self;
         let is_picture = matches!(sensor, Sensor::Picture { .. });
-        let mut settings = self.settings.in_whole_blocks(is_picture);
+        let view = View { geometry, camera, phases };
+        let wanted = self.divided(&mut gpus[0], &view, keeper.resumed(), reporter)?;
+        let mut settings = wanted.in_whole_blocks(is_picture);
         let block = settings.rounds_per_block(is_picture);
         let of_map = map.map(MapFile::rounds).filter(|most| settings.rounds > *most);
         if let Some(most) = of_map {
             settings.rounds = most - most % block;
         }
         let settings = &settings;
-        if of_map.unwrap_or(self.settings.rounds) != settings.rounds {
-            let wanted = of_map.map_or(format!("--rounds {} is", self.settings.rounds), |most| format!("the {most} rounds of --map are"));
+        if of_map.unwrap_or(wanted.rounds) != settings.rounds {
+            let wanted = of_map.map_or(format!("--rounds {} is", wanted.rounds), |most| format!("the {most} rounds of --map are"));
             reporter.note(&format!("{wanted} taken as {}: whole blocks of {block}", settings.rounds));
         }
         let done = keeper.rounds_done(block);
         if done > settings.rounds {
             complain(&format!("warning: --rounds {} is less than the {done} rounds of --resume, all of which are kept", settings.rounds));
         }
-        let view = View { geometry, camera, phases };
         let plan = until_done(&mut gpus[0], &device_failed, |gpu| scene::trial::plan(gpu, scene, &view, settings, sensor))?;
         let mut plan = map.into_iter().try_fold(plan, |plan, map| map.plan(plan, geometry))?;
         if let Some(warning) = scene_report::radius_warning(&plan, geometry, point) {
@@ -146,6 +150,31 @@ impl Job<'_> {
         };
         reporter.status("writing the results");
         Ok(lit)
+    }
+
+    /// Settings whose work is divided where nobody has set how: as in the run that this one goes on with, or as a pilot finds best.
+    fn divided(&self, gpu: &mut Gpu, view: &View, resumed: Option<&SavedRun>, reporter: &ProgressReporter) -> Result<SceneSettings> {
+        let Job { scene, settings, sensor, free, .. } = *self;
+        if free == Free::default() {
+            return Ok(settings.clone());
+        }
+        if let Some(run) = resumed {
+            let of_run = |name: &str, own: u32, is_free: bool| {
+                let value = run.identity.settings.get(name).and_then(|value| value.as_u64()?.try_into().ok());
+                if is_free { value.unwrap_or(own) } else { own }
+            };
+            let samples = of_run("samples", settings.samples, free.samples);
+            let shadow_rays = of_run("shadow_rays", settings.shadow_rays, free.shadow_rays);
+            return Ok(SceneSettings { samples, shadow_rays, ..settings.clone() });
+        }
+        reporter.status("looking for the best settings");
+        let pilot = until_done(gpu, &device_failed, |gpu| {
+            let plan = scene::trial::plan(gpu, scene, view, settings, sensor)?;
+            scene::pilot::choose(gpu, scene, view, &plan, free)
+        })?;
+        let Some(pilot) = pilot else { return Ok(settings.clone()) };
+        reporter.note(&scene_report::pilot(&pilot, &settings.stop));
+        Ok(scene::pilot::with(settings, pilot.chosen))
     }
 
     /// Runs on all devices, for the first of which the plan was made.

@@ -109,6 +109,11 @@ impl<'a> Keeper<'a> {
         self.resume.as_ref().map_or(0, |(_, run)| run.done.count() * block)
     }
 
+    /// The run that is gone on with.
+    pub(super) fn resumed(&self) -> Option<&SavedRun> {
+        self.resume.as_ref().map(|(_, run)| run)
+    }
+
     pub(super) fn destinations(&self) -> Vec<Destination> {
         self.checkpoint.iter().cloned().collect()
     }

@@ -13,6 +13,7 @@ use super::progress::ProgressReporter;
 use super::scene::{SceneArgs, TransportArgs, geometry};
 use super::{End, complain, say_beside};
 use crate::engine::scene::map_file::MapFile;
+use crate::engine::scene::pilot::Free;
 use crate::engine::scene::{RunResult, Target};
 use crate::error::{Error, Result};
 use crate::output::destination::{Destination, check_distinct, write_all};
@@ -83,6 +84,7 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
         camera: None,
         phases: &phases,
         map: map.as_ref(),
+        free: Free::default(),
         point: "point",
     };
     let mut gpus = args.device.open(&reporter)?;

@@ -10,13 +10,14 @@ use super::job::{Job, MessageArgs};
 use super::keep::Snapshot;
 use super::options::{DevicesOfRunArgs, ReportArgs};
 use super::progress::ProgressReporter;
-use super::scene::{FilterArg, PictureArgs, Subject, ToneArg};
+use super::scene::{FilterArg, PictureArgs, Subject, ToneArg, TransportArgs};
 use super::values::{parse_integer, parse_photon_name, parse_seconds, parse_stops};
 use super::{End, optional_file, say, say_beside};
 use crate::engine;
 use crate::engine::replay::PhotonName;
 use crate::engine::saved::{SavedFilm, SavedRun};
 use crate::engine::scene::map_file::MapFile;
+use crate::engine::scene::pilot::Free;
 use crate::engine::scene::{RunResult, replay};
 use crate::error::{Result, require};
 use crate::output::colour::{Format, Tone};
@@ -51,7 +52,7 @@ pub(super) struct RenderArgs {
     #[command(flatten)]
     picture: PictureArgs,
     /// Camera paths per pixel and round, a power of two. Every path queries the caustic map; where all of them
-    /// end on the first surface, only one queries the global map [default: 1]
+    /// end on the first surface, only one queries the global map [default: 1; with --error or --time what a pilot finds best]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Light transport")]
     samples: Option<u32>,
     /// Reconstruction filter of the pixels [default: box]
@@ -76,6 +77,14 @@ impl RenderArgs {
     pub(super) fn settings(&self, map: Option<&MapFile>) -> SceneSettings {
         let usual = self.picture.settings(map);
         SceneSettings { filter: self.filter.map_or(usual.filter, Filter::from), samples: self.samples.unwrap_or(usual.samples), ..usual }
+    }
+
+    /// What a pilot may choose: what is not set, of a run that ends by its error or its time. Shards must not choose each for itself.
+    fn free(&self) -> Free {
+        let TransportArgs { stop, keep, shadow_rays, .. } = &self.picture.transport;
+        let stop = stop.stop();
+        let is_open = (stop.error.is_some() || stop.seconds.is_some()) && stop.photons.is_none() && keep.shard.is_none();
+        Free { samples: is_open && self.samples.is_none(), shadow_rays: is_open && shadow_rays.is_none() }
     }
 }
 
@@ -127,6 +136,7 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
         camera: Some(camera),
         phases: &[],
         map: map.as_ref(),
+        free: args.free(),
         point: "pixel",
     };
     let mut gpus = args.device.open(&reporter)?;

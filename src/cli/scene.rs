@@ -127,9 +127,9 @@ pub(super) struct TransportArgs {
     /// rounded up to whole blocks [default: 4, less with more --samples]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
     block: Option<u32>,
-    /// Shadow rays per visible point and round [default: 4]
+    /// Shadow rays per visible point and round [default: 4; of a picture with --error or --time what a pilot finds best]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Light transport")]
-    shadow_rays: Option<u32>,
+    pub(super) shadow_rays: Option<u32>,
     /// Final gathering: take indirect light from one ray to the next surface, not from the map at the visible point
     #[arg(long, help_heading = "Light transport")]
     final_gather: bool,

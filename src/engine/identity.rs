@@ -7,6 +7,7 @@ use sha2::{Digest, Sha256};
 
 use crate::gpu::DeviceFacts;
 use crate::settings::Math;
+use crate::text::one_line;
 
 /// By default that of a run that nobody has to know again.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -57,7 +58,7 @@ impl Identity {
             return Some(format!("is of another scene, view or photon map ({})", other.scene));
         }
         if self.device != other.device {
-            let name = |identity: &Identity| identity.device.clone().unwrap_or_default();
+            let name = |identity: &Identity| one_line(&identity.device.clone().unwrap_or_default());
             let remedy = "devices of different makes need --math strict in all parts of a run";
             return Some(format!("is of {}, not of {}; {remedy}", name(other), name(self)));
         }

@@ -13,7 +13,8 @@ use crate::ledger::Fates;
 use crate::plan::differences::difference_count;
 use crate::plan::film::{BiasPlan, FilmPlan};
 use crate::plan::sensor::Sensor;
-use crate::settings::Sums;
+use crate::settings::{MOST_ROUNDS, Sums};
+use crate::text::one_line;
 
 /// A run as far as whole blocks of it are done.
 #[derive(Debug, Clone, PartialEq)]
@@ -253,7 +254,8 @@ impl SavedRun {
         let length = usize::try_from(u64::take(length)).map_err(|_| damaged())?;
         let (header, arrays) = rest.split_at_checked(length).ok_or_else(damaged)?;
         SavedRun::check_format(header)?;
-        let header: Header = serde_json::from_slice(header).map_err(|error| format!("has a header that is not understood ({error})"))?;
+        let header: Header = serde_json::from_slice(header)
+            .map_err(|error| format!("has a header that is not understood ({})", one_line(&error.to_string())))?;
         SavedRun::from_parts(header, arrays)
     }
 
@@ -265,18 +267,22 @@ impl SavedRun {
             return Ok(());
         }
         let own = env!("CARGO_PKG_VERSION");
-        Err(format!("is of format {format} (photonmill {program}), and this is photonmill {own}, which reads format {FORMAT}"))
+        Err(format!("is of format {format} (photonmill {}), and this is photonmill {own}, which reads format {FORMAT}", one_line(program)))
     }
 
     fn from_parts(header: Header, bytes: &[u8]) -> Result<SavedRun, String> {
         let Header { identity, share, wanted, done, sensor, fates, film, rounds, arrays, .. } = header;
         let wrong = |what: &str| Err(format!("contradicts itself: {what}"));
-        if !done.is_valid() || share.of == 0 || share.number >= share.of {
+        // No run has more rounds than this, and a block has one at least.
+        let most = wanted.max(done.end());
+        if !done.is_valid() || share.of == 0 || share.number >= share.of || most > MOST_ROUNDS {
             return wrong("its blocks or its share");
         }
         if !fates.iter().all(|fates| fates.is_sound(MOST_COUNTED)) {
             return wrong("the fates of its photons");
         }
+        // It is printed.
+        let identity = Identity { scene: one_line(&identity.scene), ..identity };
         let mut reader = Reader { list: arrays.iter(), bytes };
         let of_blocks = reader.next_sums("sums", rounds, done.count())?;
         let (numbers, values): (Vec<u32>, Vec<f32>) = (reader.next("kept blocks")?, reader.next("kept values")?);

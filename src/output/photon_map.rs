@@ -133,8 +133,7 @@ pub fn write_ply(map: &MapFile, rounds: u32, names: &[&str], file: &mut File, un
 fn ply_header(header: &Header, rounds: u32, count: u64) -> String {
     let maps: Vec<String> = header.maps.iter().enumerate().map(|(number, map)| format!("{number} {}", map.name)).collect();
     let mut text = String::from("ply\nformat binary_little_endian 1.0\n");
-    let one_line = |text: &str| text.replace(|letter: char| letter.is_control(), " ");
-    writeln!(text, "comment photons of {} by photonmill {}", one_line(&header.scene), one_line(&header.program)).unwrap();
+    writeln!(text, "comment photons of {} by photonmill {}", header.scene, header.program).unwrap();
     writeln!(text, "comment x y z in metres; flux in W of a photon in its round, of {rounds} independent rounds: divide by {rounds}")
         .unwrap();
     writeln!(text, "comment red green blue: the flux over its largest channel; from: unit vector towards where it came from").unwrap();

@@ -9,13 +9,16 @@ use super::report::{Common, common, end_in_words, ending, ledger, losses};
 use crate::constants::MAX_BOUNCES;
 use crate::engine::End;
 use crate::engine::scene::RunResult;
+use crate::engine::scene::pilot::Pilot;
 use crate::ledger::Ledger;
 use crate::plan::evidence::EffectDecision;
 use crate::plan::radius::{RadiusFrom, Trial};
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
+use crate::plan::work_division::Division;
 use crate::scene::geometry::Geometry;
 use crate::settings::scene::{Effect, SceneSettings};
+use crate::settings::stop::Stop;
 use crate::text::counted;
 use crate::timings::Timings;
 
@@ -54,6 +57,22 @@ pub fn rows<'a>(plan: &'a ScenePlan, run: Option<(&Timings, &[u64])>) -> Vec<Eff
             EffectRow { decision, gpu_ms, share }
         })
         .collect()
+}
+
+/// What a pilot has chosen and why, in a line.
+pub fn pilot(pilot: &Pilot, stop: &Stop) -> String {
+    let Pilot { before, chosen, .. } = pilot;
+    let division = |division: &Division| {
+        format!("{} and {}", counted(division.samples, "path") + " per pixel", counted(division.shadow_rays, "shadow ray"))
+    };
+    if chosen == before {
+        return format!("pilot: {} as usual, as nothing else is better", division(chosen));
+    }
+    let end = stop.error.map_or_else(String::new, |error| {
+        let (rounds, nanoseconds) = pilot.until(error);
+        format!("; noise of {} % takes about {rounds:.0} rounds, {:.1} s", 100.0 * error, 1e-9 * nanoseconds)
+    });
+    format!("pilot: {}; the error falls {:.1} times as fast as with {}{end}", division(chosen), pilot.gain(), division(before))
 }
 
 /// The plan as a table.

@@ -15,6 +15,7 @@ pub mod room;
 pub mod room_effects;
 pub mod scene;
 pub mod sensor;
+pub mod work_division;
 
 pub use capacity::{Limits, Persistence, Work};
 pub use room::{EmissionRange, Grid, RoomPlan, photons_of};

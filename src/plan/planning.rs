@@ -145,6 +145,7 @@ impl ScenePlan {
             arrivals,
             chain_steps,
             film,
+            footprint: 1.0,
             work_per_submission: limits.pair_tests_per_submission,
             bytes: 0,
             planned_in: Duration::ZERO,

@@ -112,6 +112,8 @@ pub struct ScenePlan {
     /// Surfaces that one dispatch follows a camera path over.
     pub chain_steps: u32,
     pub film: FilmPlan,
+    /// Width of a pixel's filter over the distance between pixels, which are spread where it is less than 1.
+    pub footprint: f64,
     /// Rays or pair tests after which commands are handed to the device.
     pub work_per_submission: u64,
     /// Bytes of all buffers, with one set of receivers; see [`ScenePlan::bytes_of`].

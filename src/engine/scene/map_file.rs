@@ -23,7 +23,7 @@ use crate::photon::MapPhoton;
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::scene::geometry::Geometry;
 use crate::settings::scene::{Illumination, SceneSettings};
-use crate::text::refusal;
+use crate::text::{one_line, refusal};
 
 /// The first bytes of a file, and the last.
 const MAGIC: &[u8; 16] = b"photonmill map\r\n";
@@ -399,7 +399,12 @@ fn read_header(bytes: &[u8]) -> std::result::Result<Header, String> {
     if header["format"].as_u64() != Some(FORMAT.into()) {
         let (format, program) = (&header["format"], header["program"].as_str().unwrap_or("unknown"));
         let own = env!("CARGO_PKG_VERSION");
+        let program = one_line(program);
         return Err(format!("is of format {format} (photonmill {program}), and this is photonmill {own}, which reads format {FORMAT}"));
     }
-    serde_json::from_value(header).map_err(|error| format!("has a header that is not understood ({error})"))
+    let header: Header = serde_json::from_value(header)
+        .map_err(|error| format!("has a header that is not understood ({})", one_line(&error.to_string())))?;
+    // They are printed.
+    let [program, device, scene] = [&header.program, &header.device, &header.scene].map(|text| one_line(text));
+    Ok(Header { program, device, scene, ..header })
 }

@@ -23,6 +23,7 @@ mod light_trial;
 pub mod losses;
 pub mod map_file;
 mod on_gpu;
+pub mod pilot;
 pub mod points;
 pub mod radius_class;
 pub mod replay;

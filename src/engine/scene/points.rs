@@ -97,6 +97,7 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                     focus: (lens.focus / geometry.unit) as f32,
                     emitter_count,
                     // Each sample has its share of the pixel's light; exact, as their number is a power of two.
+                    footprint: plan.footprint as f32,
                     film_scale: (plan.film.scale / f64::from(plan.samples())) as f32,
                     film_limit: (plan.film.limit / f64::from(plan.samples())) as f32,
                 };
