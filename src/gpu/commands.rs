@@ -356,15 +356,16 @@ impl<'gpu> Commands<'gpu> {
         let submitted = Instant::now();
         let command_buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(self.command_buffer)];
         let submission = [vk::SubmitInfo2::default().command_buffer_infos(&command_buffers)];
-        // SAFETY, here and below: everything recorded is alive; the fence is unsignalled, and waiting for it ends
-        // all use of it and of the command buffer.
         // A driver may end even an endless wait, where it adds it to a clock that somebody sets (lavapipe does).
         let wait = || loop {
+            // SAFETY: the fence is alive.
             match unsafe { device.wait_for_fences(&[self.fence], true, u64::MAX) } {
                 Err(vk::Result::TIMEOUT) => {}
                 ended => break ended,
             }
         };
+        // SAFETY: everything recorded is alive; the fence is unsignalled, and waiting for it ends
+        // all use of it and of the command buffer.
         let run = || unsafe {
             call("vkEndCommandBuffer", || device.end_command_buffer(self.command_buffer))?;
             call("vkQueueSubmit2", || device.queue_submit2(self.gpu.queue, &submission, self.fence))?;

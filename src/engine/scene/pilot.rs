@@ -27,7 +27,7 @@ const ROUNDS: u32 = 16;
 /// Of each map.
 const PHOTONS: u32 = 1 << 12;
 const MANY_SHADOW_RAYS: u32 = 4;
-const SEED: u64 = 0x7069_6c6f_74;
+const SEED: u64 = 0x0070_696c_6f74;
 /// Rounds that a run has at least: its error is looked at first after 16 blocks.
 const LEAST_ROUNDS: f64 = 24.0;
 /// Less is no reason to do otherwise than usual: costs and variances are not known as well.
@@ -96,7 +96,7 @@ pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Fre
     if all <= 0.0 || !all.is_finite() {
         return Ok(None);
     }
-    let cost = cost(plan, &gpu.facts().kind);
+    let cost = cost(plan, gpu.facts().kind);
     let limits = engine::limits(gpu.facts());
     // In pieces no smaller than before.
     let is_possible = |division: Division| {
