@@ -6,6 +6,7 @@ use std::fmt::Write;
 use serde::Serialize;
 
 use crate::constants::MAX_BOUNCES;
+use crate::constants::PART_COUNT;
 use crate::engine::bias::{Bias, BiasFrom};
 use crate::engine::error_bound::{ErrorPlaces, FilmError};
 use crate::engine::nonfinite_values::NonfiniteValues;
@@ -185,15 +186,20 @@ pub(super) fn errors(error: &FilmError, lost: f64, (measure, confidence): (Measu
     text
 }
 
-/// Where the noise sits, as shares of its square.
-fn sits(places: &ErrorPlaces, point: &str) -> String {
+/// Shares of the parts of the light, the largest first.
+pub fn shares(of_parts: [f64; PART_COUNT as usize]) -> String {
     let names = ["direct light", "light over mirrors and glass", "caustics", "indirect light"];
-    let mut parts: Vec<(f64, &str)> = places.of_parts.into_iter().zip(names).filter(|(share, _)| *share >= 0.005).collect();
+    let mut parts: Vec<(f64, &str)> = of_parts.into_iter().zip(names).filter(|(share, _)| *share >= 0.005).collect();
     parts.sort_by(|a, b| b.0.total_cmp(&a.0));
     let parts: Vec<String> = parts.into_iter().map(|(share, name)| format!("{name} {:.0} %", 100.0 * share)).collect();
+    parts.join(", ")
+}
+
+/// Where the noise sits, as shares of its square.
+fn sits(places: &ErrorPlaces, point: &str) -> String {
     format!(
         "        its square sits in {}; {:.0} % of it in the worst {}\n",
-        parts.join(", "),
+        shares(places.of_parts),
         100.0 * places.of_worst_pixels,
         counted(places.worst_pixels, point)
     )

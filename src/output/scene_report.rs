@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
-use super::report::{Common, common, end_in_words, ending, ledger, losses};
+use super::report::{Common, common, end_in_words, ending, ledger, losses, shares};
 use crate::constants::MAX_BOUNCES;
 use crate::engine::End;
 use crate::engine::scene::RunResult;
@@ -63,16 +63,17 @@ pub fn rows<'a>(plan: &'a ScenePlan, run: Option<(&Timings, &[u64])>) -> Vec<Eff
 pub fn pilot(pilot: &Pilot, stop: &Stop) -> String {
     let Pilot { before, chosen, .. } = pilot;
     let division = |division: &Division| {
-        format!("{} and {}", counted(division.samples, "path") + " per pixel", counted(division.shadow_rays, "shadow ray"))
+        format!("{} per pixel and {}", counted(division.samples, "path"), counted(division.shadow_rays, "shadow ray"))
     };
+    let why = format!("a round's squared noise sits in {}", shares(pilot.of_parts));
     if chosen == before {
-        return format!("pilot: {} as usual, as nothing else is better", division(chosen));
+        return format!("pilot: {} as usual, as nothing else is much better; {why}", division(chosen));
     }
     let end = stop.error.map_or_else(String::new, |error| {
         let (rounds, nanoseconds) = pilot.until(error);
         format!("; noise of {} % takes about {rounds:.0} rounds, {:.1} s", 100.0 * error, 1e-9 * nanoseconds)
     });
-    format!("pilot: {}; the error falls {:.1} times as fast as with {}{end}", division(chosen), pilot.gain(), division(before))
+    format!("pilot: {}; the error falls {:.1} times as fast as with {}: {why}{end}", division(chosen), pilot.gain(), division(before))
 }
 
 /// The plan as a table.

@@ -85,3 +85,32 @@ pub fn best(variance: &Terms, cost: &Terms, allowed: impl Fn(Division) -> bool) 
     let product = |division: &Division| variance.variance(*division) * cost.cost(*division);
     all.filter(|division| allowed(*division)).min_by(|a, b| product(a).total_cmp(&product(b)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn variances_are_told_apart_by_the_shadow_rays() {
+        let found = Terms::of_variances(5.0, 2.0, 4);
+        assert_eq!(found, Terms { fixed: 0.0, path: 1.0, shadow_ray: 4.0 });
+        let once = Division { samples: 1, shadow_rays: 1 };
+        assert_eq!((found.variance(once), found.variance(Division { samples: 2, shadow_rays: 4 })), (5.0, 1.0));
+        // Chance may turn them round: then all of it is the paths'.
+        assert_eq!(Terms::of_variances(2.0, 5.0, 4), Terms { fixed: 0.0, path: 2.0, shadow_ray: 0.0 });
+    }
+
+    /// As many samples as make what a round costs in any case and the samples alike, and as many shadow rays as one path's do.
+    #[test]
+    fn the_best_division_balances_costs() {
+        let all = |_: Division| true;
+        let cost = Terms { fixed: 64.0, path: 1.0, shadow_ray: 0.0 };
+        let of_paths = Terms { fixed: 1.0, path: 64.0, shadow_ray: 0.0 };
+        assert_eq!(best(&of_paths, &cost, all), Some(Division { samples: 64, shadow_rays: 1 }));
+        // sqrt(16 / 1 x 1 / 1) shadow rays.
+        let cost = Terms { fixed: 0.0, path: 1.0, shadow_ray: 1.0 };
+        let of_rays = Terms { fixed: 0.0, path: 1.0, shadow_ray: 16.0 };
+        assert_eq!(best(&of_rays, &cost, all), Some(Division { samples: 1, shadow_rays: 4 }));
+        assert_eq!(best(&of_paths, &cost, |division| division.samples == 3), None);
+    }
+}

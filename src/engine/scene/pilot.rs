@@ -4,8 +4,6 @@
 //! Its pixels are spread over the picture and as small as the picture's own. They tell how much each part of the light varies from path to
 //! path, from shadow ray to shadow ray, and with the photons.
 
-use std::time::Instant;
-
 use super::{View, light};
 use crate::constants::PART_COUNT;
 use crate::engine;
@@ -50,7 +48,6 @@ pub struct Pilot {
     pub cost: Terms,
     /// Shares of the squared noise before, of direct light, light over mirrors and glass, caustics and indirect light.
     pub of_parts: [f64; PART_COUNT as usize],
-    pub seconds: f64,
 }
 
 impl Pilot {
@@ -69,7 +66,7 @@ impl Pilot {
 
 /// Chooses samples and shadow rays of a picture for which there is a plan. `None` where nothing is to be chosen, or nothing varies.
 pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Free) -> Result<Option<Pilot>> {
-    let (began, settings) = (Instant::now(), &plan.settings);
+    let settings = &plan.settings;
     let is_picture = matches!(plan.sensor, Sensor::Picture { .. });
     if !is_picture || !(free.samples || free.shadow_rays) {
         return Ok(None);
@@ -124,7 +121,7 @@ pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Fre
         }
         if chosen == before || is_possible(chosen) {
             let of_parts = [direct.variance(before), specular.variance(before), maps[0], maps[1]].map(|part| part / all);
-            return Ok(Some(Pilot { before, chosen, variance, cost, of_parts, seconds: began.elapsed().as_secs_f64() }));
+            return Ok(Some(Pilot { before, chosen, variance, cost, of_parts }));
         }
         // More than the device's buffers hold.
         most_samples = chosen.samples / 2;
