@@ -247,7 +247,7 @@ fn no_dispatch_takes_long() {
 /// Of a run chosen to be slow, whose gathers take many times as long as `most` together.
 fn slowest_dispatch(gpu: &Gpu, most: Duration) -> (String, Duration) {
     let is_cpu = gpu.facts().kind == "cpu";
-    let photons = if is_cpu { 40_000 } else { 10_000_000 };
+    let photons = if is_cpu { 60_000 } else { 10_000_000 };
     let wide = SceneSettings { photons, caustic_photons: 2000, rounds: 3, radius: Some(0.4), ..settings() };
     let size = if is_cpu { 64 } else { 512 };
     let of = scene("cornell-spheres");
