@@ -26,8 +26,8 @@ const ROUNDS: u32 = 16;
 const PHOTONS: u32 = 1 << 12;
 const MANY_SHADOW_RAYS: u32 = 4;
 const SEED: u64 = 0x0070_696c_6f74;
-/// Rounds that a run has at least: its error is looked at first after 16 blocks.
-const LEAST_ROUNDS: f64 = 24.0;
+/// Blocks that a run has at least: its error is looked at first after so many.
+const LEAST_BLOCKS: u32 = 16;
 /// Less is no reason to do otherwise than usual: costs and variances are not known as well.
 const LEAST_GAIN: f64 = 1.2;
 
@@ -59,7 +59,7 @@ impl Pilot {
 
     /// Rounds after which the noise is so large, and their nanoseconds.
     pub fn until(&self, noise: f64) -> (f64, f64) {
-        let rounds = (self.variance.variance(self.chosen) / (noise * noise)).max(LEAST_ROUNDS);
+        let rounds = (self.variance.variance(self.chosen) / (noise * noise)).max(least_rounds(self.chosen));
         (rounds, rounds * self.cost.cost(self.chosen))
     }
 }
@@ -106,8 +106,8 @@ pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Fre
         let Division { samples, shadow_rays } = division;
         let is_free = (free.samples || samples == before.samples) && (free.shadow_rays || shadow_rays == before.shadow_rays);
         // A run of fewer rounds would not know its error.
-        let is_needed = settings.stop.error.is_none_or(|error| variance.variance(division) >= LEAST_ROUNDS * error * error);
-        let is_in_time = settings.stop.seconds.is_none_or(|seconds| LEAST_ROUNDS * cost.cost(division) <= 1e9 * seconds);
+        let is_needed = settings.stop.error.is_none_or(|error| variance.variance(division) >= least_rounds(division) * error * error);
+        let is_in_time = settings.stop.seconds.is_none_or(|seconds| least_rounds(division) * cost.cost(division) <= 1e9 * seconds);
         is_free && (is_needed && is_in_time || samples == 1 && shadow_rays <= before.shadow_rays)
     };
     let product = |division| variance.variance(division) * cost.cost(division);
@@ -126,6 +126,11 @@ pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Fre
         // More than the device's buffers hold.
         most_samples = chosen.samples / 2;
     }
+}
+
+/// Rounds of so many blocks.
+fn least_rounds(division: Division) -> f64 {
+    f64::from(LEAST_BLOCKS * (SAMPLES_PER_BLOCK / division.samples).max(1))
 }
 
 pub fn with(settings: &SceneSettings, division: Division) -> SceneSettings {
