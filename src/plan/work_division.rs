@@ -55,8 +55,8 @@ struct Costs {
     map: f64,
 }
 
-/// Measured in `cornell-spheres`, 512 x 512, 1 to 16 samples and shadow rays, on an NVIDIA H100, and on lavapipe with two cores, November
-/// 2026; between the two guessed.
+/// Of a GPU measured in `cornell-spheres`, 512 x 512, 1 to 16 samples and shadow rays, on an NVIDIA H100; of a CPU only the photons, on lavapipe
+/// with two cores (November 2026). The rest is estimated.
 fn costs(kind: &str) -> Costs {
     match kind {
         "cpu" => Costs { path: 2000.0, shadow_ray: 700.0, photon: 2200.0, round: 1e6, map: 2e6 },
