@@ -578,8 +578,20 @@ struct TryLightsPush {
     uint ray_count;
 };
 
+// How rounds divide their work.
+struct WorkDivision {
+    // Paths from the eye through a pixel in a round, a power of two. Each looks caustics up, and what it sees in mirrors or
+    // glass; of a surface that is seen straight, the first one looks up the global map and gathers for all.
+    uint samples;
+    // Rays towards lights from a visible point, each to a light of its own choice, where any are cast.
+    uint shadow_rays;
+    // Rounds of a block, a power of two: samples of a place are even over all of them together, and no block knows of another.
+    uint rounds_per_block;
+};
+
 struct GoOnPush {
     Draws draws;
+    WorkDivision work;
     uint path_count;
     uint pixel_count;
     uint emitter_count;
@@ -590,6 +602,7 @@ struct GoOnPush {
 
 struct ViewPush {
     Draws draws;
+    WorkDivision work;
     // Hash of the seed and the round that decides what is rounded up.
     uint rounding;
     uint width;
@@ -617,6 +630,7 @@ struct ViewPush {
 
 struct ReceivePush {
     Draws draws;
+    WorkDivision work;
     // Hash of the seed and the round that decides what is rounded up.
     uint rounding;
     uint first_point;
@@ -707,6 +721,8 @@ struct DiscCutsPush {
 };
 
 struct FluxToRadiancePush {
+    // Paths through a pixel.
+    uint samples;
     uint first_point;
     uint end_point;
     uint point_count;
@@ -737,6 +753,8 @@ struct EndDifferencePush {
 };
 
 struct ResolvePush {
+    // Paths through a pixel.
+    uint samples;
     uint first_pixel;
     uint end_pixel;
     uint pixel_count;

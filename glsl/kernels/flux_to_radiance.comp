@@ -145,7 +145,7 @@ void main()
         } else if (is_new) {
             note_hit(pixel, kind);
         }
-        float for_all = !is_caustic && (point.arrivals & SEEN_FOR_ALL) != 0 ? float(SAMPLES) : 1.0;
+        float for_all = !is_caustic && (point.arrivals & SEEN_FOR_ALL) != 0 ? float(push.samples) : 1.0;
         float area = is_caustic ? 0.0 : global_area;
         float widest = is_caustic ? push.caustic_radius : push.global_radius;
         if (area == 0.0) {

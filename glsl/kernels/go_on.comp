@@ -17,8 +17,9 @@ void main()
         return;
     }
     CameraPath path = camera_paths[item];
-    uint index = path.place / SAMPLES;
-    uint number = path.place % SAMPLES;
+    work = push.work;
+    uint index = path.place / work.samples;
+    uint number = path.place % work.samples;
     uint depth = path.state >> 8;
     start_chain(path.position, path.direction, path.weight, vec2(0.0));
     chain.saw_specular = (path.state & 1u) != 0;

@@ -22,6 +22,7 @@ void main()
     if (index >= push.end_point) {
         return;
     }
+    work = push.work;
     Receiver receiver = receivers[index];
     vec3 ng = receiver.normal;
     vec3 ns = receiver.shading_normal;
@@ -32,7 +33,7 @@ void main()
         chain.media = media_at(position);
         here.media = chain.media;
     }
-    if (SHADOW_RAYS != 0) {
+    if (HAS_SHADOW_RAYS) {
         add_light(direct_light(here, push.emitter_count, push.draws, index, 0, RECEIVER_BLOCK));
         note_shadow_rays(index, vec3(1.0));
     }

@@ -35,16 +35,16 @@ void main()
     for (uint channel = 0; channel < 3; channel++) {
         uint place = 3 * pixel + channel;
         uvec2 sum = uvec2(0);
-        for (uint number = 0; number < SAMPLES; number++) {
-            sum = add64(sum, pass_sums[place_of_sums(SAMPLES * pixel + number) + channel]);
+        for (uint number = 0; number < push.samples; number++) {
+            sum = add64(sum, pass_sums[place_of_sums(push.samples * pixel + number) + channel]);
         }
         for (uint k = 0; k < push.points_per_pixel; k++) {
             sum = add64(sum, estimates[3 * (k * push.pixel_count + pixel) + channel]);
         }
         uvec2 surface = sum;
         if (HAS_SEEN_LIGHT) {
-            for (uint number = 0; number < SAMPLES; number++) {
-                sum = add64(sum, pass_sums[place_of_sums(SAMPLES * pixel + number) + 3 + channel]);
+            for (uint number = 0; number < push.samples; number++) {
+                sum = add64(sum, pass_sums[place_of_sums(push.samples * pixel + number) + 3 + channel]);
             }
             surface = add64(surface_sums_of_block[place], surface);
             surface_sums_of_block[place] = ends_block ? uvec2(0) : surface;

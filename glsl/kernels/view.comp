@@ -14,13 +14,14 @@ layout(push_constant, scalar) uniform Push { ViewPush push; };
 
 void main()
 {
+    work = push.work;
     uint item = invocation_index();
-    uint place_in_order = push.first_pixel + item / SAMPLES;
+    uint place_in_order = push.first_pixel + item / work.samples;
     if (place_in_order >= push.end_pixel) {
         return;
     }
     uint pixel = pixel_in_tiles(place_in_order, push.width, push.height);
-    uint number = item % SAMPLES;
+    uint number = item % work.samples;
     vec4 u = stratified_start(number, pixel, push.draws);
     vec2 place = vec2(pixel % push.width, pixel / push.width) + 0.5 + push.footprint * filter_offsets(u.xy);
     vec2 picture = vec2(divide(2.0 * place.x, push.width) - 1.0, 1.0 - divide(2.0 * place.y, push.height));
@@ -43,11 +44,11 @@ void main()
         chain.media = media_at(origin);
     }
     if (follow(pixel, number, push.width * push.height, push.draws, push.emitter_count, 0)) {
-        put_off(SAMPLES * pixel + number, CHAIN_STEPS);
+        put_off(work.samples * pixel + number, CHAIN_STEPS);
     }
     note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), NONFINITE_LIGHT, push.draws.domain,
                 push.draws.round, pixel);
     note_surface(chain.met_surface);
-    write_pass_sum(SAMPLES * pixel + number, pixel, push.width * push.height, chain.light, chain.seen, push.film_scale, push.film_limit, push.rounding, false);
+    write_pass_sum(work.samples * pixel + number, pixel, push.width * push.height, chain.light, chain.seen, push.film_scale, push.film_limit, push.rounding, false);
     write_missing_points(pixel, number, push.width * push.height);
 }

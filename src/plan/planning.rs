@@ -106,8 +106,8 @@ impl ScenePlan {
         // A software device counts loop iterations.
         let chain_steps = if limits.loop_iterations > LOOP_LIMIT { MAX_BOUNCES } else { SEGMENT_BOUNCES };
         let mut constants = constants(geometry, &settings, &facts, &maps, &keeps);
-        constants.extend([("SAMPLES", samples), ("GATHER_RAYS", gather_rays), ("CHAIN_STEPS", chain_steps)]);
-        constants.extend([("ROUNDS_PER_BLOCK", settings.rounds_per_block(is_picture)), ("HAS_SEEN_LIGHT", u32::from(is_picture))]);
+        constants.extend([("GATHER_RAYS", gather_rays), ("CHAIN_STEPS", chain_steps)]);
+        constants.push(("HAS_SEEN_LIGHT", u32::from(is_picture)));
         let clusters = trial.as_ref().and_then(|trial| trial.lights.as_ref()).map_or(0, |lights| lights.clusters);
         constants.push(("LIGHT_CLUSTERS", clusters));
         let Maps { global, caustic, caustic_surfaces, targets, arrivals } = maps;
@@ -274,7 +274,6 @@ fn constants(
 ) -> Vec<(&'static str, u32)> {
     let flag = |effect: Effect| u32::from(keeps(effect));
     let split = settings.illumination == Illumination::Split;
-    let shadow_rays = if split && keeps(Effect::Direct) { settings.shadow_rays } else { 0 };
     vec![
         ("HAS_BVH", flag(Effect::Bvh)),
         ("HAS_OVERLAPS", u32::from(geometry.triangles.iter().any(|triangle| triangle.plane >= HIDDEN))),
@@ -312,7 +311,7 @@ fn constants(
         ("HAS_SKY_PICTURE", u32::from(keeps(Effect::Environment) && geometry.has_sky_picture())),
         ("PARANOID", u32::from(settings.paranoid)),
         ("STRICT_MATH", settings.math as u32),
-        ("SHADOW_RAYS", shadow_rays),
+        ("HAS_SHADOW_RAYS", u32::from(split && keeps(Effect::Direct))),
         ("KERNEL", settings.kernel as u32),
         ("HAS_EDGE_CORRECTION", u32::from(settings.edge_correction)),
         ("HAS_CAUSTIC_MAP", u32::from(maps.caustic.is_some())),

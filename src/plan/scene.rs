@@ -253,12 +253,22 @@ impl ScenePlan {
 
     /// Rays of one pixel, roughly.
     pub fn rays_per_pixel(&self) -> u32 {
-        self.points_per_pixel * (1 + self.constant("SHADOW_RAYS"))
+        self.points_per_pixel * (1 + self.shadow_rays())
     }
 
     /// Paths from the camera through a pixel, or from a receiver, in a round.
     pub fn samples(&self) -> u32 {
-        self.constant("SAMPLES")
+        self.film.samples
+    }
+
+    /// Rays towards lights from a visible point; none where the maps hold direct light too.
+    pub fn shadow_rays(&self) -> u32 {
+        self.constant("HAS_SHADOW_RAYS") * self.settings.shadow_rays
+    }
+
+    /// The same as the kernels take it.
+    pub fn work(&self) -> WorkDivision {
+        WorkDivision { samples: self.samples(), shadow_rays: self.shadow_rays(), rounds_per_block: self.film.rounds_per_block }
     }
 
     pub fn constant(&self, name: &str) -> u32 {

@@ -70,7 +70,7 @@ pub fn cost(plan: &ScenePlan, kind: &str) -> Terms {
     let Costs { path, shadow_ray, photon, round, map } = costs(kind);
     let pixels = f64::from(plan.sensor.pixels());
     let maps: f64 = plan.maps().map(|of| map + photon * f64::from(of.photons)).sum();
-    let rays = if plan.constant("SHADOW_RAYS") == 0 { 0.0 } else { shadow_ray };
+    let rays = if plan.shadow_rays() == 0 { 0.0 } else { shadow_ray };
     Terms { fixed: round + maps, path: pixels * path, shadow_ray: pixels * rays }
 }
 

@@ -98,7 +98,7 @@ uint arrivals_wanted(bool gathers)
 {
     uint wanted = 0;
     uint first = ARRIVED_DIRECT;
-    if (SHADOW_RAYS != 0) {
+    if (HAS_SHADOW_RAYS) {
         first = ARRIVED_CAUSTIC;
     }
     uint last = gathers ? ARRIVED_CAUSTIC : ARRIVED_INDIRECT;
@@ -114,7 +114,7 @@ void add_emission(vec3 radiance, float light_density)
     float share = 1.0;
     if (HAS_LAYERS) {
         if (chain.density > 0.0) {
-            share = divide(chain.density, chain.density + float(SHADOW_RAYS) * light_density);
+            share = divide(chain.density, chain.density + float(work.shadow_rays) * light_density);
         }
     }
     add_shining(share * radiance);
@@ -197,7 +197,7 @@ bool leave_point(Surface surface, Lobes lobes, vec3 wo, vec3 scale, bool for_all
                               : SEEN | (chain.saw_specular ? SEEN_OVER_SPECULAR : 0) | (chain.gathers ? SEEN_BY_GATHER : 0)
                                     | (for_all ? SEEN_FOR_ALL : 0);
     uint place = place_of_point(chain.point_count++, index, number, pixel_count);
-    visible_points[place] = VisiblePoint(surface.position, surface.plane, divide(chain.weight * scale, float(SAMPLES)),
+    visible_points[place] = VisiblePoint(surface.position, surface.plane, divide(chain.weight * scale, float(work.samples)),
                                          surface.ns == surface.ng ? NONE : pack_normal(surface.ns), pack_direction(wo, 0), surface.parameter,
                                          surface.kind, arrivals);
     if (HAS_LAYERS) {
@@ -274,7 +274,7 @@ bool follow(uint index, uint number, uint pixel_count, Draws draws, uint emitter
         vec3 scale = is_layered ? vec3(1.0) : surface.base_colour * scatter_scale(surface.kind, surface.parameter);
         bool wants_direct = (PARTS & part_of(ARRIVED_DIRECT)) != 0;
         bool asks_lights = false;
-        if (SHADOW_RAYS != 0) {
+        if (HAS_SHADOW_RAYS) {
             asks_lights = is_layered || (!specular && wants_direct);
         }
         if (is_layered) {
@@ -300,7 +300,7 @@ bool follow(uint index, uint number, uint pixel_count, Draws draws, uint emitter
                 chain.from = surface.position;
                 chain.from_normal = surface.ns;
             }
-            note_shadow_rays(index, divide(chain.weight * scale, float(SAMPLES)));
+            note_shadow_rays(index, divide(chain.weight * scale, float(work.samples)));
         }
         // Matt lobes are followed no further but for a gather.
         if (is_layered && !specular && matt == 0.0) {
@@ -315,7 +315,7 @@ bool follow(uint index, uint number, uint pixel_count, Draws draws, uint emitter
             if (leave_point(surface, lobes, wo, scale, for_all, index, number, pixel_count)) {
                 chain.gathers = true;
                 chain.density = 0.0;
-                chain.weight *= for_all ? float(SAMPLES) : 1.0;
+                chain.weight *= for_all ? float(work.samples) : 1.0;
                 // Shadow rays and the caustic map have counted what shines from here on.
                 chain.sees_emission = false;
             } else if (asks_lights && is_layered && seeks_light()) {
@@ -332,10 +332,9 @@ bool follow(uint index, uint number, uint pixel_count, Draws draws, uint emitter
         if (ends) {
             return false;
         }
-        uint count = SAMPLES * ROUNDS_PER_BLOCK; // build.rs cannot reflect a constant that is compared with `>=`
         vec3 u = stratified_at(number, index, block, draws).zxy;
         float mirror_chance = 0.0;
-        if (count >= MIRROR_SAMPLES && specular && depth < 2 && !chain.gathers) {
+        if (work.samples * work.rounds_per_block >= MIRROR_SAMPLES && specular && depth < 2 && !chain.gathers) {
             mirror_chance = MIRROR_CHANCES[depth];
             u.x = chain.choices[depth];
         }

@@ -103,7 +103,7 @@ ShadowRay cast_shadow_ray(Target point, Arriving arriving, Draws draws, uint ind
     uint media = point.media;
     if (largest(arriving.radiance) > 0.0) {
         if (is_layered) {
-            LobeLight light = weigh_light(point.surface, point.lobes, point.wo, arriving.wi, float(SHADOW_RAYS) * arriving.density, point.asks_lobes);
+            LobeLight light = weigh_light(point.surface, point.lobes, point.wo, arriving.wi, float(work.shadow_rays) * arriving.density, point.asks_lobes);
             ray.light = arriving.radiance * light.matt;
             ray.sharp_light = arriving.radiance * light.sharp;
             ray.is_asked = largest(ray.light) > 0.0 || largest(ray.sharp_light) > 0.0;
@@ -159,9 +159,9 @@ vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uin
         return sum;
     }
     uvec4 words = words_of(index, block, draws);
-    number = number_in_block(number, SAMPLES, draws);
-    uint sample_count = SAMPLES * ROUNDS_PER_BLOCK;
-    uint ray_count = SHADOW_RAYS;
+    number = number_in_block(number, work.samples, draws);
+    uint sample_count = work.samples * work.rounds_per_block;
+    uint ray_count = work.shadow_rays;
     uint unseen_row = 0;
     if (LIGHT_CLUSTERS != 0) {
         unseen_row = row_of_shares(point.position, point.ng, false);
@@ -169,19 +169,19 @@ vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uin
         ray_count += uint(asks_unseen);
     }
     for (uint ray = 0; ray < ray_count; ray++) {
-        vec3 u = stratified(number * SHADOW_RAYS + ray, sample_count * SHADOW_RAYS, words);
+        vec3 u = stratified(number * work.shadow_rays + ray, sample_count * work.shadow_rays, words);
         Emitter light;
         float by_power = 0.0;
         float count = 1.0;
         if (LIGHT_CLUSTERS != 0) {
             uint row = unseen_row - LIGHT_CLUSTERS;
-            if (ray == SHADOW_RAYS) {
+            if (ray == work.shadow_rays) {
                 row = unseen_row;
                 u = stratified(number, sample_count, uvec4(mix32(words.x), mix32(words.y), mix32(words.z), mix32(words.w)));
                 // For the samples that cast none.
-                count = float(SAMPLES_PER_UNSEEN * SHADOW_RAYS);
+                count = float(SAMPLES_PER_UNSEEN * work.shadow_rays);
             }
-            ChosenLight chosen = choose_light(row, point.position, u.z, mix32(words.w + (number * (SHADOW_RAYS + 1) + ray)));
+            ChosenLight chosen = choose_light(row, point.position, u.z, mix32(words.w + (number * (work.shadow_rays + 1) + ray)));
             light = emitters[chosen.emitter];
             by_power = light.probability;
             light.probability = chosen.probability;
@@ -196,7 +196,7 @@ vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uin
         }
         ShadowRay found = cast_shadow_ray(point, arriving, draws, index);
         if (found.is_asked) {
-            bool is_unseen = ray == SHADOW_RAYS || arriving.is_beside;
+            bool is_unseen = ray == work.shadow_rays || arriving.is_beside;
             if (!found.is_hidden) {
                 sum += count * found.light;
                 sharp_light += count * found.sharp_light;
@@ -204,12 +204,12 @@ vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uin
                 unseen_light_arrived = unseen_light_arrived || is_unseen;
             } else {
                 bool is_certain = light.kind == EMITTER_POINT || light.kind == EMITTER_SPOT || light.kind == EMITTER_DIRECTIONAL;
-                vec3 stopped = is_certain ? vec3(0.0) : divide(count * (found.light + found.sharp_light), float(SHADOW_RAYS));
+                vec3 stopped = is_certain ? vec3(0.0) : divide(count * (found.light + found.sharp_light), float(work.shadow_rays));
                 stopped_light = max(stopped_light, stopped);
                 stopped_unseen_light = is_unseen ? max(stopped_unseen_light, stopped) : stopped_unseen_light;
             }
         }
     }
-    sharp_light = divide(sharp_light, float(SHADOW_RAYS));
-    return divide(sum, float(SHADOW_RAYS));
+    sharp_light = divide(sharp_light, float(work.shadow_rays));
+    return divide(sum, float(work.shadow_rays));
 }

@@ -45,14 +45,8 @@ layout(constant_id = 19) const bool HAS_DISC_LIGHTS = true;
 layout(constant_id = 20) const bool HAS_ENVIRONMENT = true;
 // The environment is a picture.
 layout(constant_id = 70) const bool HAS_SKY_PICTURE = false;
-// Rays towards lights from a visible point, each to a light of its own choice; 0 where the photon maps
-// hold direct light too.
-layout(constant_id = 21) const uint SHADOW_RAYS = 1;
-// Paths from the eye through a pixel in a round, a power of two. Each looks caustics up, and what it sees in mirrors or
-// glass; of a surface that is seen straight, the first one looks up the global map and gathers for all.
-layout(constant_id = 41) const uint SAMPLES = 1;
-// Rounds of a block, a power of two: samples of a place are even over all of them together, and no block knows of another.
-layout(constant_id = 71) const uint ROUNDS_PER_BLOCK = 1;
+// Visible points send rays towards lights; not where the photon maps hold direct light too.
+layout(constant_id = 21) const bool HAS_SHADOW_RAYS = true;
 // The eye may meet what shines by itself: of a picture.
 layout(constant_id = 72) const bool HAS_SEEN_LIGHT = false;
 // Whether photons are also counted within a smaller radius, which tells the bias (film/differences.glsl).

@@ -119,6 +119,7 @@ pub fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u32; 2])
     let (width, height) = plan.sensor.size();
     in_pieces(commands, plan, plan.visible_points(), plan.pixels_at_once(4), 256, |commands, first_point, end_point| {
         let push = FluxToRadiancePush {
+            samples: plan.samples(),
             first_point,
             end_point,
             point_count: plan.visible_points(),
@@ -163,7 +164,15 @@ pub fn resolve(commands: &mut Commands, round: Round, ends_block: bool) -> Resul
     let block = round.number / plan.film.rounds_per_block;
     let work = u64::from(plan.samples() + points_per_pixel);
     in_pieces(commands, plan, pixel_count, plan.pixels_at_once(1), work, |commands, first_pixel, end_pixel| {
-        let push = ResolvePush { first_pixel, end_pixel, pixel_count, points_per_pixel, block, ends_block: u32::from(ends_block) };
+        let push = ResolvePush {
+            samples: plan.samples(),
+            first_pixel,
+            end_pixel,
+            pixel_count,
+            points_per_pixel,
+            block,
+            ends_block: u32::from(ends_block),
+        };
         let kernel = Resolve {
             pass_sums,
             estimates,

@@ -50,7 +50,7 @@ fn content(view: &View, plan: &ScenePlan, map: Option<&str>) -> Hash {
 fn found(plan: &ScenePlan) -> Hash {
     let mut hash = Hash::default();
     let constants: Vec<_> = plan.constants.iter().filter(|(name, _)| !WITHOUT_EFFECT.contains(name)).collect();
-    hash.add_text(&format!("{constants:?} {:?} {:?} {:?}", plan.film.scale, plan.film.limit, plan.film.rounds_per_block));
+    hash.add_text(&format!("{constants:?} {:?} {:?} {:?}", plan.work(), plan.film.scale, plan.film.limit));
     for MapPlan { name, photons, bounces, stored, radius, classes, flux_gain, flux_scale, through_openings, .. } in plan.maps() {
         hash.add_text(&format!(
             "{name} {photons} {bounces} {stored} {radius:?} {classes:?} {flux_gain:?} {flux_scale:?} {through_openings}"

@@ -71,7 +71,7 @@ pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Fre
     if !is_picture || !(free.samples || free.shadow_rays) {
         return Ok(None);
     }
-    let casts_shadow_rays = free.shadow_rays && plan.constant("SHADOW_RAYS") != 0;
+    let casts_shadow_rays = free.shadow_rays && plan.shadow_rays() != 0;
     let many = if free.shadow_rays { MANY_SHADOW_RAYS } else { settings.shadow_rays };
     let of_many = parts(gpu, scene, view, plan, many)?;
     let of_one = if casts_shadow_rays { parts(gpu, scene, view, plan, 1)? } else { of_many };

@@ -83,6 +83,7 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                 let half_width = half_height * f64::from(width) / f64::from(height);
                 let push = ViewPush {
                     draws: draws(DOMAIN_CAMERA),
+                    work: plan.work(),
                     rounding: rounding(plan, round),
                     width,
                     height,
@@ -109,6 +110,7 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                 let radius = plan.maps().map(|map| plan.radius(map, round)).fold(f64::INFINITY, f64::min);
                 let push = ReceivePush {
                     draws: draws(DOMAIN_RECEIVERS),
+                    work: plan.work(),
                     rounding: rounding(plan, round),
                     first_point: first,
                     end_point: end,
@@ -141,6 +143,7 @@ fn go_on(commands: &mut Commands, resources: &SceneResources, geometry: &Geometr
         commands.fill(camera_path_counts, 0, 1, 0);
         let push = GoOnPush {
             draws: Draws { seed: words(plan.settings.seed), round, domain },
+            work: plan.work(),
             path_count,
             pixel_count: plan.sensor.pixels(),
             emitter_count: geometry.emitters.len() as u32,

@@ -168,7 +168,7 @@ impl Model<'_> {
         let samples = pixels * f64::from(self.plan.samples());
         let points = f64::from(self.plan.visible_points());
         let sums = 24.0 * points * f64::from(self.plan.arrival_sets) + 8.0 * self.plan.near_sums() as f64;
-        let shadow_rays = f64::from(self.plan.constant("SHADOW_RAYS"));
+        let shadow_rays = f64::from(self.plan.shadow_rays());
         let (item, items, cost) = match pass {
             "visible points" => {
                 let cost = Cost {
