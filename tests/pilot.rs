@@ -1,12 +1,14 @@
-//! A pilot's choice of samples and shadow rays: what it expects of a round is what rounds are like, and it chooses the same twice.
+//! A pilot's choice: what it expects of a round is what rounds are like, and it chooses the same twice.
 
 use crate::common::prelude::*;
-use photonmill::engine::scene::pilot::{self, Free, Pilot};
+use photonmill::engine::scene::pilot::{self, Pilot};
 use photonmill::engine::scene::{View, light, trial};
+use photonmill::plan::work_division::{Division, Free};
 use photonmill::settings::stop::Stop;
 
 const SIZE: u32 = 32;
-const ALL: Free = Free { samples: true, shadow_rays: true };
+const ALL: Free = Free { samples: true, shadow_rays: true, photons: true, caustic_photons: true, neighbours: true };
+const NONE: Free = Free { samples: false, shadow_rays: false, photons: false, caustic_photons: false, neighbours: false };
 
 struct Subject {
     scene: Scene,
@@ -34,7 +36,7 @@ impl Subject {
     fn variance(&self, gpu: &Gpu, settings: &SceneSettings) -> f64 {
         let camera = self.scene.first_camera();
         let view = self.view(&camera);
-        let settings = SceneSettings { rounds: 64, alpha: 1.0, seed: 5, ..settings.clone() };
+        let settings = SceneSettings { rounds: 64, alpha: 1.0, seed: 5, stop: Stop::default(), ..settings.clone() };
         let plan = trial::plan(gpu, &self.scene, &view, &settings, square_picture(SIZE)).unwrap();
         let lit = light(gpu, &view, plan, &mut Control::default()).unwrap();
         let noise = lit.film.relative_error();
@@ -44,7 +46,8 @@ impl Subject {
 
 /// Few photons, which a software device traces in time.
 fn few() -> SceneSettings {
-    SceneSettings { photons: 1 << 13, caustic_photons: 1 << 13, ..SceneSettings::default() }
+    let stop = Stop { error: Some(0.05), ..Stop::default() };
+    SceneSettings { photons: 1 << 13, caustic_photons: 1 << 13, stop, ..SceneSettings::default() }
 }
 
 /// Within a factor: rare light is met by chance, and even samples vary less the more there are.
@@ -53,17 +56,17 @@ fn rounds_vary_as_the_pilot_expects() {
     let Some(gpu) = device() else { return };
     for name in ["cornell", "cornell-spheres"] {
         let subject = Subject::new(name);
-        let found = subject.chosen(&gpu, &few(), ALL).unwrap();
-        let products = [found.before, found.chosen].map(|division| {
-            let measured = subject.variance(&gpu, &pilot::with(&few(), division));
-            let expected = found.variance.variance(division);
-            println!("{name}: {division:?}: {expected:.4} expected, {measured:.4} found");
+        let found = subject.chosen(&gpu, &few(), Free { photons: false, caustic_photons: false, ..ALL }).unwrap();
+        for division in [found.before, found.chosen] {
+            let measured = subject.variance(&gpu, &division.set(&few()));
+            let variance = &found.rounds.variance;
+            let of_paths = (variance.path + variance.shadow_ray / f64::from(division.shadow_rays)) / f64::from(division.samples);
+            let of_maps = variance.global.of_first_round(division.photons, division.neighbours)
+                + variance.caustic.of_first_round(division.caustic_photons, division.neighbours);
+            let expected = of_paths + of_maps;
+            println!("{name}: {division:?}: {of_paths:.4} + {of_maps:.4} expected, {measured:.4} found");
             assert!((0.3..4.0).contains(&(expected / measured)), "{name}, {division:?}: {expected} of {measured}");
-            measured * found.cost.cost(division)
-        });
-        let gain = products[0] / products[1];
-        println!("{name}: {:?}, {:?}; a gain of {:.2} expected, {gain:.2} found", found.variance, found.of_parts, found.gain());
-        assert!(found.gain() >= 1.0 && gain >= 0.9, "{name}: {products:?}");
+        }
     }
 }
 
@@ -72,21 +75,24 @@ fn rounds_vary_as_the_pilot_expects() {
 fn what_is_set_stays_and_the_rest_is_chosen_alike_each_time() {
     let Some(gpu) = device() else { return };
     let subject = Subject::new("cornell-spheres");
-    let found = subject.chosen(&gpu, &few(), ALL).unwrap();
-    assert!(found.chosen.samples >= 4 && found.gain() > 2.0, "{found:?}");
-    let again = subject.chosen(&gpu, &SceneSettings { seed: 77, ..few() }, ALL).unwrap();
-    assert_eq!((found.chosen, found.variance), (again.chosen, again.variance));
-    let of_rays = subject.chosen(&gpu, &few(), Free { samples: false, shadow_rays: true }).unwrap();
-    assert_eq!(of_rays.chosen.samples, 1);
-    let of_samples = subject.chosen(&gpu, &few(), Free { samples: true, shadow_rays: false }).unwrap();
-    assert_eq!(of_samples.chosen.shadow_rays, 4);
-    assert_eq!(subject.chosen(&gpu, &few(), Free::default()), None);
-    // A large error needs few rounds, and little time leaves few.
     let goal = |error, seconds| SceneSettings { stop: Stop { error, seconds, ..Stop::default() }, ..few() };
+    let fine = goal(Some(0.01), None);
+    let found = subject.chosen(&gpu, &fine, ALL).unwrap();
+    assert!(found.chosen.samples >= 4 && found.gain(&fine.stop) > 1.5, "{found:?}");
+    let again = subject.chosen(&gpu, &SceneSettings { seed: 77, ..fine.clone() }, ALL).unwrap();
+    assert_eq!((found.chosen, found.rounds), (again.chosen, again.rounds));
+    let of_rays = subject.chosen(&gpu, &fine, Free { shadow_rays: true, ..NONE }).unwrap();
+    assert_eq!(of_rays.chosen, Division { shadow_rays: of_rays.chosen.shadow_rays, ..of_rays.before });
+    let three = SceneSettings { shadow_rays: 3, ..fine.clone() };
+    let of_others = subject.chosen(&gpu, &three, Free { shadow_rays: false, ..ALL }).unwrap();
+    assert!(of_others.chosen.shadow_rays == 3 && of_others.chosen.samples >= 4, "{of_others:?}");
+    assert_eq!(subject.chosen(&gpu, &fine, NONE), None);
+    // A small error takes more of it.
     let coarse = subject.chosen(&gpu, &goal(Some(0.3), None), ALL).unwrap();
-    assert!(coarse.chosen.samples < found.chosen.samples && coarse.until(0.3).0 >= 16.0, "{coarse:?}");
+    let [rough, good] = [(&coarse, 0.3), (&found, 0.01)].map(|(pilot, error)| pilot.rounds.until(pilot.chosen, error));
+    assert!(rough.0 >= 16.0 && rough.1 < 0.1 * good.1, "{rough:?} {good:?}");
     let short = subject.chosen(&gpu, &goal(None, Some(1e-3)), ALL).unwrap();
-    assert_eq!(short.chosen.samples, 1, "{short:?}");
+    assert!(short.rounds.cost(short.chosen) < 0.1 * short.rounds.cost(short.before), "{short:?}");
 }
 
 /// The program takes what a pilot finds where an error ends the run and nothing is set, and goes on with it.
@@ -94,17 +100,21 @@ fn what_is_set_stays_and_the_rest_is_chosen_alike_each_time() {
 fn the_program_has_a_pilot_where_an_error_ends_the_run() {
     let Some(_) = device() else { return };
     let place = Place::new();
-    let line = "render cornell-spheres --size 16x16 --photons 2000 --caustic-photons 2000";
+    let line = "render cornell-spheres --size 16x16";
     let (_, stderr) = place.succeed(&format!("{line} --error 20% -o a.exr --json a.json --checkpoint a.pms"));
     let settings = place.json("a.json")["settings"].clone();
-    let [samples, shadow_rays] = ["samples", "shadow_rays"].map(|name| settings[name].as_u64().unwrap());
-    assert!(samples > 1 && stderr.contains(&format!("pilot: {samples} paths per pixel and {shadow_rays} shadow ray")), "{stderr}");
+    let names = ["samples", "shadow_rays", "photons", "caustic_photons", "neighbours"];
+    let values = names.map(|name| settings[name].as_u64().unwrap());
+    assert!(values[2] < 131_072 && stderr.contains(&format!("pilot: {} path", values[0])), "{stderr}");
     // By hand it is the same run.
-    place.succeed(&format!("{line} --error 20% -o b.exr --samples {samples} --shadow-rays {shadow_rays} -q"));
+    let [samples, shadow_rays, photons, caustic_photons, neighbours] = values;
+    place.succeed(&format!(
+        "{line} --error 20% -o b.exr --samples {samples} --shadow-rays {shadow_rays} --photons {photons} --caustic-photons {caustic_photons} --neighbours {neighbours} -q"
+    ));
     assert!(std::fs::read(place.at("a.exr")).unwrap() == std::fs::read(place.at("b.exr")).unwrap());
     // And it goes on without a pilot.
     let (_, stderr) = place.succeed(&format!("{line} --error 19% -o c.exr --json c.json --resume a.pms"));
-    assert!(!stderr.contains("pilot: ") && place.json("c.json")["settings"]["samples"] == settings["samples"], "{stderr}");
-    let (_, stderr) = place.succeed(&format!("{line} --rounds 4 -o d.exr"));
+    assert!(!stderr.contains("pilot: ") && names.iter().all(|name| place.json("c.json")["settings"][name] == settings[name]), "{stderr}");
+    let (_, stderr) = place.succeed(&format!("{line} --rounds 4 --photons 2000 -o d.exr"));
     assert!(!stderr.contains("pilot: "), "{stderr}");
 }

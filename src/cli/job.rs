@@ -13,7 +13,6 @@ use crate::engine::retry::{run_on, until_done};
 use crate::engine::saved::{SavedFilm, SavedRun};
 use crate::engine::scene::losses::losses;
 use crate::engine::scene::map_file::MapFile;
-use crate::engine::scene::pilot::Free;
 use crate::engine::scene::{self, RunResult, SceneFilm, View};
 use crate::engine::several_devices::Work;
 use crate::engine::{self, Control};
@@ -25,6 +24,7 @@ use crate::plan::film::BiasPlan;
 use crate::plan::radius::mean_squared_radius;
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
+use crate::plan::work_division::{Division, Free};
 use crate::records::Receiver;
 use crate::scene::geometry::Geometry;
 use crate::scene::{Camera, Scene};
@@ -163,9 +163,14 @@ impl Job<'_> {
                 let value = run.identity.settings.get(name).and_then(|value| value.as_u64()?.try_into().ok());
                 if is_free { value.unwrap_or(own) } else { own }
             };
-            let samples = of_run("samples", settings.samples, free.samples);
-            let shadow_rays = of_run("shadow_rays", settings.shadow_rays, free.shadow_rays);
-            return Ok(SceneSettings { samples, shadow_rays, ..settings.clone() });
+            let division = Division {
+                samples: of_run("samples", settings.samples, free.samples),
+                shadow_rays: of_run("shadow_rays", settings.shadow_rays, free.shadow_rays),
+                photons: of_run("photons", settings.photons, free.photons),
+                caustic_photons: of_run("caustic_photons", settings.caustic_photons, free.caustic_photons),
+                neighbours: of_run("neighbours", settings.neighbours, free.neighbours),
+            };
+            return Ok(division.set(settings));
         }
         reporter.status("looking for the best settings");
         let pilot = until_done(gpu, &device_failed, |gpu| {
@@ -174,7 +179,7 @@ impl Job<'_> {
         })?;
         let Some(pilot) = pilot else { return Ok(settings.clone()) };
         reporter.note(&scene_report::pilot(&pilot, &settings.stop));
-        Ok(scene::pilot::with(settings, pilot.chosen))
+        Ok(pilot.chosen.set(settings))
     }
 
     /// Runs on all devices, for the first of which the plan was made.

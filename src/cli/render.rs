@@ -10,14 +10,13 @@ use super::job::{Job, MessageArgs};
 use super::keep::Snapshot;
 use super::options::{DevicesOfRunArgs, ReportArgs};
 use super::progress::ProgressReporter;
-use super::scene::{FilterArg, PictureArgs, Subject, ToneArg, TransportArgs};
+use super::scene::{FilterArg, MOST_ROUNDS, PictureArgs, Subject, ToneArg};
 use super::values::{parse_integer, parse_photon_name, parse_seconds, parse_stops};
 use super::{End, optional_file, say, say_beside};
 use crate::engine;
 use crate::engine::replay::PhotonName;
 use crate::engine::saved::{SavedFilm, SavedRun};
 use crate::engine::scene::map_file::MapFile;
-use crate::engine::scene::pilot::Free;
 use crate::engine::scene::{RunResult, replay};
 use crate::error::{Result, require};
 use crate::output::colour::{Format, Tone};
@@ -25,6 +24,7 @@ use crate::output::destination::{Destination, check_distinct, write_all};
 use crate::output::scene_report;
 use crate::output::show::Show;
 use crate::plan::scene::ScenePlan;
+use crate::plan::work_division::Free;
 use crate::scene::{Camera, Scene};
 use crate::settings::scene::{Filter, Part, SceneSettings};
 use crate::verify::judge::{Judge, Verdict};
@@ -52,7 +52,7 @@ pub(super) struct RenderArgs {
     #[command(flatten)]
     picture: PictureArgs,
     /// Camera paths per pixel and round, a power of two. Every path queries the caustic map; where all of them
-    /// end on the first surface, only one queries the global map [default: 1; with --error or --time what a pilot finds best]
+    /// end on the first surface, only one queries the global map [default: 1; what a pilot finds best of a run that ends at an error or a time]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Light transport")]
     samples: Option<u32>,
     /// Reconstruction filter of the pixels [default: box]
@@ -79,21 +79,37 @@ impl RenderArgs {
         SceneSettings { filter: self.filter.map_or(usual.filter, Filter::from), samples: self.samples.unwrap_or(usual.samples), ..usual }
     }
 
-    /// What a pilot may choose: what is not set, of a run that ends by its error or its time. Shards must not choose each for itself.
+    /// What a pilot may choose: what is not set, of a run that ends by its error or its time.
     fn free(&self) -> Free {
-        let TransportArgs { stop, keep, shadow_rays, .. } = &self.picture.transport;
-        let stop = stop.stop();
-        let is_open = (stop.error.is_some() || stop.seconds.is_some()) && stop.photons.is_none() && keep.shard.is_none();
-        Free { samples: is_open && self.samples.is_none(), shadow_rays: is_open && shadow_rays.is_none() }
+        let free = self.picture.transport.free();
+        Free { samples: free.samples && self.samples.is_none(), ..free }
     }
 }
 
+/// When a picture is good enough to be shown, where nothing says when it ends, and after how many seconds it ends in any case on a class of
+/// devices.
+const GOOD_ERROR: f64 = 0.02;
+fn longest_seconds(kind: &str) -> f64 {
+    match kind {
+        "cpu" => 45.0,
+        "discrete" => 1.0,
+        _ => 10.0,
+    }
+}
+/// Between two pictures of such a run.
+const SNAPSHOT_SECONDS: f64 = 5.0;
+
 pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     let map = args.picture.transport.map()?;
-    let settings = args.settings(map.as_ref());
+    let mut settings = args.settings(map.as_ref());
     settings.validate()?;
     if let Some(name) = args.replay {
         return show_photon(args, &settings, name);
+    }
+    let has_no_end = args.picture.transport.has_no_end();
+    if has_no_end {
+        settings.stop.error = Some(GOOD_ERROR);
+        settings.rounds = MOST_ROUNDS;
     }
     let output = args.output.as_ref();
     let format = output.map(|output| Format::of("-o", output)).transpose()?;
@@ -128,6 +144,10 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     let reporter = ProgressReporter::new(&args.messages.progress);
     let subject = args.picture.open(&settings, &reporter)?;
     let Subject { scene, camera, width, height, geometry } = &subject;
+    let mut gpus = args.device.open(&reporter)?;
+    if has_no_end {
+        settings.stop.seconds = Some(longest_seconds(gpus[0].facts().kind));
+    }
     let job = Job {
         scene,
         geometry,
@@ -139,14 +159,13 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
         free: args.free(),
         point: "pixel",
     };
-    let mut gpus = args.device.open(&reporter)?;
     let size = (*width, *height);
     let show = Show { size, exposure: args.exposure, tone: args.tone.map_or(Tone::default(), Tone::from) };
     let mut snapshot = |run: &SavedRun| match (&run.film, &picture, format) {
         (SavedFilm::Scene(film), Some(picture), Some(format)) => write_all([(picture.clone(), show.picture(film, format).0)]),
         _ => Ok(()),
     };
-    if let Some(seconds) = args.snapshot {
+    if let Some(seconds) = args.snapshot.or(has_no_end.then_some(SNAPSHOT_SECONDS)) {
         require((0.001..=1e6).contains(&seconds), "--snapshot", seconds, "must be from 1ms to 1000000s")?;
         keeper.set_snapshot(Some(Snapshot { every: Duration::from_secs_f64(seconds), write: &mut snapshot }));
     }

@@ -17,6 +17,7 @@ use crate::engine::scene::map_file::MapFile;
 use crate::error::{Error, Result, require};
 use crate::output::colour::Tone;
 use crate::plan::sensor::Sensor;
+use crate::plan::work_division::Free;
 use crate::scene::daylight;
 use crate::scene::geometry::Geometry;
 use crate::scene::light::{Light, LightKind};
@@ -83,12 +84,12 @@ fn parse_environment(text: &str) -> std::result::Result<EnvironmentArg, String> 
 /// Which photons are traced, through what.
 #[derive(Args)]
 pub(super) struct PhotonArgs {
-    /// Photons of the global map, per round [default: 131072]
+    /// Photons of the global map, per round [default: 131072; what a pilot finds best of a picture that ends at an error or a time]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
-    photons: Option<u32>,
-    /// Photons of the caustic map, per round [default: the same as --photons]
+    pub(super) photons: Option<u32>,
+    /// Photons of the caustic map, per round [default: the same as --photons; what a pilot finds best]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
-    caustic_photons: Option<u32>,
+    pub(super) caustic_photons: Option<u32>,
     /// Cut photons off after this many bounces [default: none; Russian roulette ends paths]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
     bounces: Option<u32>,
@@ -115,30 +116,33 @@ pub(super) struct TransportArgs {
     pub(super) keep: KeepArgs,
 
     #[command(flatten)]
-    light: PhotonArgs,
+    pub(super) light: PhotonArgs,
     /// Take the photons from a file of `photonmill map` instead of tracing them: the same light for another camera, radius or kernel
     #[arg(long, value_name = "FILE", help_heading = "Photons", conflicts_with_all = ["photons", "caustic_photons", "bounces", "aim", "illumination"])]
     map: Option<PathBuf>,
-    /// Number of independent rounds, of which the result is the mean [default: 16; with --error or --time up to 65536, with
-    /// --total-photons as many as needed]
+    /// Number of independent rounds, of which the result is the mean [default: as many as the goals take, up to 65536;
+    /// 16 of points, texels and shards without a goal]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
     rounds: Option<u32>,
     /// Rounds of a block, a power of two. Samples are even over a block, and errors come from the spread of blocks; --rounds is
     /// rounded up to whole blocks [default: 4, less with more --samples]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
     block: Option<u32>,
-    /// Shadow rays per visible point and round [default: 4; of a picture with --error or --time what a pilot finds best]
+    /// Shadow rays per visible point and round [default: 4; what a pilot finds best of a picture that ends at an error or a time]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Light transport")]
     pub(super) shadow_rays: Option<u32>,
     /// Final gathering: take indirect light from one ray to the next surface, not from the map at the visible point
     #[arg(long, help_heading = "Light transport")]
     final_gather: bool,
 
-    /// Radius of the density estimate of the global map in the first round, metres [default: from a trial round,
-    /// so that about 24 photons of a round lie within it at the median pixel, texel or point]
+    /// Photons of a round that the first radius of the global map is to hold at the median pixel, texel or point, as a trial finds it; of
+    /// the caustic map a quarter of them [default: 24; what a pilot finds best of a picture that ends at an error or a time]
+    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Density estimate")]
+    neighbours: Option<u32>,
+    /// Radius of the density estimate of the global map in the first round, metres [default: what holds --neighbours]
     #[arg(long, value_name = "METRES", value_parser = parse_number::<f64>, allow_hyphen_values = true, help_heading = "Density estimate")]
     radius: Option<f64>,
-    /// The same for the caustic map [default: from the same trial round, for about 6 photons]
+    /// The same for the caustic map [default: what holds a quarter of them]
     #[arg(long, value_name = "METRES", value_parser = parse_number::<f64>, allow_hyphen_values = true, help_heading = "Density estimate")]
     caustic_radius: Option<f64>,
     /// How the radius shrinks from round to round, as alpha of Knaus and Zwicker (2011): above 0 and at most 1, which keeps the
@@ -240,7 +244,7 @@ const MOST_FOCUS: f64 = 1e12;
 const MOST_RADIANCE: f32 = 1e30;
 
 /// Most rounds of a run with a stop criterion other than --total-photons.
-const MOST_ROUNDS: u32 = 65_536;
+pub(super) const MOST_ROUNDS: u32 = 65_536;
 
 /// Most rounds of a run with a stop criterion, if there is one; `photons` are those of the smaller map per round.
 fn most_rounds(stop: &Stop, photons: u32) -> Option<u32> {
@@ -375,6 +379,26 @@ impl TransportArgs {
         Ok(Some(map))
     }
 
+    /// What a pilot may choose of a run of a picture that ends at a goal; shards must not choose each for itself.
+    pub(super) fn free(&self) -> Free {
+        if self.rounds.is_some() || self.stop.counts_photons() || self.keep.shard.is_some() {
+            return Free::default();
+        }
+        let traces = self.map.is_none();
+        Free {
+            samples: true,
+            shadow_rays: self.shadow_rays.is_none(),
+            photons: traces && self.light.photons.is_none(),
+            caustic_photons: traces && self.light.caustic_photons.is_none(),
+            neighbours: self.neighbours.is_none() && self.radius.is_none() && self.caustic_radius.is_none(),
+        }
+    }
+
+    /// Whether nothing says when a run ends.
+    pub(super) fn has_no_end(&self) -> bool {
+        !self.stop.stop().is_set() && self.rounds.is_none() && self.map.is_none() && self.keep.shard.is_none()
+    }
+
     pub(super) fn settings(&self, map: Option<&MapFile>) -> SceneSettings {
         let usual = self.light.settings(&self.common);
         let usual = map.map_or_else(|| usual.clone(), |map| map.settings(&usual));
@@ -387,6 +411,7 @@ impl TransportArgs {
             block: self.block.or(usual.block),
             rounds: self.rounds.unwrap_or_else(most),
             stop,
+            neighbours: self.neighbours.unwrap_or(usual.neighbours),
             radius: self.radius,
             caustic_radius: self.caustic_radius,
             alpha: if self.fixed_radius { 1.0 } else { self.alpha.unwrap_or(usual.alpha) },

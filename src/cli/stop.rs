@@ -24,7 +24,7 @@ pub(super) struct StopArgs {
     /// Confidence level of the error bound [default: 95%]
     #[arg(long, value_name = "PERCENT", value_parser = parse_percent, allow_hyphen_values = true)]
     confidence: Option<f64>,
-    /// Stop after this time: 2s, 500ms, 3m
+    /// Stop after rounds of this time: 2s, 500ms, 3m. Start-up and a pilot come on top
     #[arg(long, value_name = "TIME", value_parser = parse_seconds, allow_hyphen_values = true)]
     time: Option<f64>,
     /// Stop once this many photons have been traced, summed over all rounds and maps
@@ -55,6 +55,11 @@ impl StopArgs {
             return Err(Error::setting("--total-photons", photons, only_merged));
         }
         require(!self.bias, "--shard", shard, "cannot be measured with --bias; leave --bias out")
+    }
+
+    /// Whether photons end the run, whatever its error.
+    pub(super) fn counts_photons(&self) -> bool {
+        self.total_photons.is_some()
     }
 
     pub(super) fn stop(&self) -> Stop {

@@ -256,7 +256,7 @@ impl<'a> RunState<'a> {
     fn new(task: Task<'a>, recorder: &impl Recorder, control: &mut Control) -> Result<RunState<'a>> {
         let share = control.keep.share;
         let mut state = RunState {
-            watch: Watch::new(task.stop, task.alpha, task.rounds_per_block, recorder.started()),
+            watch: Watch::new(task.stop, task.alpha, task.rounds_per_block, Instant::now()),
             fates_of_blocks: task.fates.clone(),
             fates_of_rest: task.fates.clone(),
             open: vec![0; task.fates.len()],

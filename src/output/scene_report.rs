@@ -15,7 +15,6 @@ use crate::plan::evidence::EffectDecision;
 use crate::plan::radius::{RadiusFrom, Trial};
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
-use crate::plan::work_division::Division;
 use crate::scene::geometry::Geometry;
 use crate::settings::scene::{Effect, SceneSettings};
 use crate::settings::stop::Stop;
@@ -59,21 +58,52 @@ pub fn rows<'a>(plan: &'a ScenePlan, run: Option<(&Timings, &[u64])>) -> Vec<Eff
         .collect()
 }
 
-/// What a pilot has chosen and why, in a line.
+/// What a pilot has chosen and why, and what errors will take, in a line.
 pub fn pilot(pilot: &Pilot, stop: &Stop) -> String {
-    let Pilot { before, chosen, .. } = pilot;
-    let division = |division: &Division| {
-        format!("{} per pixel and {}", counted(division.samples, "path"), counted(division.shadow_rays, "shadow ray"))
+    let Pilot { before, chosen, rounds, .. } = pilot;
+    let maps = [(rounds.variance.global, chosen.photons, "global"), (rounds.variance.caustic, chosen.caustic_photons, "caustic")];
+    let photons: Vec<String> =
+        maps.iter().filter(|(map, ..)| map.photons > 0).map(|(_, photons, name)| counted(*photons, &format!("{name} photon"))).collect();
+    let maps = match photons.is_empty() {
+        true => String::new(),
+        false => format!(", {} ({} within the first radius)", photons.join(" and "), chosen.neighbours),
     };
-    let why = format!("a round's squared noise sits in {}", shares(pilot.of_parts));
-    if chosen == before {
-        return format!("pilot: {} as usual, as nothing else is much better; {why}", division(chosen));
+    let paths = format!("{} per pixel and {}", counted(chosen.samples, "path"), counted(chosen.shadow_rays, "shadow ray"));
+    let against = match chosen == before {
+        true => " as usual, as nothing else is much better".to_owned(),
+        false => format!(", {:.1} times as fast as the usual settings", pilot.gain(stop)),
+    };
+    let why = shares(pilot.of_parts);
+    format!("pilot: {paths}{maps} a round{against}, as the noise sits in {why}; {}", expected(pilot, stop))
+}
+
+/// Seconds until the error that is wanted, and until half of it; or the error after the time that there is.
+fn expected(pilot: &Pilot, stop: &Stop) -> String {
+    let Pilot { chosen, rounds, .. } = pilot;
+    let until = |error: f64| 1e-9 * rounds.until(*chosen, error).1;
+    match (stop.error, stop.seconds) {
+        (Some(error), most) if most.is_none_or(|most| until(error) <= most) => {
+            let half = 0.5 * error;
+            format!("{} % takes about {}, {} % {}", percent(error), seconds(until(error)), percent(half), seconds(until(half)))
+        }
+        (_, Some(most)) => format!("about {} % after {}", percent(rounds.after(*chosen, most)), seconds(most)),
+        _ => String::new(),
     }
-    let end = stop.error.map_or_else(String::new, |error| {
-        let (rounds, nanoseconds) = pilot.until(error);
-        format!("; noise of {} % takes about {rounds:.0} rounds, {:.1} s", 100.0 * error, 1e-9 * nanoseconds)
-    });
-    format!("pilot: {}; the error falls {:.1} times as fast as with {}: {why}{end}", division(chosen), pilot.gain(), division(before))
+}
+
+/// Two digits.
+fn percent(error: f64) -> String {
+    let percent = 100.0 * error;
+    if percent < 10.0 { format!("{}", (percent * 100.0).round() / 100.0) } else { format!("{percent:.0}") }
+}
+
+fn seconds(seconds: f64) -> String {
+    match seconds {
+        ..10.0 => format!("{seconds:.1} s"),
+        ..120.0 => format!("{seconds:.0} s"),
+        ..7200.0 => format!("{:.0} min", seconds / 60.0),
+        _ => format!("{:.0} h", seconds / 3600.0),
+    }
 }
 
 /// The plan as a table.

@@ -84,7 +84,8 @@ fn map(
     } else {
         ("global", DOMAIN_PHOTONS, settings.photons, ("--radius", settings.radius))
     };
-    let FirstRadius { radius, from, expected, classes } = FirstRadius::new(geometry, photons, caustic_only, radius, trial)?;
+    let FirstRadius { radius, from, expected, classes } =
+        FirstRadius::new(geometry, (photons, settings.neighbours), caustic_only, radius, trial)?;
     // Photons of a round land once at every bounce at most; a caustic's only once.
     let landings = if caustic_only { 1 } else { u64::from(settings.bounces.min(SEGMENT_BOUNCES)) };
     let chunk_photons = chunk_photons(photons, landings, settings, limits)?;
@@ -115,6 +116,8 @@ fn map(
         radius_from: from,
         classes,
         expected,
+        // A caustic has edges: half the radius.
+        neighbours: f64::from(settings.neighbours) * if caustic_only { 0.25 } else { 1.0 },
         lanes: capacity::lanes_of(expected / FOUND_BY_LANE, limits),
         target_count: 0,
         through_openings,

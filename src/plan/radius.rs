@@ -14,6 +14,7 @@ use crate::photon::MapPhoton;
 use crate::records::CausticTarget;
 use crate::rng::mix32;
 use crate::scene::geometry::Geometry;
+use crate::settings::scene::NEIGHBOURS;
 
 /// Where the radius of a map's first round comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -81,7 +82,7 @@ pub const RADIUS_RANGE: (f64, f64) = (1.0 / (1 << LEAST_RADIUS_BITS) as f64, 2.0
 const MOST_DOUBLINGS: u32 = 3;
 /// Largest radius that is taken by default, relative to the scene's normalised extent.
 pub const MAX_DEFAULT_RADIUS: f64 = 0.125;
-/// Photons within the first radius of the global map, on average.
+/// Photons within the first radius of the global map that goes by the area, on average, with so many neighbours.
 const PHOTONS_PER_ESTIMATE: f64 = 60.0;
 /// A caustic's photons lie closer: its radius over that of as many photons spread over everything.
 const CAUSTIC_RADIUS_SHARE: f64 = 0.25;
@@ -123,7 +124,7 @@ impl FirstRadius {
     /// What `option` asks for in metres, or a trial round found, or the scene's area tells.
     pub(super) fn new(
         geometry: &Geometry,
-        photons: u32,
+        (photons, neighbours): (u32, u32),
         caustic_only: bool,
         (option, asked): (&'static str, Option<f64>),
         trial: Option<&Trial>,
@@ -134,12 +135,13 @@ impl FirstRadius {
             PHOTONS_PER_ESTIMATE * (radius / usual).powi(2)
         };
         let Some(metres) = asked else {
-            let of_area = area_radius(geometry, photons, caustic_only);
+            let of_area = area_radius(geometry, photons, neighbours, caustic_only);
+            let expected = PHOTONS_PER_ESTIMATE * f64::from(neighbours) / f64::from(NEIGHBOURS);
             return Ok(match tried {
                 Some(tried) => {
                     let radius = tried * trial.and_then(|trial| trial.factor).unwrap_or(1.0);
                     let classes = Some(Classes::around(tried, of_area));
-                    FirstRadius { radius, from: RadiusFrom::Trial, expected: PHOTONS_PER_ESTIMATE, classes }
+                    FirstRadius { radius, from: RadiusFrom::Trial, expected, classes }
                 }
                 None => FirstRadius { radius: of_area, from: RadiusFrom::Area, expected: by_area(of_area), classes: None },
             });
@@ -161,8 +163,9 @@ pub fn usual_radius(geometry: &Geometry, photons: f64) -> f64 {
 }
 
 /// Radius of a map's first round, normalised, where nothing but the scene's area is known.
-pub fn area_radius(geometry: &Geometry, photons: u32, caustic_only: bool) -> f64 {
-    (usual_radius(geometry, f64::from(photons)) * share(caustic_only)).clamp(RADIUS_RANGE.0, MAX_DEFAULT_RADIUS)
+pub fn area_radius(geometry: &Geometry, photons: u32, neighbours: u32, caustic_only: bool) -> f64 {
+    let as_usual = f64::from(photons) * f64::from(NEIGHBOURS) / f64::from(neighbours);
+    (usual_radius(geometry, as_usual) * share(caustic_only)).clamp(RADIUS_RANGE.0, MAX_DEFAULT_RADIUS)
 }
 
 /// Rounds of which the radius is multiplied out.

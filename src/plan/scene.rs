@@ -47,6 +47,8 @@ pub struct MapPlan {
     pub classes: Option<Classes>,
     /// Photons of a round that lie within it, on average.
     pub expected: f64,
+    /// The same at the median point, as a trial is to find it.
+    pub neighbours: f64,
     /// Invocations that share the candidates of a visible point.
     pub lanes: u32,
     /// Spheres that its photons are aimed at; 0: they leave their lights in all directions.

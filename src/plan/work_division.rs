@@ -1,116 +1,345 @@
-//! How a picture divides its work between samples, shadow rays and photons, so that its error falls fastest.
+//! How a picture divides its work between paths, shadow rays, photons and the radius, so that its error falls fastest.
 //!
-//! The light of a round has a variance of (per path + per shadow ray / shadow rays) / samples + of maps, and a round costs a fixed part +
-//! samples (per path + shadow rays x per ray). Rounds are independent, so that after the same work the squared error of one division over
-//! that of another is the ratio of the products of the two (Glynn and Whitt 1992: efficiency is one over variance times cost).
+//! After n rounds of S paths a pixel with R shadow rays each, the squared error relative to the light is taken for
 //!
-//! Costs are those of a class of devices and no run's own times, so that the same seed chooses the same on each device of its class.
+//! ```text
+//! noise of paths   (path + shadow ray / R) / (S n)
+//! noise of maps    of a round / neighbours x the mean of 1 / r^2 of the rounds / n
+//! bias             (BIAS x share of light from maps x neighbours / photons x the mean of r^2)^2
+//! ```
+//!
+//! with what is not known of the bias, which falls with the noise of the maps. Radii shrink as Knaus and Zwicker (2011) have them. Variances
+//! are a pilot's ([`crate::engine::scene::pilot`]). Costs are those of a class of devices and no run's own times, so that the same
+//! is chosen on each device of its class.
 
-use crate::plan::scene::ScenePlan;
+use rayon::prelude::*;
+use serde::Serialize;
 
-/// How many paths go through a pixel in each round, and how many shadow rays leave each visible point.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+use super::radius::mean_squared_radius;
+use super::scene::ScenePlan;
+use crate::settings::scene::{NEIGHBOURS, SAMPLES_PER_BLOCK, SceneSettings};
+use crate::settings::stop::Stop;
+
+/// What each round does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Division {
+    /// Paths through a pixel, and shadow rays from each visible point.
     pub samples: u32,
     pub shadow_rays: u32,
+    /// Of the global and of the caustic map.
+    pub photons: u32,
+    pub caustic_photons: u32,
+    /// Photons of a round within the first radius.
+    pub neighbours: u32,
 }
 
-/// A quantity of a round, by what it grows or falls with.
+impl Division {
+    pub fn of(settings: &SceneSettings) -> Division {
+        let &SceneSettings { samples, shadow_rays, photons, caustic_photons, neighbours, .. } = settings;
+        Division { samples, shadow_rays, photons, caustic_photons, neighbours }
+    }
+
+    pub fn set(self, settings: &SceneSettings) -> SceneSettings {
+        let Division { samples, shadow_rays, photons, caustic_photons, neighbours } = self;
+        SceneSettings { samples, shadow_rays, photons, caustic_photons, neighbours, ..settings.clone() }
+    }
+}
+
+/// What is to be chosen, as nobody has set it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Free {
+    pub samples: bool,
+    pub shadow_rays: bool,
+    pub photons: bool,
+    pub caustic_photons: bool,
+    pub neighbours: bool,
+}
+
+/// What light of a round varies by, relative to the square of all light.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Terms {
-    /// Of the round, whatever its samples.
-    pub fixed: f64,
-    /// Of a path through each pixel, and of a shadow ray of each path.
+pub struct Variance {
+    /// Of one path through each pixel, and of one shadow ray of each.
     pub path: f64,
     pub shadow_ray: f64,
+    pub global: MapVariance,
+    pub caustic: MapVariance,
 }
 
-impl Terms {
-    /// Of a round of so many samples and shadow rays, each of which costs.
-    pub fn cost(&self, division: Division) -> f64 {
-        self.fixed + f64::from(division.samples) * (self.path + f64::from(division.shadow_rays) * self.shadow_ray)
+/// The same of a map at its first radius.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct MapVariance {
+    /// With so many photons and neighbours.
+    pub of_round: f64,
+    pub photons: u32,
+    pub neighbours: u32,
+    /// The share of all light that the map gives.
+    pub share: f64,
+    /// The radius is given, whatever the photons.
+    pub is_radius_set: bool,
+}
+
+impl MapVariance {
+    /// The first radius's square over that of the usual photons and neighbours; one that is given is taken for that.
+    fn squared_radius(&self, photons: u32, neighbours: u32) -> f64 {
+        match self.is_radius_set {
+            true => 1.0,
+            false => f64::from(neighbours) / f64::from(NEIGHBOURS) * USUAL_PHOTONS / f64::from(photons),
+        }
     }
 
-    /// The same of a variance, which they share.
-    pub fn variance(&self, division: Division) -> f64 {
-        self.fixed + (self.path + self.shadow_ray / f64::from(division.shadow_rays)) / f64::from(division.samples)
+    /// The variance of the first round's light.
+    pub fn of_first_round(&self, photons: u32, neighbours: u32) -> f64 {
+        let hits = |photons: u32, neighbours: u32| f64::from(photons) * self.squared_radius(photons, neighbours);
+        match self.of_round {
+            0.0 => 0.0,
+            found => found * hits(self.photons, self.neighbours) / hits(photons, neighbours),
+        }
     }
+}
 
-    /// A variance from what rounds of one sample had with 1 shadow ray and with `many`.
-    pub fn of_variances(with_one: f64, with_many: f64, many: u32) -> Terms {
+impl Variance {
+    /// From what a path with 1 shadow ray and with `many` had.
+    pub fn of_paths(with_one: f64, with_many: f64, many: u32) -> Variance {
         let shadow_ray = ((with_one - with_many) / (1.0 - 1.0 / f64::from(many))).clamp(0.0, with_one);
-        Terms { fixed: 0.0, path: with_one - shadow_ray, shadow_ray }
+        Variance { path: with_one - shadow_ray, shadow_ray, ..Variance::default() }
     }
 }
 
-/// What work costs on a class of devices, nanoseconds: of scenes of some ten thousand triangles.
+/// What a round takes, nanoseconds.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Cost {
+    /// In any case.
+    pub round: f64,
+    /// Of a path through each pixel, and of a shadow ray of each.
+    pub paths: f64,
+    pub shadow_rays: f64,
+    pub photon: f64,
+}
+
+/// What work costs on a class of devices, nanoseconds: in scenes of at most [`FEW_TRIANGLES`], and more for each doubling of these.
 struct Costs {
     /// A path from the camera to what it sees, with its lookups in the maps.
-    path: f64,
-    shadow_ray: f64,
+    path: [f64; 2],
+    shadow_ray: [f64; 2],
     /// A photon from its lamp to its end, sorted into its map.
-    photon: f64,
+    photon: [f64; 2],
     /// What a round and each of its maps take in any case.
     round: f64,
-    map: f64,
+    map: [f64; 2],
 }
 
-/// Of a GPU measured in `cornell-spheres`, 512 x 512, 1 to 16 samples and shadow rays, on an NVIDIA H100; of a CPU only the photons, on lavapipe
-/// with two cores (November 2026). The rest is estimated.
+const FEW_TRIANGLES: f64 = 32.0;
+
+/// Measured in `cornell` and `cornell-spheres`: of GPUs on an NVIDIA H100, of CPUs on lavapipe with two cores (November 2026). GPUs that share
+/// the host's memory were not measured.
 fn costs(kind: &str) -> Costs {
     match kind {
-        "cpu" => Costs { path: 2000.0, shadow_ray: 700.0, photon: 2200.0, round: 1e6, map: 2e6 },
-        "discrete" => Costs { path: 2.4, shadow_ray: 0.15, photon: 5.0, round: 5e5, map: 8e5 },
-        _ => Costs { path: 60.0, shadow_ray: 12.0, photon: 60.0, round: 3e5, map: 6e5 },
+        "cpu" => Costs { path: [1500.0, 200.0], shadow_ray: [60.0, 35.0], photon: [2200.0, 0.0], round: 1e6, map: [2e6, 0.0] },
+        "discrete" => Costs { path: [0.6, 0.22], shadow_ray: [0.04, 0.01], photon: [0.6, 0.5], round: 1.5e5, map: [1e5, 5e4] },
+        _ => Costs { path: [15.0, 5.0], shadow_ray: [1.0, 0.5], photon: [15.0, 12.0], round: 3e5, map: [2e5, 1e5] },
     }
 }
 
-/// Nanoseconds of a round, of the plan's pixels and photons, on a class of devices.
-pub fn cost(plan: &ScenePlan, kind: &str) -> Terms {
+/// More neighbours make a path's lookups longer: by this share for as many again as usual.
+const OF_NEIGHBOURS: f64 = 0.08;
+
+/// Of a plan's scene and pixels on a class of devices.
+pub fn cost(plan: &ScenePlan, triangles: usize, kind: &str) -> Cost {
     let Costs { path, shadow_ray, photon, round, map } = costs(kind);
+    let doublings = (triangles as f64 / FEW_TRIANGLES).log2().max(0.0);
+    let of = |[few, more]: [f64; 2]| few + more * doublings;
     let pixels = f64::from(plan.sensor.pixels());
-    let maps: f64 = plan.maps().map(|of| map + photon * f64::from(of.photons)).sum();
-    let rays = if plan.shadow_rays() == 0 { 0.0 } else { shadow_ray };
-    Terms { fixed: round + maps, path: pixels * path, shadow_ray: pixels * rays }
+    Cost {
+        round: round + of(map) * plan.maps().count() as f64,
+        paths: pixels * of(path),
+        shadow_rays: if plan.shadow_rays() == 0 { 0.0 } else { pixels * of(shadow_ray) },
+        photon: of(photon),
+    }
 }
 
+/// Photons and radius at which [`BIAS`] is: with [`NEIGHBOURS`].
+const USUAL_PHOTONS: f64 = 131_072.0;
+/// The bias of light from a map at the usual first radius, relative to it: 1 to 3 % in the built-in scenes. A pilot cannot tell it from noise.
+const BIAS: f64 = 0.02;
+/// The bound of the bias over the bias, and over the root of how well a squared difference of two radii is known, which falls with the
+/// number of discs that have no photon in common: about so many at the usual radius.
+const BOUND_OF_BIAS: f64 = 2.1;
+const TWO_RADII: f64 = 2.0;
+const QUANTILE: f64 = 1.645;
+const DISCS: f64 = 2000.0;
+/// The bound of noise over noise, squared.
+const BOUND_OF_NOISE: f64 = 1.3;
+/// Blocks that a run has at least: its error is looked at first after so many.
+const LEAST_BLOCKS: u32 = 16;
+
+/// What is known of a picture's rounds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rounds {
+    pub variance: Variance,
+    pub cost: Cost,
+    pub pixels: f64,
+    pub alpha: f64,
+    /// Whether the bias is part of the error.
+    pub counts_bias: bool,
+}
+
+impl Rounds {
+    /// Nanoseconds of a round.
+    pub fn cost(&self, division: Division) -> f64 {
+        let Cost { round, paths, shadow_rays, photon } = self.cost;
+        let Division { samples, shadow_rays: rays, photons, caustic_photons, neighbours } = division;
+        let has = |map: MapVariance| f64::from(u8::from(map.photons > 0));
+        let of_maps = has(self.variance.global) * f64::from(photons) + has(self.variance.caustic) * f64::from(caustic_photons);
+        let lookups = 1.0 + OF_NEIGHBOURS * (f64::from(neighbours) / f64::from(NEIGHBOURS) - 1.0);
+        round + photon * of_maps + f64::from(samples) * (paths * lookups + f64::from(rays) * shadow_rays)
+    }
+
+    /// The bound of the error after so many rounds.
+    pub fn error(&self, division: Division, rounds: f64) -> f64 {
+        let Variance { path, shadow_ray, global, caustic } = self.variance;
+        let Division { samples, shadow_rays, photons, caustic_photons, neighbours } = division;
+        let of_paths = (path + shadow_ray / f64::from(shadow_rays)) / (f64::from(samples) * rounds);
+        let shrunk = mean_squared_radius(self.alpha, rounds.ceil() as u32);
+        // The mean of 1 / r^2 over rounds is n^(1 - alpha) / (2 - alpha), and that of the first round 1.
+        let inverse = 1.0 / (2.0 - self.alpha);
+        let of_radii = rounds.powf(-self.alpha) * (inverse + (1.0 - inverse) / rounds);
+        let (mut of_maps, mut unknown, mut bias) = (0.0, 0.0, 0.0);
+        for (map, photons) in [(global, photons), (caustic, caustic_photons)] {
+            let noise = map.of_first_round(photons, neighbours) * of_radii;
+            let squared_radius = map.squared_radius(photons.max(1), neighbours) * shrunk;
+            let discs = (DISCS / squared_radius).min(3.0 * self.pixels);
+            of_maps += noise;
+            unknown += noise * QUANTILE * (2.0 / discs).sqrt();
+            bias += BIAS * map.share * squared_radius;
+        }
+        let of_bias = if self.counts_bias { BOUND_OF_BIAS.powi(2) * (bias * bias + TWO_RADII.powi(2) * unknown) } else { 0.0 };
+        (BOUND_OF_NOISE * (of_paths + of_maps) + of_bias).sqrt()
+    }
+
+    /// Rounds after which the error is so small, if ever, and their nanoseconds.
+    pub fn until(&self, division: Division, error: f64) -> (f64, f64) {
+        let (mut less, mut more) = (self.least_rounds(division), MOST_ROUNDS);
+        if self.error(division, less) > error {
+            // Halves the range of the logarithm.
+            for _ in 0..24 {
+                let middle = (less * more).sqrt();
+                if self.error(division, middle) <= error { more = middle } else { less = middle }
+            }
+            less = more;
+        }
+        (less, less * self.cost(division))
+    }
+
+    /// The error after so many seconds.
+    pub fn after(&self, division: Division, seconds: f64) -> f64 {
+        let rounds = 1e9 * seconds / self.cost(division);
+        let few = (self.least_rounds(division) / rounds).max(1.0);
+        // Fewer rounds than an error takes: it is not known.
+        few * self.error(division, rounds.clamp(1.0, MOST_ROUNDS))
+    }
+
+    fn least_rounds(&self, division: Division) -> f64 {
+        f64::from(LEAST_BLOCKS * (SAMPLES_PER_BLOCK / division.samples).max(1))
+    }
+
+    /// What is to be small: the seconds until an error, or where those are too many, or none is wanted, the error after some seconds.
+    pub fn loss(&self, division: Division, stop: &Stop) -> f64 {
+        let seconds = stop.error.map_or(f64::INFINITY, |error| 1e-9 * self.until(division, error).1);
+        match stop.seconds {
+            Some(most) if seconds > most => most * (1.0 + self.after(division, most).powi(2)),
+            _ => seconds,
+        }
+    }
+}
+
+/// Rounds of a run that its error ends, at most.
+const MOST_ROUNDS: f64 = 65_536.0;
 /// More shadow rays of one path tell little that other paths do not.
 const MOST_SHADOW_RAYS: u32 = 16;
-const MOST_SAMPLES: u32 = 256;
+pub const MOST_SAMPLES: u32 = 256;
+const LEAST_PHOTONS: u32 = 1 << 12;
+pub const MOST_PHOTONS: u32 = 1 << 22;
+const CHOICE_OF_NEIGHBOURS: [u32; 8] = [3, 6, 12, 24, 48, 96, 192, 384];
 
-/// The division whose error falls fastest, among those that are `allowed`; the least one of those that do.
-pub fn best(variance: &Terms, cost: &Terms, allowed: impl Fn(Division) -> bool) -> Option<Division> {
-    let powers = |most: u32| (0..).map(|k| 1u32 << k).take_while(move |power| *power <= most);
-    let all = powers(MOST_SAMPLES).flat_map(|samples| powers(MOST_SHADOW_RAYS).map(move |shadow_rays| Division { samples, shadow_rays }));
-    let product = |division: &Division| variance.variance(*division) * cost.cost(*division);
-    all.filter(|division| allowed(*division)).min_by(|a, b| product(a).total_cmp(&product(b)))
+/// The division whose loss is least: what is free in powers of two, up to so many samples and photons.
+pub fn best(rounds: &Rounds, before: Division, free: Free, stop: &Stop, (most_samples, most_photons): (u32, u32)) -> Division {
+    let powers = |is_free: bool, least: u32, most: u32, own: u32| match is_free {
+        true => std::iter::successors(Some(least), |power| Some(2 * power)).take_while(|power| *power <= most).collect(),
+        false => vec![own],
+    };
+    let Variance { global, caustic, .. } = rounds.variance;
+    let photons = powers(free.photons && global.photons > 0, LEAST_PHOTONS, most_photons, before.photons);
+    let caustic_photons = powers(free.caustic_photons && caustic.photons > 0, LEAST_PHOTONS, most_photons, before.caustic_photons);
+    let neighbours = if free.neighbours { CHOICE_OF_NEIGHBOURS.to_vec() } else { vec![before.neighbours] };
+    let mut all = vec![before];
+    for samples in powers(free.samples, 1, most_samples, before.samples) {
+        for shadow_rays in powers(free.shadow_rays, 1, MOST_SHADOW_RAYS, before.shadow_rays) {
+            for photons in photons.iter().copied() {
+                for caustic_photons in caustic_photons.iter().copied() {
+                    let of = |neighbours: &u32| Division { samples, shadow_rays, photons, caustic_photons, neighbours: *neighbours };
+                    all.extend(neighbours.iter().map(of));
+                }
+            }
+        }
+    }
+    let losses = all.into_par_iter().map(|division| (rounds.loss(division, stop), division)).collect::<Vec<_>>();
+    losses.into_iter().reduce(|least, other| if other.0 < least.0 { other } else { least }).expect("there is one").1
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    #[test]
-    fn variances_are_told_apart_by_the_shadow_rays() {
-        let found = Terms::of_variances(5.0, 2.0, 4);
-        assert_eq!(found, Terms { fixed: 0.0, path: 1.0, shadow_ray: 4.0 });
-        let once = Division { samples: 1, shadow_rays: 1 };
-        assert_eq!((found.variance(once), found.variance(Division { samples: 2, shadow_rays: 4 })), (5.0, 1.0));
-        // Chance may turn them round: then all of it is the paths'.
-        assert_eq!(Terms::of_variances(2.0, 5.0, 4), Terms { fixed: 0.0, path: 2.0, shadow_ray: 0.0 });
+    const BEFORE: Division = Division { samples: 1, shadow_rays: 1, photons: 1 << 17, caustic_photons: 1 << 17, neighbours: NEIGHBOURS };
+    const OF_PATHS: Free = Free { samples: true, shadow_rays: true, photons: false, caustic_photons: false, neighbours: false };
+
+    fn rounds(variance: Variance, cost: Cost) -> Rounds {
+        Rounds { variance, cost, pixels: 1e6, alpha: 2.0 / 3.0, counts_bias: true }
     }
 
-    /// As many samples as make what a round costs in any case and the samples alike, and as many shadow rays as one path's do.
+    fn goal(error: f64) -> Stop {
+        Stop { error: Some(error), ..Stop::default() }
+    }
+
+    #[test]
+    fn variances_are_told_apart_by_the_shadow_rays() {
+        let found = Variance::of_paths(5.0, 2.0, 4);
+        assert_eq!((found.path, found.shadow_ray), (1.0, 4.0));
+        // Chance may turn them round: then all of it is the paths'.
+        let found = Variance::of_paths(2.0, 5.0, 4);
+        assert_eq!((found.path, found.shadow_ray), (2.0, 0.0));
+    }
+
+    /// As many shadow rays as make their noise and their cost alike those of paths: sqrt(16 / 1 x 1 / 1).
     #[test]
     fn the_best_division_balances_costs() {
-        let all = |_: Division| true;
-        let cost = Terms { fixed: 64.0, path: 1.0, shadow_ray: 0.0 };
-        let of_paths = Terms { fixed: 1.0, path: 64.0, shadow_ray: 0.0 };
-        assert_eq!(best(&of_paths, &cost, all), Some(Division { samples: 64, shadow_rays: 1 }));
-        // sqrt(16 / 1 x 1 / 1) shadow rays.
-        let cost = Terms { fixed: 0.0, path: 1.0, shadow_ray: 1.0 };
-        let of_rays = Terms { fixed: 0.0, path: 1.0, shadow_ray: 16.0 };
-        assert_eq!(best(&of_rays, &cost, all), Some(Division { samples: 1, shadow_rays: 4 }));
-        assert_eq!(best(&of_paths, &cost, |division| division.samples == 3), None);
+        let cost = Cost { paths: 1.0, shadow_rays: 1.0, ..Cost::default() };
+        let of_rays = rounds(Variance { path: 1.0, shadow_ray: 16.0, ..Variance::default() }, cost);
+        let all = (MOST_SAMPLES, MOST_PHOTONS);
+        assert_eq!(best(&of_rays, BEFORE, OF_PATHS, &goal(0.001), all).shadow_rays, 4);
+        // What each round takes is shared by as many samples as leave enough rounds.
+        let dear_rounds = rounds(Variance { path: 1.0, ..Variance::default() }, Cost { round: 1000.0, paths: 1.0, ..Cost::default() });
+        assert_eq!(best(&dear_rounds, BEFORE, OF_PATHS, &goal(0.01), all).samples, 256);
+        assert_eq!(best(&dear_rounds, BEFORE, OF_PATHS, &goal(0.1), all).samples, 8);
+        assert_eq!(best(&dear_rounds, BEFORE, OF_PATHS, &goal(0.01), (2, MOST_PHOTONS)).samples, 2);
+        // What is set stays, a power of two or none.
+        let set = Division { shadow_rays: 3, ..BEFORE };
+        assert_eq!(best(&of_rays, set, Free { shadow_rays: false, ..OF_PATHS }, &goal(0.001), all).shadow_rays, 3);
+    }
+
+    #[test]
+    fn photons_go_where_the_noise_is_and_small_errors_take_more_of_them() {
+        let of_map = |of_round: f64| MapVariance { of_round, photons: 1 << 17, neighbours: NEIGHBOURS, share: 0.5, is_radius_set: false };
+        let variance = Variance { path: 0.1, global: of_map(1.0), caustic: of_map(0.01), ..Variance::default() };
+        let found = rounds(variance, Cost { round: 1e6, paths: 1e6, shadow_rays: 1e5, photon: 5.0 });
+        let free = Free { samples: true, shadow_rays: true, photons: true, caustic_photons: true, neighbours: true };
+        let of = |error: f64| best(&found, BEFORE, free, &goal(error), (MOST_SAMPLES, MOST_PHOTONS));
+        assert!(of(0.02).photons > of(0.02).caustic_photons, "{:?}", of(0.02));
+        assert!(of(0.003).photons > of(0.05).photons, "{:?} {:?}", of(0.003), of(0.05));
+        let [chosen, usual] = [of(0.01), BEFORE].map(|division| found.until(division, 0.01).1);
+        assert!(chosen < 0.5 * usual, "{chosen} {usual}");
+        // A radius that is given has its bias, and more photons in it less noise.
+        let set = MapVariance { is_radius_set: true, ..of_map(1.0) };
+        assert_eq!((set.of_first_round(1 << 18, 1), of_map(1.0).of_first_round(1 << 18, NEIGHBOURS)), (0.5, 1.0));
     }
 }

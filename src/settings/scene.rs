@@ -116,6 +116,9 @@ pub struct SceneSettings {
     #[serde(serialize_with = "cap")]
     pub bounces: u32,
     pub seed: u64,
+    /// Photons of a round that the first radius of the global map is to hold at the median point, where a trial finds it; of the caustic
+    /// map a quarter of them.
+    pub neighbours: u32,
     /// Radius of the first pass's density estimate, metres; `None`: by a trial round
     /// (`engine::scene::trial`), or by the scene's area and the photons where none is made.
     pub radius: Option<f64>,
@@ -165,6 +168,7 @@ impl Default for SceneSettings {
             block: None,
             bounces: MAX_BOUNCES,
             seed: 1,
+            neighbours: NEIGHBOURS,
             radius: None,
             caustic_radius: None,
             alpha: 2.0 / 3.0,
@@ -190,9 +194,13 @@ impl Default for SceneSettings {
 }
 
 pub const MAX_ROUNDS: u32 = 1 << 20;
+/// Photons of a round within the first radius of a point of the global map, by default: about what a radius by the scene's area leaves of
+/// light that was scattered before, in closed rooms.
+pub const NEIGHBOURS: u32 = 24;
 /// Camera paths through a pixel in a block of rounds, at least.
 pub const SAMPLES_PER_BLOCK: u32 = 4;
 pub const MAX_BLOCK: u32 = 1 << 10;
+const MAX_NEIGHBOURS: u32 = 10_000;
 /// A visible point's rays are one loop.
 const MAX_SHADOW_RAYS: u32 = 64;
 /// A pixel's paths are summed by one invocation.
@@ -209,6 +217,7 @@ impl SceneSettings {
             let allowed = format!("traces the paper's box only; for a scene choose one of {known}");
             require(Builder::ON_GPU.contains(&builder), "--variant", builder.name(), allowed)?;
         }
+        within("--neighbours", self.neighbours, 1..=MAX_NEIGHBOURS, "photons of a round within the first radius")?;
         within("--shadow-rays", self.shadow_rays, 1..=MAX_SHADOW_RAYS, "shadow rays from each visible point, each round")?;
         if let Some(block) = self.block {
             let is_allowed = block.is_power_of_two() && block <= MAX_BLOCK;

@@ -83,6 +83,8 @@ struct SceneOnGpu<'a> {
     grids: Option<[Vec<Range<u32>>; 2]>,
     /// Photons that are not traced but read; `None` where they are traced.
     stored: Option<StoredPhotons<'a>>,
+    /// Photons that a chunk of the global and of the caustic map may have where time may be up.
+    timed_chunks: [u32; 2],
     cancelled: &'a AtomicBool,
 }
 
@@ -131,7 +133,15 @@ pub fn light_from(gpu: &Gpu, view: &View, plan: ScenePlan, map: Option<&MapFile>
     };
     let none = || [Fates::of_scene(plan.settings.bounces), Fates::of_scene(plan.settings.bounces)];
     let stored = map.map(|file| StoredPhotons { file, open: none(), open_of_blocks: none() });
-    let mut world = SceneOnGpu { view, plan: &plan, resources, grids: None, stored, cancelled: control.cancelled };
+    let mut world = SceneOnGpu {
+        view,
+        plan: &plan,
+        resources,
+        grids: None,
+        stored,
+        timed_chunks: [FIRST_TIMED_CHUNK; 2],
+        cancelled: control.cancelled,
+    };
     if !plan.has_classes() {
         world.grids = Some([radius_class::one_grid(), radius_class::one_grid()]);
     } else if control.keep.begins_later() {
@@ -331,7 +341,7 @@ impl SceneOnGpu<'_> {
 
     /// One round. When its time is up, it takes no further chunk of photons.
     fn one_round(&mut self, commands: &mut Commands, deadline: Option<Instant>, state: &mut RunState) -> Result<()> {
-        let SceneOnGpu { view, plan, resources, grids, stored, .. } = self;
+        let SceneOnGpu { view, plan, resources, grids, stored, timed_chunks, .. } = self;
         let round = Round { resources, geometry: view.geometry, plan, number: state.round() };
         commands.scope("visible points", |commands| points::see(commands, round, view.camera))?;
         if let Some(photons) = &resources.photons {
@@ -349,7 +359,7 @@ impl SceneOnGpu<'_> {
                 let in_round = MapInRound { photons, map, grids: &grids[usize::from(map.caustic_only)] };
                 let of_map = commands.scope(map.name, |commands| match stored {
                     Some(stored) => one_stored_map(commands, round, &in_round, stored, state),
-                    None => one_map(commands, round, &in_round, deadline, state),
+                    None => one_map(commands, round, &in_round, deadline, &mut timed_chunks[usize::from(map.caustic_only)], state),
                 })?;
                 traced[usize::from(map.caustic_only)] = of_map;
             }
@@ -366,7 +376,7 @@ impl SceneOnGpu<'_> {
     }
 }
 
-/// Photons of the first chunk of a round in which the time may be up, and how long a chunk may take that the next one doubles.
+/// Photons of the first chunk of a run in which the time may be up, and how long a chunk may take that the next one doubles.
 const FIRST_TIMED_CHUNK: u32 = 1 << 12;
 const TIMED_CHUNK: Duration = Duration::from_millis(40);
 
@@ -406,26 +416,34 @@ fn one_stored_map(
     Ok(map.photons)
 }
 
-/// The photons of a map; says how many. Where the time may be up, chunks grow only as long as they take little of it.
-fn one_map(commands: &mut Commands, round: Round, in_round: &MapInRound, deadline: Option<Instant>, state: &mut RunState) -> Result<u32> {
+/// The photons of a map; says how many. Where the time may be up, chunks grow only as long as they take little of it, from round to round.
+fn one_map(
+    commands: &mut Commands,
+    round: Round,
+    in_round: &MapInRound,
+    deadline: Option<Instant>,
+    timed_chunk: &mut u32,
+    state: &mut RunState,
+) -> Result<u32> {
     let map = in_round.map;
     if round.plan.cuts_discs() {
         commands.scope("cuts", |commands| estimate::cut_discs(commands, round, map))?;
     }
     let mut traced = 0;
-    let mut most = if deadline.is_some() { FIRST_TIMED_CHUNK } else { map.chunk_photons };
     while traced < map.photons {
         let began = Instant::now();
         if traced > 0 && deadline.is_some_and(|deadline| began >= deadline) {
             break;
         }
+        let most = if deadline.is_some() { *timed_chunk } else { map.chunk_photons };
         let count = most.min(map.chunk_photons).min(map.photons - traced);
         state.hand_out(usize::from(map.caustic_only), count);
         one_chunk(commands, round, in_round, (traced, count))?;
         traced += count;
         if deadline.is_some() {
             commands.submit()?;
-            most = if began.elapsed() < TIMED_CHUNK { most.saturating_mul(2) } else { most };
+            let is_short = began.elapsed() < TIMED_CHUNK;
+            *timed_chunk = if is_short { timed_chunk.saturating_mul(2) } else { *timed_chunk };
         }
     }
     Ok(traced)

@@ -4,7 +4,7 @@
 //!
 //! A radius by the scene's area is right where photons lie everywhere alike. Of a room on a plain it would be wider than the
 //! room. So a few photons are traced, with random numbers that no run has, and each of a few points is given the radius
-//! within which a round of the run will leave 24 photons (6 of the caustic map). The median is taken, in steps of a fourth root of 2:
+//! within which a round of the run will leave 24 photons (6 of the caustic map), or as many as `--neighbours` says. The median is taken, in steps of a fourth root of 2:
 //! an integer, so that nothing but these photons and points decides; but no more than the radius by the area. It depends on no
 //! seed, builder or split.
 
@@ -40,11 +40,6 @@ const PHOTONS: u32 = 1 << 14;
 const POINTS: u32 = 1 << 10;
 /// Nearest photons whose distance tells the density at a point.
 const NEAREST: usize = 8;
-/// Photons of a round within the radius of a point of the global map: about what the rule by the area leaves of light that
-/// was scattered before, in closed rooms.
-const PHOTONS_AT_POINT: f64 = 24.0;
-/// The same of the caustic map, whose light has edges: half the radius.
-const CAUSTIC_PHOTONS_AT_POINT: f64 = 6.0;
 /// Steps of a radius in a factor of 2.
 const STEPS: f64 = 4.0;
 /// Of the clearance of points: a radius that is no larger reaches round few corners.
@@ -57,8 +52,7 @@ const SEED: u64 = 0x7472_6961;
 
 /// Photons of the trial, of which this share was kept, within the radius that holds as many of a round of the run as wanted.
 pub(super) fn photons_wanted(map: &MapPlan, share: f64) -> f64 {
-    let of_round = if map.caustic_only { CAUSTIC_PHOTONS_AT_POINT } else { PHOTONS_AT_POINT };
-    share * of_round * f64::from(PHOTONS) / f64::from(map.photons)
+    share * map.neighbours * f64::from(PHOTONS) / f64::from(map.photons)
 }
 
 /// The plan of a run, its default radii and its choice of lights by a trial round.
@@ -163,13 +157,12 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, lights: Option<Li
             continue;
         }
         let found = trace::stored(&mut commands, round, map)?;
-        let wanted = if map.caustic_only { CAUSTIC_PHOTONS_AT_POINT } else { PHOTONS_AT_POINT };
         let own: Vec<f64> = asked
             .par_iter()
-            .map(|point| own_radius(&visible_points[*point], &found, &view.geometry.planes, of_run.photons, wanted))
+            .map(|point| own_radius(&visible_points[*point], &found, &view.geometry.planes, of_run.photons, of_run.neighbours))
             .collect();
         let clear: Vec<f64> = asked.iter().map(|point| f64::from(clearances[*point])).collect();
-        let by_area = area_radius(view.geometry, of_run.photons, map.caustic_only);
+        let by_area = area_radius(view.geometry, of_run.photons, run.settings.neighbours, map.caustic_only);
         let radius = radius(&own, &clear, by_area);
         *(if map.caustic_only { &mut trial.caustic_radius } else { &mut trial.global_radius }) = Some(radius);
         trial.photons[usize::from(map.caustic_only)] = TrialPhotons::some_of(found);
