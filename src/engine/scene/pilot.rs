@@ -45,12 +45,7 @@ pub struct Pilot {
 impl Pilot {
     /// How many times as long the settings before take for the same.
     pub fn gain(&self, stop: &Stop) -> f64 {
-        let seconds = |division| match stop.error {
-            // As far as time matters, error and time are one.
-            Some(error) => 1e-9 * self.rounds.until(division, error).1,
-            None => self.rounds.after(division, stop.seconds.unwrap_or(1.0)).powi(2),
-        };
-        seconds(self.before) / seconds(self.chosen)
+        self.rounds.loss(self.before, stop) / self.rounds.loss(self.chosen, stop)
     }
 }
 
