@@ -58,7 +58,7 @@ pub(super) struct BakeArgs {
 
 pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
     let map = args.transport.map()?;
-    let settings = args.transport.settings(map.as_ref());
+    let settings = args.transport.settings(map.as_ref(), args.transport.light.chosen.open()?.as_ref());
     settings.validate()?;
     let folder = Folder::open("-o", &args.output)?;
     let reports = args.report.open()?;
@@ -111,7 +111,9 @@ pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
         camera: None,
         phases: &phases,
         map: map.as_ref(),
-        free: Free::default(),
+        free: Free { samples: false, ..args.transport.free() },
+        chosen: None,
+        save_settings: None,
         point: "texel",
     };
     let mut gpus = args.device.open(&reporter)?;

@@ -4,6 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use clap::Args;
 
+use super::chosen::{Chosen, For};
 use super::interrupt::interruptible;
 use super::keep::Keeper;
 use super::progress::{ProgressArgs, ProgressReporter};
@@ -19,6 +20,7 @@ use crate::engine::{self, Control};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::ledger::Fates;
+use crate::output::destination::Destination;
 use crate::output::scene_report;
 use crate::plan::film::BiasPlan;
 use crate::plan::radius::mean_squared_radius;
@@ -54,6 +56,9 @@ pub(super) struct Job<'a> {
     pub(super) map: Option<&'a MapFile>,
     /// What a pilot may choose.
     pub(super) free: Free,
+    /// What one has chosen before, and where to write what this one does.
+    pub(super) chosen: Option<&'a Chosen>,
+    pub(super) save_settings: Option<&'a Destination>,
     /// What results are of: pixel, texel or point.
     pub(super) point: &'static str,
 }
@@ -154,10 +159,7 @@ impl Job<'_> {
 
     /// Settings whose work is divided where nobody has set how: as in the run that this one goes on with, or as a pilot finds best.
     fn divided(&self, gpu: &mut Gpu, view: &View, resumed: Option<&SavedRun>, reporter: &ProgressReporter) -> Result<SceneSettings> {
-        let Job { scene, settings, sensor, free, .. } = *self;
-        if free == Free::default() {
-            return Ok(settings.clone());
-        }
+        let Job { settings, free, .. } = *self;
         if let Some(run) = resumed {
             let of_run = |name: &str, own: u32, is_free: bool| {
                 let value = run.identity.settings.get(name).and_then(|value| value.as_u64()?.try_into().ok());
@@ -172,14 +174,40 @@ impl Job<'_> {
             };
             return Ok(division.set(settings));
         }
-        reporter.status("looking for the best settings");
-        let pilot = until_done(gpu, &device_failed, |gpu| {
-            let plan = scene::trial::plan(gpu, scene, view, settings, sensor)?;
-            scene::pilot::choose(gpu, scene, view, &plan, free)
-        })?;
-        let Some(pilot) = pilot else { return Ok(settings.clone()) };
-        reporter.note(&scene_report::pilot(&pilot, &settings.stop));
-        Ok(pilot.chosen.set(settings))
+        self.choose(gpu, view, reporter)
+    }
+
+    /// The settings that a pilot finds best, saved where asked.
+    pub(super) fn choose(&self, gpu: &mut Gpu, view: &View, reporter: &ProgressReporter) -> Result<SceneSettings> {
+        let Job { scene, settings, geometry, sensor, free, chosen, save_settings, .. } = *self;
+        let mut found = settings.clone();
+        let mut rounds = settings.rounds;
+        // A number of rounds is no goal.
+        let has_goal = settings.stop.error.is_some() || settings.stop.seconds.is_some();
+        if has_goal && free != Free::default() {
+            reporter.status("looking for the best settings");
+            let pilot = until_done(gpu, &device_failed, |gpu| {
+                let plan = scene::trial::plan(gpu, scene, view, settings, sensor)?;
+                scene::pilot::choose(gpu, scene, view, &plan, free)
+            })?;
+            if let Some(pilot) = pilot {
+                reporter.note(&scene_report::pilot(&pilot, &settings.stop, self.point));
+                found = pilot.chosen.set(settings);
+                rounds = pilot.rounds.expected(pilot.chosen, &settings.stop);
+            }
+        }
+        if chosen.is_none() && save_settings.is_none() {
+            return Ok(found);
+        }
+        let device = gpu.facts().kind;
+        let this = For { scene: &scene.name, scene_hash: scene::scene_hash(geometry), size: sensor.size(), device };
+        chosen.iter().for_each(|chosen| chosen.compare(&this));
+        if let Some(file) = save_settings {
+            Chosen::new(&found, rounds.next_multiple_of(found.rounds_per_block(matches!(sensor, Sensor::Picture { .. }))), &this)
+                .write(file.clone())?;
+            reporter.note(&format!("settings for about {}: wrote {}", counted(rounds, "round"), file.path().display()));
+        }
+        Ok(found)
     }
 
     /// Runs on all devices, for the first of which the plan was made.

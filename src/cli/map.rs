@@ -134,7 +134,7 @@ pub(super) fn run(args: &MapArgs, cancelled: &AtomicBool) -> Result<End> {
 }
 
 fn make(args: &MakeArgs, cancelled: &AtomicBool) -> Result<End> {
-    let usual = args.light.settings(&args.common);
+    let usual = args.light.settings(&args.common, args.light.chosen.open()?.as_ref());
     // Of a block each: rounds know nothing of each other.
     let settings = SceneSettings { rounds: args.rounds.unwrap_or(usual.rounds), block: Some(1), ..usual };
     settings.validate()?;

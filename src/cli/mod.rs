@@ -2,6 +2,7 @@
 
 mod bake;
 mod bench;
+mod chosen;
 mod compare;
 mod devices;
 mod help;

@@ -30,7 +30,7 @@ pub(super) struct PlanArgs {
 
 pub(super) fn run(args: &PlanArgs) -> Result<()> {
     let map = args.picture.transport.map()?;
-    let settings = args.picture.settings(map.as_ref());
+    let settings = args.picture.settings(map.as_ref(), args.picture.transport.light.chosen.open()?.as_ref());
     settings.validate()?;
     let json = optional_file("--json", args.json.json.as_ref())?;
     let reporter = ProgressReporter::new(&args.progress);

@@ -7,6 +7,7 @@ use std::sync::atomic::AtomicBool;
 use clap::Args;
 use glam::DVec3;
 
+use super::chosen::Chosen;
 use super::job::{Job, MessageArgs};
 use super::options::{DevicesOfRunArgs, ReportArgs};
 use super::progress::ProgressReporter;
@@ -45,14 +46,14 @@ pub(super) struct ProbeArgs {
 }
 
 impl ProbeArgs {
-    pub(super) fn settings(&self, map: Option<&MapFile>) -> SceneSettings {
-        self.transport.settings(map)
+    pub(super) fn settings(&self, map: Option<&MapFile>, chosen: Option<&Chosen>) -> SceneSettings {
+        self.transport.settings(map, chosen)
     }
 }
 
 pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
     let map = args.transport.map()?;
-    let settings = args.settings(map.as_ref());
+    let settings = args.settings(map.as_ref(), args.transport.light.chosen.open()?.as_ref());
     settings.validate()?;
     let output = Destination::open("-o", &args.output)?;
     let reports = args.report.open()?;
@@ -84,7 +85,9 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
         camera: None,
         phases: &phases,
         map: map.as_ref(),
-        free: Free::default(),
+        free: Free { samples: false, ..args.transport.free() },
+        chosen: None,
+        save_settings: None,
         point: "point",
     };
     let mut gpus = args.device.open(&reporter)?;

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use clap::Args;
 
+use super::chosen::Chosen;
 use super::job::{Job, MessageArgs};
 use super::keep::Snapshot;
 use super::options::{DevicesOfRunArgs, ReportArgs};
@@ -17,7 +18,7 @@ use crate::engine;
 use crate::engine::replay::PhotonName;
 use crate::engine::saved::{SavedFilm, SavedRun};
 use crate::engine::scene::map_file::MapFile;
-use crate::engine::scene::{RunResult, replay};
+use crate::engine::scene::{RunResult, View, replay};
 use crate::error::{Result, require};
 use crate::output::colour::{Format, Tone};
 use crate::output::destination::{Destination, check_distinct, write_all};
@@ -32,7 +33,7 @@ use crate::verify::judge::{Judge, Verdict};
 #[derive(Args)]
 pub(super) struct RenderArgs {
     /// Picture: an .exr holds linear radiance in W/m2/sr, a .png is sRGB, for the eye
-    #[arg(short, long, alias = "out", value_name = "FILE", required_unless_present_any = ["replay", "shard"], help_heading = "Output")]
+    #[arg(short, long, alias = "out", value_name = "FILE", required_unless_present_any = ["replay", "shard", "save_settings"], help_heading = "Output")]
     output: Option<PathBuf>,
     /// Also write the picture so far at this interval: 10s, 5m
     #[arg(long, value_name = "TIME", value_parser = parse_seconds, allow_hyphen_values = true, requires = "output", help_heading = "Output")]
@@ -55,6 +56,9 @@ pub(super) struct RenderArgs {
     /// end on the first surface, only one queries the global map [default: 1; what a pilot finds best of a run that ends at an error or a time]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Light transport")]
     samples: Option<u32>,
+    /// Write what the pilot has chosen for --settings; without -o nothing else is done
+    #[arg(long, value_name = "FILE", help_heading = "Light transport")]
+    save_settings: Option<PathBuf>,
     /// Reconstruction filter of the pixels [default: box]
     #[arg(long, value_enum, value_name = "FILTER", help_heading = "Light transport")]
     filter: Option<FilterArg>,
@@ -65,7 +69,7 @@ pub(super) struct RenderArgs {
     /// Trace a single photon of this run, print its path, and exit; rounds and photons count from 0, and `:caustic` at the
     /// end takes a photon of the caustic map
     #[arg(long, value_name = "ROUND:PHOTON", value_parser = parse_photon_name, help_heading = "Checks",
-        conflicts_with_all = ["output", "error_image", "exposure", "tone", "judge", "explain", "json", "trace", "time_dispatches", "map", "devices"])]
+        conflicts_with_all = ["output", "error_image", "exposure", "tone", "judge", "explain", "json", "trace", "save_settings", "time_dispatches", "map", "devices"])]
     replay: Option<PhotonName>,
     #[command(flatten)]
     messages: MessageArgs,
@@ -74,8 +78,8 @@ pub(super) struct RenderArgs {
 }
 
 impl RenderArgs {
-    pub(super) fn settings(&self, map: Option<&MapFile>) -> SceneSettings {
-        let usual = self.picture.settings(map);
+    pub(super) fn settings(&self, map: Option<&MapFile>, chosen: Option<&Chosen>) -> SceneSettings {
+        let usual = self.picture.settings(map, chosen);
         SceneSettings { filter: self.filter.map_or(usual.filter, Filter::from), samples: self.samples.unwrap_or(usual.samples), ..usual }
     }
 
@@ -101,7 +105,8 @@ const SNAPSHOT_SECONDS: f64 = 5.0;
 
 pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     let map = args.picture.transport.map()?;
-    let mut settings = args.settings(map.as_ref());
+    let chosen = args.picture.transport.light.chosen.open()?;
+    let mut settings = args.settings(map.as_ref(), chosen.as_ref());
     settings.validate()?;
     if let Some(name) = args.replay {
         return show_photon(args, &settings, name);
@@ -136,7 +141,8 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     let reports = args.report.open()?;
     let stop = &args.picture.transport.stop;
     let mut keeper = args.picture.transport.keep.open(stop)?;
-    let files = [&picture, &errors].into_iter().flatten().cloned().collect();
+    let save_settings = optional_file("--save-settings", args.save_settings.as_ref())?;
+    let files = [&picture, &errors, &save_settings].into_iter().flatten().cloned().collect();
     let all: Vec<Destination> = [files, reports.destinations(), keeper.destinations()].concat();
     check_distinct(&all)?;
     keeper.check_not_read(&all, args.picture.inputs())?;
@@ -157,6 +163,8 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
         phases: &[],
         map: map.as_ref(),
         free: args.free(),
+        chosen: chosen.as_ref(),
+        save_settings: save_settings.as_ref(),
         point: "pixel",
     };
     let size = (*width, *height);
@@ -168,6 +176,12 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     if let Some(seconds) = args.snapshot.or(has_no_end.then_some(SNAPSHOT_SECONDS)) {
         require((0.001..=1e6).contains(&seconds), "--snapshot", seconds, "must be from 1ms to 1000000s")?;
         keeper.set_snapshot(Some(Snapshot { every: Duration::from_secs_f64(seconds), write: &mut snapshot }));
+    }
+    if picture.is_none() && args.picture.transport.keep.shard.is_none() {
+        let view = View { geometry, camera: Some(camera), phases: &[] };
+        job.choose(&mut gpus[0], &view, &reporter)?;
+        reporter.finish();
+        return Ok(End::Finished);
     }
     let lit = job.run(&mut gpus, stop, &mut keeper, &reporter, cancelled)?;
 

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use clap::Args;
 use glam::{DVec2, Vec3};
 
+use super::chosen::{Chosen, ChosenArgs};
 use super::keep::KeepArgs;
 use super::options::CommonArgs;
 use super::picture_size::{PictureSize, parse_size};
@@ -100,6 +101,8 @@ pub(super) struct PhotonArgs {
     /// Source of direct light and caustics [default: split]
     #[arg(long, value_enum, value_name = "METHOD", help_heading = "Light transport")]
     illumination: Option<IlluminationArg>,
+    #[command(flatten)]
+    pub(super) chosen: ChosenArgs,
     /// Simulate an effect even if the scene does not need it; `photonmill plan` lists them
     #[arg(long, value_name = "EFFECT", value_parser = effect_parser(), value_delimiter = ',', help_heading = "Light transport")]
     with: Vec<Effect>,
@@ -337,14 +340,17 @@ impl SceneArgs {
 }
 
 impl PhotonArgs {
-    /// Settings that are usual, but for these.
-    pub(super) fn settings(&self, common: &CommonArgs) -> SceneSettings {
+    /// Settings that are usual or chosen, but for these.
+    pub(super) fn settings(&self, common: &CommonArgs, chosen: Option<&Chosen>) -> SceneSettings {
         let usual = SceneSettings::default();
+        let usual = chosen.map_or_else(|| usual.clone(), |chosen| chosen.settings.set(&usual));
+        // As many as of the global map, unless something else is known.
+        let caustic_photons = self.photons.filter(|_| chosen.is_none()).unwrap_or(usual.caustic_photons);
         let photons = self.photons.unwrap_or(usual.photons);
         let &CommonArgs { seed, math, chunk, group_size, paranoid } = common;
         SceneSettings {
             photons,
-            caustic_photons: self.caustic_photons.unwrap_or(photons),
+            caustic_photons: self.caustic_photons.unwrap_or(caustic_photons),
             bounces: self.bounces.unwrap_or(usual.bounces),
             aim: self.aim.map_or(usual.aim, |switch| switch == SwitchArg::On),
             illumination: self.illumination.map_or(usual.illumination, Illumination::from),
@@ -361,12 +367,12 @@ impl PhotonArgs {
 }
 
 impl TransportArgs {
-    /// The file that photons are taken from.
     /// Files that are read.
     pub(super) fn inputs(&self) -> impl Iterator<Item = &Path> {
-        self.map.iter().map(PathBuf::as_path)
+        self.map.iter().map(PathBuf::as_path).chain(self.light.chosen.inputs())
     }
 
+    /// The file that photons are taken from.
     pub(super) fn map(&self) -> Result<Option<MapFile>> {
         let Some(map) = self.map.as_ref().map(|path| MapFile::open("--map", path)).transpose()? else { return Ok(None) };
         if let Some(rounds) = self.rounds.filter(|rounds| *rounds > map.rounds()) {
@@ -381,7 +387,7 @@ impl TransportArgs {
 
     /// What a pilot may choose of a run of a picture that ends at a goal; shards must not choose each for itself.
     pub(super) fn free(&self) -> Free {
-        if self.rounds.is_some() || self.stop.counts_photons() || self.keep.shard.is_some() {
+        if self.rounds.is_some() || self.stop.counts_photons() || self.keep.shard.is_some() || self.light.chosen.is_given() {
             return Free::default();
         }
         let traces = self.map.is_none();
@@ -396,16 +402,22 @@ impl TransportArgs {
 
     /// Whether nothing says when a run ends.
     pub(super) fn has_no_end(&self) -> bool {
-        !self.stop.stop().is_set() && self.rounds.is_none() && self.map.is_none() && self.keep.shard.is_none()
+        !self.stop.stop().is_set()
+            && self.rounds.is_none()
+            && self.map.is_none()
+            && self.keep.shard.is_none()
+            && !self.light.chosen.is_given()
     }
 
-    pub(super) fn settings(&self, map: Option<&MapFile>) -> SceneSettings {
-        let usual = self.light.settings(&self.common);
+    pub(super) fn settings(&self, map: Option<&MapFile>, chosen: Option<&Chosen>) -> SceneSettings {
+        let usual = self.light.settings(&self.common, chosen);
         let usual = map.map_or_else(|| usual.clone(), |map| map.settings(&usual));
         let stop = self.stop.stop();
         let most = || match map {
             Some(map) => map.rounds(),
-            None => most_rounds(&stop, usual.photons.min(usual.caustic_photons)).unwrap_or(usual.rounds),
+            None => {
+                most_rounds(&stop, usual.photons.min(usual.caustic_photons)).unwrap_or(chosen.map_or(usual.rounds, |chosen| chosen.rounds))
+            }
         };
         SceneSettings {
             block: self.block.or(usual.block),
@@ -431,8 +443,8 @@ impl PictureArgs {
         self.transport.inputs().chain([self.scene.path()])
     }
 
-    pub(super) fn settings(&self, map: Option<&MapFile>) -> SceneSettings {
-        let usual = self.transport.settings(map);
+    pub(super) fn settings(&self, map: Option<&MapFile>, chosen: Option<&Chosen>) -> SceneSettings {
+        let usual = self.transport.settings(map, chosen);
         SceneSettings { part: self.part.map_or(usual.part, Part::from), ..usual }
     }
 

@@ -153,7 +153,7 @@ mod tests {
                 Line::Scene(settings) => {
                     let line = command::on_scene("render open-box -o picture.exr", settings);
                     let Some(Command::Render(render)) = parse(&line).command else { panic!("{line}") };
-                    assert_eq!(render.settings(None), *settings, "{line}");
+                    assert_eq!(render.settings(None, None), *settings, "{line}");
                 }
             }
         }

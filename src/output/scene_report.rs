@@ -59,7 +59,7 @@ pub fn rows<'a>(plan: &'a ScenePlan, run: Option<(&Timings, &[u64])>) -> Vec<Eff
 }
 
 /// What a pilot has chosen and why, and what errors will take, in a line.
-pub fn pilot(pilot: &Pilot, stop: &Stop) -> String {
+pub fn pilot(pilot: &Pilot, stop: &Stop, point: &str) -> String {
     let Pilot { before, chosen, rounds, .. } = pilot;
     let maps = [(rounds.variance.global, chosen.photons, "global"), (rounds.variance.caustic, chosen.caustic_photons, "caustic")];
     let photons: Vec<String> =
@@ -68,7 +68,7 @@ pub fn pilot(pilot: &Pilot, stop: &Stop) -> String {
         true => String::new(),
         false => format!(", {} ({} within the first radius)", photons.join(" and "), chosen.neighbours),
     };
-    let paths = format!("{} per pixel and {}", counted(chosen.samples, "path"), counted(chosen.shadow_rays, "shadow ray"));
+    let paths = format!("{} per {point} and {}", counted(chosen.samples, "path"), counted(chosen.shadow_rays, "shadow ray"));
     let against = match chosen == before {
         true => " as usual, as nothing else is much better".to_owned(),
         false => format!(", {:.1} times as fast as the usual settings", pilot.gain(stop)),

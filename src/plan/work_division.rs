@@ -13,7 +13,7 @@
 //! is chosen on each device of its class.
 
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::radius::mean_squared_radius;
 use super::scene::ScenePlan;
@@ -21,7 +21,8 @@ use crate::settings::scene::{NEIGHBOURS, SAMPLES_PER_BLOCK, SceneSettings};
 use crate::settings::stop::Stop;
 
 /// What each round does.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Division {
     /// Paths through a pixel, and shadow rays from each visible point.
     pub samples: u32,
@@ -134,7 +135,7 @@ const FEW_TRIANGLES: f64 = 32.0;
 /// the host's memory were not measured.
 fn costs(kind: &str) -> Costs {
     match kind {
-        "cpu" => Costs { path: [1500.0, 200.0], shadow_ray: [60.0, 35.0], photon: [2200.0, 0.0], round: 1e6, map: [2e6, 0.0] },
+        "cpu" => Costs { path: [1500.0, 200.0], shadow_ray: [60.0, 35.0], photon: [1100.0, 150.0], round: 1e6, map: [2e6, 0.0] },
         "discrete" => Costs { path: [0.6, 0.22], shadow_ray: [0.04, 0.01], photon: [0.6, 0.5], round: 1.5e5, map: [1e5, 5e4] },
         _ => Costs { path: [15.0, 5.0], shadow_ray: [1.0, 0.5], photon: [15.0, 12.0], round: 3e5, map: [2e5, 1e5] },
     }
@@ -240,6 +241,13 @@ impl Rounds {
 
     fn least_rounds(&self, division: Division) -> f64 {
         f64::from(LEAST_BLOCKS * (SAMPLES_PER_BLOCK / division.samples).max(1))
+    }
+
+    /// Rounds that a goal takes.
+    pub fn expected(&self, division: Division, stop: &Stop) -> u32 {
+        let in_time = stop.seconds.map_or(f64::INFINITY, |seconds| 1e9 * seconds / self.cost(division));
+        let of_error = stop.error.map_or(f64::INFINITY, |error| self.until(division, error).0);
+        in_time.min(of_error).clamp(1.0, MOST_ROUNDS).ceil() as u32
     }
 
     /// What is to be small: the seconds until an error. Where there are fewer, those that the error after them would take if its square

@@ -35,6 +35,7 @@ mod trial_rays;
 use glam::DVec3;
 
 pub use film::SceneFilm;
+pub use identity::scene_hash;
 pub use on_gpu::{constants, light, light_from, modules};
 
 use crate::engine::error_bound::FilmError;

@@ -21,7 +21,7 @@ use crate::settings::stop::{Measure, Stop};
 
 /// Pixels at most: of so many all that is known is kept.
 const PIXELS: f64 = 1024.0;
-/// As many as a block of a run has at least: they are even over it, and vary less than if each was alone.
+/// Paths through each: as many as a block of a run has at least: they are even over it, and vary less than if each was alone.
 const SAMPLES: u32 = SAMPLES_PER_BLOCK;
 const ROUNDS: u32 = 16;
 /// Of each map, and those within the first radius, which is wider than in a run.
@@ -52,8 +52,7 @@ impl Pilot {
 /// Chooses the division of a picture's work, for whose settings there is a plan. `None` where nothing is to be chosen, or nothing varies.
 pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Free) -> Result<Option<Pilot>> {
     let settings = &plan.settings;
-    let is_picture = matches!(plan.sensor, Sensor::Picture { .. });
-    if !is_picture || free == Free::default() {
+    if free == Free::default() {
         return Ok(None);
     }
     let casts_shadow_rays = free.shadow_rays && plan.shadow_rays() != 0;
@@ -132,20 +131,32 @@ fn parts(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, shadow_rays: u3
         stop: Stop { measure: Measure::Rmse, ..Stop::default() },
         ..run.settings.clone()
     };
-    let (width, height) = run.sensor.size();
-    let smaller = (PIXELS / (f64::from(width) * f64::from(height))).sqrt().min(1.0);
-    let length = |length: u32| ((f64::from(length) * smaller) as u32).max(1);
-    let sensor = Sensor::Picture { width: length(width), height: length(height) };
-    let mut plan = trial::plan(gpu, scene, view, &settings, sensor)?;
-    plan.footprint = f64::from(length(width)) / f64::from(width);
-    let lit = light(gpu, view, plan, &mut Control::default())?;
+    let (sensor, phases, footprint) = match run.sensor {
+        Sensor::Picture { width, height } => {
+            let smaller = (PIXELS / (f64::from(width) * f64::from(height))).sqrt().min(1.0);
+            let length = |length: u32| ((f64::from(length) * smaller) as u32).max(1);
+            let sensor = Sensor::Picture { width: length(width), height: length(height) };
+            (sensor, Vec::new(), f64::from(length(width)) / f64::from(width))
+        }
+        Sensor::Receivers { .. } => {
+            let all = &view.phases[0];
+            let some: Vec<_> = all.iter().step_by(all.len().div_ceil(PIXELS as usize)).copied().collect();
+            (Sensor::Receivers { count: some.len() as u32 }, vec![some], 1.0)
+        }
+    };
+    let view = View { phases: &phases, ..*view };
+    let mut plan = trial::plan(gpu, scene, &view, &settings, sensor)?;
+    plan.footprint = footprint;
+    let samples = plan.samples();
+    let lit = light(gpu, &view, plan, &mut Control::default())?;
     let error = lit.film.error(settings.stop.confidence);
     let of_round = error.noise * error.noise * f64::from(lit.film.rounds);
     let [direct, specular, caustic, indirect] = error.places.map_or([0.0; PART_COUNT as usize], |places| places.of_parts);
-    let of_path = f64::from(SAMPLES) * of_round;
+    let of_path = f64::from(samples) * of_round;
     let light: Vec<f64> = lit.film.part_totals.iter().map(|total| *total as f64).collect();
     // Without lamps and sky that are seen straight.
-    let all = lit.film.of_surfaces.iter().flat_map(|surfaces| &surfaces.sums).map(|sum| *sum as f64).sum::<f64>().max(1.0);
+    let surfaces = lit.film.of_surfaces.as_ref().unwrap_or(&lit.film.of_blocks);
+    let all = surfaces.sums.iter().map(|sum| *sum as f64).sum::<f64>().max(1.0);
     Ok(Parts {
         variance: [direct * of_path, specular * of_path, caustic * of_round, indirect * of_round],
         light: std::array::from_fn(|part| light[part] / all),
