@@ -419,11 +419,20 @@ struct TrialRaysPush {
     uint rays_of_point;
 };
 
+// A sample of a pixel, or of a receiver.
+struct Sample {
+    // Among all of all pixels.
+    uint place;
+    uint pixel;
+    // Among those of the pixel, and how many these are.
+    uint number;
+    uint count;
+};
+
 // A path from the camera or a receiver, under way over mirrors and glass.
 struct CameraPath {
     vec3 position;
-    // Of its sample among all of all pixels.
-    uint place;
+    Sample own;
     vec3 direction;
     // Bits 0 to 3: it saw a specular surface, it gathers, it starts at no surface, emission counts at its next one; bits 4
     // and 5: visible points found; bit 6: it ends there; from bit 8 on: surfaces that it has met.
@@ -587,11 +596,15 @@ struct WorkDivision {
     uint shadow_rays;
     // Rounds of a block, a power of two: samples of a place are even over all of them together, and no block knows of another.
     uint rounds_per_block;
+    // Samples that some pixels have beyond `samples`, all together.
+    uint extra_samples;
 };
 
 struct GoOnPush {
     Draws draws;
     WorkDivision work;
+    // That a pixel has.
+    uint most_samples;
     uint path_count;
     uint pixel_count;
     uint emitter_count;
@@ -607,6 +620,7 @@ struct ViewPush {
     uint rounding;
     uint width;
     uint height;
+    // Pixels, and behind them extra samples.
     uint first_pixel;
     uint end_pixel;
     vec3 eye;
@@ -654,6 +668,7 @@ struct CellPush {
 };
 
 struct SceneGatherPush {
+    WorkDivision work;
     uint first_point;
     uint end_point;
     uint point_count;
@@ -705,6 +720,7 @@ struct RadiusClassPush {
 
 // Where walls cut the discs of density estimates off.
 struct DiscCutsPush {
+    WorkDivision work;
     uint first_point;
     uint end_point;
     uint pixel_count;
@@ -721,8 +737,7 @@ struct DiscCutsPush {
 };
 
 struct FluxToRadiancePush {
-    // Paths through a pixel.
-    uint samples;
+    WorkDivision work;
     uint first_point;
     uint end_point;
     uint point_count;
@@ -753,13 +768,12 @@ struct EndDifferencePush {
 };
 
 struct ResolvePush {
-    // Paths through a pixel.
-    uint samples;
+    WorkDivision work;
     uint first_pixel;
     uint end_pixel;
     uint pixel_count;
-    // Visible points that photons may have lit.
-    uint points_per_pixel;
+    // Visible points of a path that photons may have lit.
+    uint points_per_path;
     uint block;
     // 1: it is the last round of its block.
     uint ends_block;

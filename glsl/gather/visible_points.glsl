@@ -42,6 +42,7 @@ uvec2 fixed_point(float flux, float chance)
 
 void gather_photons()
 {
+    work = push.work;
     uint slice = push.first_slice + gl_WorkGroupID.y;
     uint invocation = gl_WorkGroupID.x * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
     uint lane = invocation % push.lanes;

@@ -9,6 +9,7 @@ layout(set = 1, binding = 1, scalar) readonly buffer VisiblePoints { VisiblePoin
 #include "math/math.glsl"
 #include "dispatch/dispatch.glsl"
 #include "world/scene/effects.glsl"
+#include "world/scene/sample_places.glsl"
 #include "math/directions.glsl"
 #include "world/scene/bvh.glsl"
 #include "world/scene/box_walk.glsl"
@@ -133,6 +134,7 @@ Foot nearest_foot(Site site, Cuts cuts)
 
 void main()
 {
+    work = push.work;
     uint place = push.first_point + invocation_index();
     if (place >= push.end_point) {
         return;

@@ -15,6 +15,8 @@ layout(set = 1, binding = 2, scalar) buffer Estimates { uvec2 estimates[]; };
 #include "ledger/nonfinite_values.glsl"
 #include "dispatch/dispatch.glsl"
 #include "world/scene/effects.glsl"
+#include "world/scene/sample_places.glsl"
+#include "world/scene/extra_samples.glsl"
 #include "math/directions.glsl"
 #include "world/scene/bvh.glsl"
 #include "material/surface.glsl"
@@ -71,7 +73,7 @@ vec2 areas_around(VisiblePoint point, uint place, bool is_caustic, bool with_nea
     if (HAS_EDGE_CORRECTION) {
         bool whole;
         vec2 covered = covered_areas(point.position, point.plane, radius, near_radius, cuts, whole);
-        note_unless(is_finite(covered.x) && is_finite(covered.y), NONFINITE_ESTIMATE, 0, push.round, place % push.pixel_count);
+        note_unless(is_finite(covered.x) && is_finite(covered.y), NONFINITE_ESTIMATE, 0, push.round, pixel_of_point(place, push.pixel_count));
         if (whole) {
             atomicAdd(anomalies[2], 1);
         }
@@ -105,6 +107,7 @@ uint part_number(uint seen, uint arrival)
 
 void main()
 {
+    work = push.work;
     uint place = push.first_point + invocation_index();
     bool exists = place < push.end_point;
     uvec2 totals[PART_COUNT];
@@ -135,7 +138,7 @@ void main()
         if (HAS_CAUSTIC_MAP) {
             is_caustic = arrival == 1;
         }
-        uint pixel = place % push.pixel_count;
+        uint pixel = pixel_of_point(place, push.pixel_count);
         uint kind = is_caustic ? HIT_CAUSTIC_PHOTON : HIT_GLOBAL_PHOTON;
         bool is_new = !is_reached(pixel, kind);
         if (flux == vec3(0.0)) {
@@ -145,7 +148,7 @@ void main()
         } else if (is_new) {
             note_hit(pixel, kind);
         }
-        float for_all = !is_caustic && (point.arrivals & SEEN_FOR_ALL) != 0 ? float(push.samples) : 1.0;
+        float for_all = !is_caustic && (point.arrivals & SEEN_FOR_ALL) != 0 ? float(samples_of(pixel)) : 1.0;
         float area = is_caustic ? 0.0 : global_area;
         float widest = is_caustic ? push.caustic_radius : push.global_radius;
         if (area == 0.0) {
@@ -195,6 +198,6 @@ void main()
         }
     }
     if (HAS_DIFFERENCES && is_lit) {
-        add_difference(place % push.pixel_count, push.pixel_count, change * push.film_scale, push.film_limit);
+        add_difference(pixel_of_point(place, push.pixel_count), push.pixel_count, change * push.film_scale, push.film_limit);
     }
 }

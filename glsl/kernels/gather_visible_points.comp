@@ -15,6 +15,7 @@ layout(push_constant, scalar) uniform Push { SceneGatherPush push; };
 #include "film/SUMS.glsl"
 #include "math/directions.glsl"
 #include "world/scene/effects.glsl"
+#include "world/scene/sample_places.glsl"
 #include "material/lobes.glsl"
 #include "rng/sampling.glsl"
 #include "material/layers.glsl"

@@ -18,8 +18,8 @@ void main()
     }
     CameraPath path = camera_paths[item];
     work = push.work;
-    uint index = path.place / work.samples;
-    uint number = path.place % work.samples;
+    own = path.own;
+    uint index = own.pixel;
     uint depth = path.state >> 8;
     start_chain(path.position, path.direction, path.weight, vec2(0.0));
     chain.saw_specular = (path.state & 1u) != 0;
@@ -34,12 +34,13 @@ void main()
     chain.from = path.from;
     chain.from_normal = path.from_normal;
     chain.point_count = (path.state >> 4) & 3u;
-    if (follow(index, number, push.pixel_count, push.draws, push.emitter_count, depth)) {
-        put_off(path.place, depth + CHAIN_STEPS);
+    if (follow(push.pixel_count, push.draws, push.emitter_count, depth)) {
+        put_off(depth + CHAIN_STEPS);
     }
     note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), NONFINITE_LIGHT, push.draws.domain,
                 push.draws.round, index);
-    note_surface(chain.met_surface && !met_surface);
-    write_pass_sum(path.place, index, push.pixel_count, chain.light, chain.seen, push.film_scale, push.film_limit, mix32(push.rounding + depth), true);
-    write_missing_points(index, number, push.pixel_count);
+    note_surface(chain.met_surface && !met_surface, push.most_samples / own.count);
+    float share = divide(1.0, float(own.count));
+    write_pass_sum(own.place, index, push.pixel_count, chain.light, chain.seen, share * push.film_scale, share * push.film_limit, mix32(push.rounding + depth), true);
+    write_missing_points(push.pixel_count);
 }

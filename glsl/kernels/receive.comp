@@ -23,6 +23,7 @@ void main()
         return;
     }
     work = push.work;
+    own = Sample(index, index, 0, 1);
     Receiver receiver = receivers[index];
     vec3 ng = receiver.normal;
     vec3 ns = receiver.shading_normal;
@@ -45,7 +46,7 @@ void main()
     if (on_surface) {
         uint arrivals = arrivals_wanted(gathers);
         vec3 on_plane = receiver.position - plane_height(plane, receiver.position) * planes[plane >> 1].xyz;
-        visible_points[place_of_point(chain.point_count++, index, 0, push.point_count)] =
+        visible_points[place_of_point(chain.point_count++, own.place, push.point_count)] =
             VisiblePoint(on_plane, plane, vec3(1.0), ns == ng ? NONE : pack_normal(ns), 0, 0.0, SURFACE_RECEIVER, arrivals | SEEN);
     }
     if (gathers) {
@@ -61,12 +62,12 @@ void main()
         if (HAS_ALL_ARRIVALS) {
             chain.sees_emission = !on_surface;
         }
-        if (follow(index, 0, push.point_count, push.draws, push.emitter_count, 0)) {
-            put_off(index, CHAIN_STEPS);
+        if (follow(push.point_count, push.draws, push.emitter_count, 0)) {
+            put_off(CHAIN_STEPS);
         }
     }
     note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), NONFINITE_LIGHT, push.draws.domain,
                 push.draws.round, index);
     write_pass_sum(index, index, push.point_count, chain.light, chain.seen, push.film_scale, push.film_limit, push.rounding, false);
-    write_missing_points(index, 0, push.point_count);
+    write_missing_points(push.point_count);
 }

@@ -18,6 +18,8 @@ layout(set = 1, binding = 9, scalar) buffer SurfaceSquares { uvec4 surface_squar
 
 #include "dispatch/dispatch.glsl"
 #include "world/scene/effects.glsl"
+#include "world/scene/sample_places.glsl"
+#include "world/scene/extra_samples.glsl"
 #include "film/wide.glsl"
 #include "rng/hash.glsl"
 #include "film/kept_places.glsl"
@@ -30,21 +32,23 @@ void main()
     if (pixel >= push.end_pixel) {
         return;
     }
+    work = push.work;
+    uint samples = samples_of(pixel);
     bool ends_block = push.ends_block != 0;
     uint kept = ends_block ? kept_number(pixel, push.pixel_count) : NONE;
     for (uint channel = 0; channel < 3; channel++) {
         uint place = 3 * pixel + channel;
         uvec2 sum = uvec2(0);
-        for (uint number = 0; number < push.samples; number++) {
-            sum = add64(sum, pass_sums[place_of_sums(push.samples * pixel + number) + channel]);
-        }
-        for (uint k = 0; k < push.points_per_pixel; k++) {
-            sum = add64(sum, estimates[3 * (k * push.pixel_count + pixel) + channel]);
+        for (uint number = 0; number < samples; number++) {
+            sum = add64(sum, pass_sums[place_of_sums(place_of_sample(pixel, number, push.pixel_count)) + channel]);
+            for (uint k = 0; k < push.points_per_path; k++) {
+                sum = add64(sum, estimates[3 * place_of_point(k, place_of_sample(pixel, number, push.pixel_count), push.pixel_count) + channel]);
+            }
         }
         uvec2 surface = sum;
         if (HAS_SEEN_LIGHT) {
-            for (uint number = 0; number < push.samples; number++) {
-                sum = add64(sum, pass_sums[place_of_sums(push.samples * pixel + number) + 3 + channel]);
+            for (uint number = 0; number < samples; number++) {
+                sum = add64(sum, pass_sums[place_of_sums(place_of_sample(pixel, number, push.pixel_count)) + 3 + channel]);
             }
             surface = add64(surface_sums_of_block[place], surface);
             surface_sums_of_block[place] = ends_block ? uvec2(0) : surface;

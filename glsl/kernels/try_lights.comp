@@ -11,6 +11,7 @@ layout(set = 1, binding = 0, scalar) writeonly buffer Found { float found[]; };
 #include "world/scene/rays.glsl"
 #include "rng/hash.glsl"
 #include "rng/sobol.glsl"
+#include "world/scene/sample_places.glsl"
 #include "world/scene/samples.glsl"
 #include "material/lobes.glsl"
 #include "material/scatter.glsl"

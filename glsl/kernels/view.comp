@@ -9,6 +9,7 @@
 layout(push_constant, scalar) uniform Push { ViewPush push; };
 
 #include "world/scene/camera_kernel.glsl"
+#include "world/scene/extra_samples.glsl"
 #include "world/scene/filter.glsl"
 #include "world/scene/tiles.glsl"
 
@@ -16,12 +17,19 @@ void main()
 {
     work = push.work;
     uint item = invocation_index();
-    uint place_in_order = push.first_pixel + item / work.samples;
+    uint pixel_count = push.width * push.height;
+    bool is_extra = push.first_pixel >= pixel_count;
+    uint place_in_order = push.first_pixel + (is_extra ? item : item / work.samples);
     if (place_in_order >= push.end_pixel) {
         return;
     }
-    uint pixel = pixel_in_tiles(place_in_order, push.width, push.height);
-    uint number = item % work.samples;
+    if (is_extra) {
+        own = extra_sample(place_in_order - pixel_count, pixel_count);
+    } else {
+        own = even_sample(pixel_in_tiles(place_in_order, push.width, push.height), item % work.samples);
+    }
+    uint pixel = own.pixel;
+    uint number = own.number;
     vec4 u = stratified_start(number, pixel, push.draws);
     vec2 place = vec2(pixel % push.width, pixel / push.width) + 0.5 + push.footprint * filter_offsets(u.xy);
     vec2 picture = vec2(divide(2.0 * place.x, push.width) - 1.0, 1.0 - divide(2.0 * place.y, push.height));
@@ -43,12 +51,13 @@ void main()
     if (HAS_MEDIA) {
         chain.media = media_at(origin);
     }
-    if (follow(pixel, number, push.width * push.height, push.draws, push.emitter_count, 0)) {
-        put_off(work.samples * pixel + number, CHAIN_STEPS);
+    if (follow(pixel_count, push.draws, push.emitter_count, 0)) {
+        put_off(CHAIN_STEPS);
     }
     note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), NONFINITE_LIGHT, push.draws.domain,
                 push.draws.round, pixel);
-    note_surface(chain.met_surface);
-    write_pass_sum(work.samples * pixel + number, pixel, push.width * push.height, chain.light, chain.seen, push.film_scale, push.film_limit, push.rounding, false);
-    write_missing_points(pixel, number, push.width * push.height);
+    note_surface(chain.met_surface, most_samples(pixel_count) / own.count);
+    float share = divide(1.0, float(own.count));
+    write_pass_sum(own.place, pixel, pixel_count, chain.light, chain.seen, share * push.film_scale, share * push.film_limit, push.rounding, false);
+    write_missing_points(pixel_count);
 }

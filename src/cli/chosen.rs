@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::output::destination::{Destination, write_all};
 use crate::plan::work_division::Division;
 use crate::settings::scene::SceneSettings;
+use crate::settings::tile_samples::TileSamples;
 use crate::text::refusal;
 
 #[derive(Args)]
@@ -38,6 +39,8 @@ pub(super) struct Chosen {
     /// Class of the device.
     device: String,
     pub(super) settings: Division,
+    /// Tiles with more samples than all pixels have.
+    tiles: Option<TileSamples>,
     /// Rounds that the goal was expected to take, whole blocks.
     pub(super) rounds: u32,
 }
@@ -75,8 +78,13 @@ impl Chosen {
             size: [chosen_for.size.0, chosen_for.size.1],
             device: chosen_for.device.into(),
             settings: Division::of(settings),
+            tiles: settings.tiles.clone(),
             rounds,
         }
+    }
+
+    pub(super) fn set(&self, settings: &SceneSettings) -> SceneSettings {
+        SceneSettings { tiles: self.tiles.clone(), ..self.settings.set(settings) }
     }
 
     fn open(path: &Path) -> Result<Chosen> {

@@ -172,7 +172,9 @@ impl Job<'_> {
                 caustic_photons: of_run("caustic_photons", settings.caustic_photons, free.caustic_photons),
                 neighbours: of_run("neighbours", settings.neighbours, free.neighbours),
             };
-            return Ok(division.set(settings));
+            let tiles = run.identity.settings.get("tiles").and_then(|tiles| serde_json::from_value(tiles.clone()).ok());
+            let tiles = tiles.filter(|_| free.samples).or_else(|| settings.tiles.clone());
+            return Ok(SceneSettings { tiles, ..division.set(settings) });
         }
         self.choose(gpu, view, reporter)
     }
@@ -192,7 +194,7 @@ impl Job<'_> {
             })?;
             if let Some(pilot) = pilot {
                 reporter.note(&scene_report::pilot(&pilot, &settings.stop, self.point));
-                found = pilot.chosen.set(settings);
+                found = pilot.set(settings);
                 rounds = pilot.rounds.expected(pilot.chosen, &settings.stop);
             }
         }

@@ -80,7 +80,10 @@ pub(super) struct RenderArgs {
 impl RenderArgs {
     pub(super) fn settings(&self, map: Option<&MapFile>, chosen: Option<&Chosen>) -> SceneSettings {
         let usual = self.picture.settings(map, chosen);
-        SceneSettings { filter: self.filter.map_or(usual.filter, Filter::from), samples: self.samples.unwrap_or(usual.samples), ..usual }
+        // Tiles with more samples were chosen together with those of all pixels.
+        let tiles = usual.tiles.clone().filter(|_| self.samples.is_none());
+        let filter = self.filter.map_or(usual.filter, Filter::from);
+        SceneSettings { filter, samples: self.samples.unwrap_or(usual.samples), tiles, ..usual }
     }
 
     /// What a pilot may choose: what is not set, of a run that ends by its error or its time.

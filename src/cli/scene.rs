@@ -343,7 +343,7 @@ impl PhotonArgs {
     /// Settings that are usual or chosen, but for these.
     pub(super) fn settings(&self, common: &CommonArgs, chosen: Option<&Chosen>) -> SceneSettings {
         let usual = SceneSettings::default();
-        let usual = chosen.map_or_else(|| usual.clone(), |chosen| chosen.settings.set(&usual));
+        let usual = chosen.map_or_else(|| usual.clone(), |chosen| chosen.set(&usual));
         // As many as of the global map, unless something else is known.
         let caustic_photons = self.photons.filter(|_| chosen.is_none()).unwrap_or(usual.caustic_photons);
         let photons = self.photons.unwrap_or(usual.photons);

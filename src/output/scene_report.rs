@@ -221,7 +221,7 @@ fn plan_report<'a>(plan: &'a ScenePlan, run: Option<(&Timings, &[u64])>) -> Plan
         effects: rows(plan, run),
         maps: plan.maps().collect(),
         trial: plan.trial.as_ref(),
-        points_per_pixel: plan.points_per_pixel,
+        points_per_pixel: plan.samples() * plan.points_per_path,
         bytes: plan.bytes,
     }
 }

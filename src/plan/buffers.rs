@@ -241,6 +241,7 @@ impl ScenePlan {
         let measures_bias = self.film.bias == BiasPlan::Blocks;
         let difference_words = (difference_count(pixels as usize) + row_length(pixels as usize)) as u64;
         let mut buffers = vec![
+            buffer::<u32>("extra samples", self.extra_samples.table.len() as u64, "samples of tiles that have more"),
             buffer::<u64>("block sums", 3 * pixels, "sums of the block under way"),
             buffer::<u64>("film sums", 3 * pixels, "sums of all blocks"),
             buffer::<u64>("film squares", 6 * pixels, "sums of their squares"),
@@ -250,7 +251,11 @@ impl ScenePlan {
             buffer::<f32>("latest blocks", PART_VALUES * kept_values(pixels as usize) as u64, "some pixels of the latest blocks"),
             buffer::<u32>("one hits", u64::from(HIT_KINDS) * pixels, "what one hit would add where none has"),
             buffer::<u32>("one hits of blocks", u64::from(HIT_KINDS) * pixels, "the same as the latest whole block left it"),
-            buffer::<u64>("pass sums", 3 * (pixels + seen) * u64::from(self.samples()), "samples of pixels in a round"),
+            buffer::<u64>(
+                "pass sums",
+                3 * (if self.film.sees_light { 2 } else { 1 }) * u64::from(self.paths()),
+                "samples of pixels in a round",
+            ),
             buffer::<VisiblePoint>("visible points", points, "where photons are looked up"),
             buffer::<MattLobes>("matt lobes", if self.keeps(Effect::Layers) { points } else { 0 }, "how layered points weigh light"),
             buffer::<MattCover>("matt covers", if self.has_covers() { points } else { 0 }, "coats, sheen and films of visible points"),

@@ -5,6 +5,7 @@ pub mod buffers;
 pub mod capacity;
 pub mod differences;
 pub mod evidence;
+pub mod extra_samples;
 pub mod film;
 pub mod latest_blocks;
 pub mod light_choice;

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use super::Limits;
 use super::buffers::{PlannedBuffer, bytes_of};
 use super::evidence::{EffectDecision, Facts};
+use super::extra_samples::ExtraSamples;
 use super::film::{BiasPlan, FilmPlan};
 use super::light_choice::LightChoice;
 use super::maps::Maps;
@@ -111,17 +112,23 @@ impl ScenePlan {
         let clusters = trial.as_ref().and_then(|trial| trial.lights.as_ref()).map_or(0, |lights| lights.clusters);
         constants.push(("LIGHT_CLUSTERS", clusters));
         let Maps { global, caustic, caustic_surfaces, targets, arrivals } = maps;
-        let points_per_pixel = samples * if gather_rays == GATHER_NONE { 1 } else { 2 };
+        let tiles = settings.tiles.as_ref().filter(|_| is_picture);
+        tiles.map_or(Ok(()), |tiles| tiles.check(samples, sensor.size()))?;
+        let of_tiles = "cannot name the pixels of tiles with more samples, as a pilot or --settings gives them; set --samples too";
+        require(!settings.paranoid || tiles.is_none(), "--paranoid", "on", of_tiles)?;
+        let extra_samples = ExtraSamples::new(tiles, samples, sensor.size());
+        let most_samples = extra_samples.most;
+        let points_per_path = if gather_rays == GATHER_NONE { 1 } else { 2 };
         let arrival_sets = if split { 2 } else { 3 };
         let limit = MOST_UNITS / f64::from(settings.rounds.max(ROUNDS_OF_UNIT));
         let film = FilmPlan {
             scale: 1.0,
             limit,
-            point_limit: limit / f64::from((points_per_pixel * arrival_sets).next_power_of_two()),
+            point_limit: limit / f64::from((most_samples * points_per_path * arrival_sets).next_power_of_two()),
             rounds_per_block: settings.rounds_per_block(is_picture),
-            samples,
+            samples: most_samples,
             // What is seen straight is rounded by itself.
-            roundings_per_round: f64::from((PART_COUNT + 1) * samples + points_per_pixel * arrival_sets),
+            roundings_per_round: f64::from(most_samples * (PART_COUNT + 1 + points_per_path * arrival_sets)),
             sees_light: is_picture,
             rare_radiance: 0.0,
             alpha: settings.alpha,
@@ -140,11 +147,13 @@ impl ScenePlan {
             caustic,
             caustic_surfaces,
             targets,
-            points_per_pixel,
+            points_per_path,
+            extra_samples,
             arrival_sets,
             arrivals,
             chain_steps,
             film,
+            paths_only: false,
             footprint: 1.0,
             work_per_submission: limits.pair_tests_per_submission,
             bytes: 0,
@@ -170,7 +179,9 @@ impl ScenePlan {
         if shows_lamps && self.film.sees_light && self.settings.part as u32 & PART_SPECULAR != 0 {
             // A path of one channel stands for three.
             let of_channel = if self.keeps(Effect::Dispersion) { 3.0 } else { 1.0 };
-            self.film.rare_radiance = of_channel * geometry.brightest_shown();
+            // Where a pixel has fewest samples, each counts more than where it has most.
+            let fewest = f64::from(self.film.samples / self.samples());
+            self.film.rare_radiance = fewest * of_channel * geometry.brightest_shown();
         }
         let widest = |map: &Option<MapPlan>| map.as_ref().map_or(0.0, |map| self.widest_radius(map, 0));
         self.film.widest_radii = [widest(&self.global), widest(&self.caustic)];

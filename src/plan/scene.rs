@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::capacity::Persistence;
 use super::evidence::EffectDecision;
+use super::extra_samples::ExtraSamples;
 use super::film::FilmPlan;
 use super::light_choice::LightChoice;
 use super::radius::{self, Classes, RADIUS_RANGE, RadiusFrom, Trial};
@@ -106,7 +107,10 @@ pub struct ScenePlan {
     pub caustic_surfaces: u32,
     /// What photons of the caustic map are aimed at.
     pub targets: Vec<CausticTarget>,
-    pub points_per_pixel: u32,
+    /// Visible points that one camera path may have.
+    pub points_per_path: u32,
+    /// Those of tiles with more samples than all pixels have.
+    pub extra_samples: ExtraSamples,
     /// Sets of sums a visible point has, one an arrival.
     pub arrival_sets: u32,
     /// Mask of the arrivals that some map holds.
@@ -114,6 +118,8 @@ pub struct ScenePlan {
     /// Surfaces that one dispatch follows a camera path over.
     pub chain_steps: u32,
     pub film: FilmPlan,
+    /// Light that photons bring is left out: of a pilot that looks at paths alone.
+    pub paths_only: bool,
     /// Width of a pixel's filter over the distance between pixels, which are spread where it is less than 1.
     pub footprint: f64,
     /// Rays or pair tests after which commands are handed to the device.
@@ -221,7 +227,7 @@ impl ScenePlan {
     }
 
     pub fn visible_points(&self) -> u32 {
-        self.sensor.pixels().saturating_mul(self.points_per_pixel)
+        self.paths().saturating_mul(self.points_per_path)
     }
 
     /// Pixels of one dispatch that casts `rays` rays each.
@@ -249,18 +255,27 @@ impl ScenePlan {
 
     /// Camera paths that one dispatch may leave.
     pub fn camera_path_capacity(&self) -> u64 {
-        let pixels = self.pixels_at_once(self.rays_per_pixel()).min(self.sensor.pixels());
-        if self.chains_go_on() { u64::from(pixels) * u64::from(self.samples()) } else { 0 }
+        if self.chains_go_on() { u64::from(self.camera_paths_at_once()) } else { 0 }
+    }
+
+    /// Camera paths of one dispatch, at most.
+    pub fn camera_paths_at_once(&self) -> u32 {
+        self.pixels_at_once(self.rays_per_pixel()).min(self.sensor.pixels()).saturating_mul(self.samples())
     }
 
     /// Rays of one pixel, roughly.
     pub fn rays_per_pixel(&self) -> u32 {
-        self.points_per_pixel * (1 + self.shadow_rays())
+        self.samples() * self.points_per_path * (1 + self.shadow_rays())
     }
 
-    /// Paths from the camera through a pixel, or from a receiver, in a round.
+    /// Paths from the camera through each pixel, or from a receiver, in a round.
     pub fn samples(&self) -> u32 {
-        self.film.samples
+        if matches!(self.sensor, Sensor::Picture { .. }) { self.settings.samples } else { 1 }
+    }
+
+    /// Paths of a round, with those that some tiles have beyond these.
+    pub fn paths(&self) -> u32 {
+        self.sensor.pixels().saturating_mul(self.samples()).saturating_add(self.extra_samples.count)
     }
 
     /// Rays towards lights from a visible point; none where the maps hold direct light too.
@@ -270,7 +285,12 @@ impl ScenePlan {
 
     /// The same as the kernels take it.
     pub fn work(&self) -> WorkDivision {
-        WorkDivision { samples: self.samples(), shadow_rays: self.shadow_rays(), rounds_per_block: self.film.rounds_per_block }
+        WorkDivision {
+            samples: self.samples(),
+            shadow_rays: self.shadow_rays(),
+            rounds_per_block: self.film.rounds_per_block,
+            extra_samples: self.extra_samples.count,
+        }
     }
 
     pub fn constant(&self, name: &str) -> u32 {

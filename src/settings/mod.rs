@@ -24,6 +24,7 @@ macro_rules! named {
 pub mod builder;
 pub mod scene;
 pub mod stop;
+pub mod tile_samples;
 
 use serde::Serialize;
 

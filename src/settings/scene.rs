@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 pub use super::stop::Stop;
+use super::tile_samples::TileSamples;
 use super::{Builder, MAX_PHOTONS, Math, check_common};
 use crate::constants::{self, MAX_BOUNCES};
 use crate::error::{Error, Result, require, within};
@@ -131,6 +132,8 @@ pub struct SceneSettings {
     pub edge_correction: bool,
     /// Paths from the camera through each pixel, each pass, a power of two; of a picture.
     pub samples: u32,
+    /// Tiles of a picture that have more; `None`: none.
+    pub tiles: Option<TileSamples>,
     /// Shadow rays from each visible point, each pass.
     pub shadow_rays: u32,
     /// Indirect light by a ray to the next surface instead of the map where the camera looks.
@@ -175,6 +178,7 @@ impl Default for SceneSettings {
             kernel: Kernel::Box,
             edge_correction: true,
             samples: 1,
+            tiles: None,
             shadow_rays: 4,
             final_gather: false,
             aim: true,
@@ -204,7 +208,7 @@ const MAX_NEIGHBOURS: u32 = 10_000;
 /// A visible point's rays are one loop.
 const MAX_SHADOW_RAYS: u32 = 64;
 /// A pixel's paths are summed by one invocation.
-const MAX_SAMPLES: u32 = 1024;
+pub const MAX_SAMPLES: u32 = 1024;
 
 impl SceneSettings {
     pub fn validate(&self) -> Result<()> {

@@ -2,6 +2,7 @@
 
 #include "world/scene/rays.glsl"
 #include "rng/sobol.glsl"
+#include "world/scene/sample_places.glsl"
 #include "world/scene/samples.glsl"
 #include "film/wide.glsl"
 #include "world/scene/film_units.glsl"

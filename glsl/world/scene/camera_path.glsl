@@ -183,9 +183,9 @@ bool seeks_light()
 }
 
 // Leaves a visible point, of whose light `scale` goes on to the eye. Says whether a gather ray leaves it.
-bool leave_point(Surface surface, Lobes lobes, vec3 wo, vec3 scale, bool for_all, uint index, uint number, uint pixel_count)
+bool leave_point(Surface surface, Lobes lobes, vec3 wo, vec3 scale, bool for_all, uint pixel_count)
 {
-    bool leads = !for_all || number == 0;
+    bool leads = !for_all || own.number == 0;
     bool gathers = leads && !chain.gathers && gathers_here(surface) && (PARTS & part_of(ARRIVED_INDIRECT)) != 0;
     uint arrivals = arrivals_wanted(gathers);
     uint for_others = 0;
@@ -196,8 +196,8 @@ bool leave_point(Surface surface, Lobes lobes, vec3 wo, vec3 scale, bool for_all
     arrivals |= arrivals == 0 ? SEEN
                               : SEEN | (chain.saw_specular ? SEEN_OVER_SPECULAR : 0) | (chain.gathers ? SEEN_BY_GATHER : 0)
                                     | (for_all ? SEEN_FOR_ALL : 0);
-    uint place = place_of_point(chain.point_count++, index, number, pixel_count);
-    visible_points[place] = VisiblePoint(surface.position, surface.plane, divide(chain.weight * scale, float(work.samples)),
+    uint place = place_of_point(chain.point_count++, own.place, pixel_count);
+    visible_points[place] = VisiblePoint(surface.position, surface.plane, divide(chain.weight * scale, float(own.count)),
                                          surface.ns == surface.ng ? NONE : pack_normal(surface.ns), pack_direction(wo, 0), surface.parameter,
                                          surface.kind, arrivals);
     if (HAS_LAYERS) {
@@ -206,10 +206,12 @@ bool leave_point(Surface surface, Lobes lobes, vec3 wo, vec3 scale, bool for_all
     return gathers;
 }
 
-// Follows the path of sample `number` of a place, which is over `first_depth` surfaces already. Says whether it is still under way. Random
+// Follows the path of a sample, which is over `first_depth` surfaces already. Says whether it is still under way. Random
 // numbers: block 1 + VERTEX_BLOCKS * depth goes on, the one after it is for direct light.
-bool follow(uint index, uint number, uint pixel_count, Draws draws, uint emitter_count, uint first_depth)
+bool follow(uint pixel_count, Draws draws, uint emitter_count, uint first_depth)
 {
+    uint index = own.pixel;
+    uint number = own.number;
     uint end_depth = min(first_depth + CHAIN_STEPS, MAX_BOUNCES);
     for (uint depth = first_depth; depth < end_depth; depth++) {
         note_unless(is_finite(chain.position) && is_finite(chain.direction) && is_finite(chain.weight), NONFINITE_LIGHT, draws.domain,
@@ -300,7 +302,7 @@ bool follow(uint index, uint number, uint pixel_count, Draws draws, uint emitter
                 chain.from = surface.position;
                 chain.from_normal = surface.ns;
             }
-            note_shadow_rays(index, divide(chain.weight * scale, float(work.samples)));
+            note_shadow_rays(index, divide(chain.weight * scale, float(own.count)));
         }
         // Matt lobes are followed no further but for a gather.
         if (is_layered && !specular && matt == 0.0) {
@@ -312,10 +314,10 @@ bool follow(uint index, uint number, uint pixel_count, Draws draws, uint emitter
             }
             // Where it is by chance that a path gets here, each counts for itself.
             bool for_all = !chain.saw_specular && !chain.gathers && matt == 1.0;
-            if (leave_point(surface, lobes, wo, scale, for_all, index, number, pixel_count)) {
+            if (leave_point(surface, lobes, wo, scale, for_all, pixel_count)) {
                 chain.gathers = true;
                 chain.density = 0.0;
-                chain.weight *= for_all ? float(work.samples) : 1.0;
+                chain.weight *= for_all ? float(own.count) : 1.0;
                 // Shadow rays and the caustic map have counted what shines from here on.
                 chain.sees_emission = false;
             } else if (asks_lights && is_layered && seeks_light()) {
@@ -334,7 +336,7 @@ bool follow(uint index, uint number, uint pixel_count, Draws draws, uint emitter
         }
         vec3 u = stratified_at(number, index, block, draws).zxy;
         float mirror_chance = 0.0;
-        if (work.samples * work.rounds_per_block >= MIRROR_SAMPLES && specular && depth < 2 && !chain.gathers) {
+        if (own.count * work.rounds_per_block >= MIRROR_SAMPLES && specular && depth < 2 && !chain.gathers) {
             mirror_chance = MIRROR_CHANCES[depth];
             u.x = chain.choices[depth];
         }
@@ -379,20 +381,19 @@ layout(set = 1, binding = 9, scalar) writeonly buffer NextCameraPaths { CameraPa
 // [0]: how many.
 layout(set = 1, binding = 10, scalar) buffer CameraPathCounts { uint camera_path_counts[]; };
 
-// `place` is that of the sample among all samples.
-void put_off(uint place, uint depth)
+void put_off(uint depth)
 {
     uint flags = uint(chain.saw_specular) | uint(chain.gathers) << 1 | uint(chain.starts_nowhere) << 2 | uint(chain.sees_emission) << 3
                | uint(chain.ends_at_light) << 6 | uint(chain.met_surface) << 7;
     next_camera_paths[atomicAdd(camera_path_counts[0], 1)] =
-        CameraPath(chain.position, place, chain.direction, flags | chain.point_count << 4 | depth << 8, chain.weight, chain.media, chain.density, chain.from,
+        CameraPath(chain.position, own, chain.direction, flags | chain.point_count << 4 | depth << 8, chain.weight, chain.media, chain.density, chain.from,
                    chain.from_normal);
 }
 
 // Visible points that the path has not found: nothing arrives there.
-void write_missing_points(uint pixel, uint number, uint pixel_count)
+void write_missing_points(uint pixel_count)
 {
     for (uint k = chain.point_count; k < points_per_path(); k++) {
-        visible_points[place_of_point(k, pixel, number, pixel_count)] = no_point();
+        visible_points[place_of_point(k, own.place, pixel_count)] = no_point();
     }
 }

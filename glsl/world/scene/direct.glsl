@@ -159,8 +159,8 @@ vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uin
         return sum;
     }
     uvec4 words = words_of(index, block, draws);
-    number = number_in_block(number, work.samples, draws);
-    uint sample_count = work.samples * work.rounds_per_block;
+    number = number_in_block(number, own.count, draws);
+    uint sample_count = own.count * work.rounds_per_block;
     uint ray_count = work.shadow_rays;
     uint unseen_row = 0;
     if (LIGHT_CLUSTERS != 0) {

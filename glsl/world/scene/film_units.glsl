@@ -21,11 +21,11 @@ void note_cut_path(float weight)
     add_to_anomaly(6, uint(min(weight * 1048576.0, 2147483648.0)));
 }
 
-// Counts a sample of a pixel whose path meets a surface that scatters light.
-void note_surface(bool met)
+// Counts a sample of a pixel whose path meets a surface that scatters light, as so many of the pixels that have most samples.
+void note_surface(bool met, uint weight)
 {
     if (HAS_SEEN_LIGHT) {
-        uint count = subgroupAdd(met ? 1u : 0u);
+        uint count = subgroupAdd(met ? weight : 0u);
         if (subgroupElect() && count != 0) {
             add_to_anomaly(8, count);
         }

@@ -9,23 +9,6 @@ layout(set = 1, binding = 2, scalar) buffer PassSums { uvec2 pass_sums[]; };
 layout(set = 1, binding = 14, scalar) writeonly buffer MattLobesOfPoints { MattLobes matt_lobes[]; };
 layout(set = 1, binding = 16, scalar) writeonly buffer MattCoversOfPoints { MattCover matt_covers[]; };
 
-// Points that one camera path may have.
-uint points_per_path()
-{
-    uint count = 1;
-    if (GATHER_RAYS != GATHER_NONE) {
-        count = 2;
-    }
-    return count;
-}
-
-// Where point `k` of sample `number` stands: all pixels' first points before their second ones, so that neighbours in memory are
-// neighbours in the picture.
-uint place_of_point(uint k, uint pixel, uint number, uint pixel_count)
-{
-    return (points_per_path() * number + k) * pixel_count + pixel;
-}
-
 void write_matt_lobes(uint place, Lobes lobes)
 {
     matt_lobes[place] = lobes.matt;

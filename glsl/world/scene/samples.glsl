@@ -4,9 +4,6 @@
 // likely anywhere, and those of all rounds of a block together lie evenly, the first two numbers most of all. Nothing of a block
 // depends on another, so blocks are as independent as by chance alone.
 
-// Of this dispatch. It is no constant, so that another division needs no other pipeline; `main` sets it.
-WorkDivision work = WorkDivision(1, 1, 1);
-
 vec4 scrambled(uint number, uvec4 words)
 {
     uvec4 point = sobol(number);
@@ -31,7 +28,7 @@ uvec4 words_of(uint index, uint vertex, Draws draws)
 // Where sample `number` of a place starts: four numbers of vertex 0.
 vec4 stratified_start(uint number, uint index, Draws draws)
 {
-    return scrambled(number_in_block(number, work.samples, draws), words_of(index, 0, draws));
+    return scrambled(number_in_block(number, own.count, draws), words_of(index, 0, draws));
 }
 
 // Three numbers for sample `number` of `count`, shuffled, so that two vertices meet as by chance.
@@ -44,5 +41,5 @@ vec3 stratified(uint number, uint count, uvec4 words)
 // The same at a vertex of sample `number` of a place.
 vec3 stratified_at(uint number, uint index, uint vertex, Draws draws)
 {
-    return stratified(number_in_block(number, work.samples, draws), work.samples * work.rounds_per_block, words_of(index, vertex, draws));
+    return stratified(number_in_block(number, own.count, draws), own.count * work.rounds_per_block, words_of(index, vertex, draws));
 }

@@ -27,9 +27,13 @@ uint pixel_in_tiles(uint place, uint width, uint height)
     return pixel.y * width + pixel.x;
 }
 
-// The same of visible points: sets of one a pixel, set after set. Receivers have an order of their own: their width is 0.
+// The same of visible points: sets of one a pixel, set after set. Receivers have an order of their own: their width is 0; and so have extra
+// samples.
 uint point_in_tiles(uint place, uint width, uint height, uint pixel_count)
 {
+    if (width == 0 || place >= even_points(pixel_count)) {
+        return place;
+    }
     uint pixel = place % pixel_count;
-    return width == 0 ? place : place - pixel + pixel_in_tiles(pixel, width, height);
+    return place - pixel + pixel_in_tiles(pixel, width, height);
 }

@@ -23,6 +23,7 @@ pub fn cut_discs(commands: &mut Commands, round: Round, map: &MapPlan) -> Result
     let (width, height) = plan.sensor.size();
     in_pieces(commands, plan, plan.visible_points(), plan.pixels_at_once(4), 256, |commands, first_point, end_point| {
         let push = DiscCutsPush {
+            work: plan.work(),
             first_point,
             end_point,
             pixel_count: plan.sensor.pixels(),
@@ -81,6 +82,7 @@ pub fn gather(
     };
     in_pieces(commands, plan, point_count, plan.points_at_once(), map.tests_per_point(), |commands, first_point, end_point| {
         let push = SceneGatherPush {
+            work: plan.work(),
             first_point,
             end_point,
             point_count,
@@ -112,14 +114,14 @@ pub fn gather(
 pub fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u32; 2]) -> Result<()> {
     let Round { resources, geometry, plan, .. } = round;
     let SceneResources { scene, visible_points, estimates, near_sums, differences, radius_classes, disc_cuts, .. } = resources;
-    let SceneResources { one_hits, part_totals, anomalies, nonfinite_values, .. } = resources;
+    let SceneResources { one_hits, part_totals, anomalies, nonfinite_values, extra_samples, .. } = resources;
     let radius = |map: &Option<MapPlan>| map.as_ref().map_or(1.0, |map| plan.widest_radius(map, round.number)) as f32;
     let flux =
         |map: &Option<MapPlan>| map.as_ref().map_or(0.0, |map| map.photon_flux_of(geometry, traced[usize::from(map.caustic_only)])) as f32;
     let (width, height) = plan.sensor.size();
     in_pieces(commands, plan, plan.visible_points(), plan.pixels_at_once(4), 256, |commands, first_point, end_point| {
         let push = FluxToRadiancePush {
-            samples: plan.samples(),
+            work: plan.work(),
             first_point,
             end_point,
             point_count: plan.visible_points(),
@@ -149,6 +151,7 @@ pub fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u32; 2])
             one_hits,
             part_totals,
             nonfinite_values,
+            extra_samples,
         };
         commands.dispatch(kernel, &push, Extent::Items(u64::from(end_point - first_point)))
     })
@@ -157,23 +160,24 @@ pub fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u32; 2])
 /// Ends a round: light that was found joins its block, and at the end of that the film.
 pub fn resolve(commands: &mut Commands, round: Round, ends_block: bool) -> Result<()> {
     let Round { resources, plan, .. } = round;
-    let SceneResources { pass_sums, estimates, sums_of_block, film_sums, film_squares, .. } = resources;
+    let SceneResources { extra_samples, pass_sums, estimates, sums_of_block, film_sums, film_squares, .. } = resources;
     let SceneResources { surface_sums_of_block, surface_sums, surface_squares, part_totals, latest_blocks, .. } = resources;
     let pixel_count = plan.sensor.pixels();
-    let points_per_pixel = if resources.photons.is_some() { plan.points_per_pixel } else { 0 };
+    let points_per_path = if resources.photons.is_some() { plan.points_per_path } else { 0 };
     let block = round.number / plan.film.rounds_per_block;
-    let work = u64::from(plan.samples() + points_per_pixel);
+    let work = u64::from(plan.film.samples * (1 + points_per_path));
     in_pieces(commands, plan, pixel_count, plan.pixels_at_once(1), work, |commands, first_pixel, end_pixel| {
         let push = ResolvePush {
-            samples: plan.samples(),
+            work: plan.work(),
             first_pixel,
             end_pixel,
             pixel_count,
-            points_per_pixel,
+            points_per_path,
             block,
             ends_block: u32::from(ends_block),
         };
         let kernel = Resolve {
+            extra_samples,
             pass_sums,
             estimates,
             sums_of_block,

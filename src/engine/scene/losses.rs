@@ -43,7 +43,7 @@ pub fn losses(geometry: &Geometry, plan: &ScenePlan, fates: &[Fates], film: &Sce
         let of_part = if totals.stored > 0 && all > 0.0 { part / (1.0 - share) / (all + part * share / (1.0 - share)) } else { 1.0 };
         losses.relative += Losses::SAFETY * share * of_part;
     }
-    let paths = f64::from(plan.sensor.pixels()) * f64::from(plan.samples()) * f64::from(film.rounds.max(1));
+    let paths = f64::from(plan.paths()) * f64::from(film.rounds.max(1));
     // Of what surfaces scatter, over all pixels.
     let mean = film.surface_means().map(DVec3::element_sum).sum::<f64>() / (3 * film.pixels()).max(1) as f64;
     if mean > 0.0 {

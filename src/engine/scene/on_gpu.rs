@@ -114,7 +114,7 @@ pub fn light_from(gpu: &Gpu, view: &View, plan: ScenePlan, map: Option<&MapFile>
     commands.warm_up()?;
     commands.submit()?;
     let identity = control.keep.identity(|name| identity(name, view, &plan, map.map(|map| map.hash.as_str()), gpu.facts()))?;
-    let photons_per_round = plan.maps().map(|map| u64::from(map.photons)).sum();
+    let photons_per_round = if plan.paths_only { 0 } else { plan.maps().map(|map| u64::from(map.photons)).sum() };
     let task = Task {
         device: Some((gpu, pipelines_before)),
         identity,
@@ -344,9 +344,11 @@ impl SceneOnGpu<'_> {
         let SceneOnGpu { view, plan, resources, grids, stored, timed_chunks, .. } = self;
         let round = Round { resources, geometry: view.geometry, plan, number: state.round() };
         commands.scope("visible points", |commands| points::see(commands, round, view.camera))?;
-        if let Some(photons) = &resources.photons {
+        if resources.photons.is_some() {
             let sums = 3 * u64::from(plan.visible_points()) * u64::from(plan.arrival_sets);
             commands.fill(&resources.estimates, 0, sums, 0);
+        }
+        if let Some(photons) = resources.photons.as_ref().filter(|_| !plan.paths_only) {
             if plan.film.bias == BiasPlan::Blocks {
                 commands.fill(&resources.near_sums, 0, plan.near_sums(), 0);
             }

@@ -16,8 +16,9 @@ use crate::plan::scene::ScenePlan;
 use crate::plan::sensor::Sensor;
 use crate::plan::work_division::{Division, Free, MOST_PHOTONS, MOST_SAMPLES, MapVariance, Rounds, Variance, best, cost};
 use crate::scene::Scene;
-use crate::settings::scene::{SAMPLES_PER_BLOCK, SceneSettings};
+use crate::settings::scene::{MAX_SAMPLES, SAMPLES_PER_BLOCK, SceneSettings};
 use crate::settings::stop::{Measure, Stop};
+use crate::settings::tile_samples::{TILE, TileSamples};
 
 /// Pixels at most: of so many all that is known is kept.
 const PIXELS: f64 = 1024.0;
@@ -36,13 +37,24 @@ const LEAST_GAIN: f64 = 1.2;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pilot {
     pub before: Division,
+    /// With the mean of all pixels' samples.
     pub chosen: Division,
+    /// Where these differ: those that all pixels have, and the tiles that have more.
+    pub tiles: Option<(u32, TileSamples)>,
     pub rounds: Rounds,
     /// Shares of the squared noise of a round before, of direct light, light over mirrors and glass, caustics and indirect light.
     pub of_parts: [f64; PART_COUNT as usize],
 }
 
 impl Pilot {
+    pub fn set(&self, settings: &SceneSettings) -> SceneSettings {
+        let chosen = self.chosen.set(settings);
+        match &self.tiles {
+            Some((samples, tiles)) => SceneSettings { samples: *samples, tiles: Some(tiles.clone()), ..chosen },
+            None => chosen,
+        }
+    }
+
     /// How many times as long the settings before take for the same.
     pub fn gain(&self, stop: &Stop) -> f64 {
         self.rounds.loss(self.before, stop) / self.rounds.loss(self.chosen, stop)
@@ -87,7 +99,7 @@ pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Fre
     }
     let cost = cost(plan, view.geometry.triangles.len(), gpu.facts().kind);
     let counts_bias = plan.film.bias == BiasPlan::Blocks;
-    let rounds = Rounds { variance, cost, pixels: f64::from(plan.sensor.pixels()), alpha: settings.alpha, counts_bias };
+    let mut rounds = Rounds { variance, cost, pixels: f64::from(plan.sensor.pixels()), alpha: settings.alpha, counts_bias };
     let limits = engine::limits(gpu.facts());
     let plan_of =
         |division: Division| ScenePlan::with_trial(scene, view.geometry, &division.set(settings), plan.sensor, &limits, plan.trial.clone());
@@ -95,6 +107,27 @@ pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Fre
     // As many photons as are traced at once.
     let most = Division { photons: MOST_PHOTONS, caustic_photons: MOST_PHOTONS, ..before };
     let at_once = plan_of(most).map_or(before.photons, |plan| plan.maps().map(|map| map.chunk_photons).min().unwrap_or(before.photons));
+    let first = best(&rounds, before, free, &settings.stop, (MOST_SAMPLES, at_once));
+    let mut tiles = None;
+    // What is to name each pixel knows of no tiles.
+    if free.samples
+        && !settings.paranoid
+        && let Sensor::Picture { width, .. } = plan.sensor
+        && let Some(found) = of_tiles(gpu, scene, view, plan, first, &rounds)?
+    {
+        // Rare light that few pixels showed.
+        let seen = found.variance * (1.0 - of_many.light[2] - of_many.light[3]).max(0.0).powi(2);
+        rounds.variance.path = (seen - variance.shadow_ray / f64::from(first.shadow_rays)).max(variance.path);
+        let shares = smooth(&found.shares, width.div_ceil(TILE) as usize);
+        // Where samples go by the root of the variance, the mean variance is the square of the mean root (Neyman 1934).
+        let roots: Vec<f64> = shares.iter().map(|share| share.sqrt()).collect();
+        let root = roots.iter().sum::<f64>() / roots.len() as f64;
+        if root * root < LEAST_TILES {
+            rounds.variance.path *= root * root;
+            rounds.variance.shadow_ray *= root * root;
+            tiles = Some(roots.into_iter().map(|own| own / root).collect::<Vec<f64>>());
+        }
+    }
     let mut most_samples = MOST_SAMPLES;
     let mut chosen = best(&rounds, before, free, &settings.stop, (most_samples, at_once));
     // More samples than the device's buffers hold.
@@ -105,7 +138,98 @@ pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Fre
     if rounds.loss(before, &settings.stop) <= LEAST_GAIN * rounds.loss(chosen, &settings.stop) {
         chosen = before;
     }
-    Ok(Some(Pilot { before, chosen, rounds, of_parts: parts.map(|part| part / all) }))
+    let size = plan.sensor.size();
+    let tiles = tiles.map(|tiles| tile_samples(chosen.samples, &tiles, size)).filter(|(_, tiles)| tiles.most() > 0);
+    Ok(Some(Pilot { before, chosen, tiles, rounds, of_parts: parts.map(|part| part / all) }))
+}
+
+/// Less than this of the variance must be left for tiles to be worth their while.
+const LEAST_TILES: f64 = 0.8;
+/// Rounds of all pixels' paths, and the share of the run that these may take.
+const TILE_ROUNDS: std::ops::RangeInclusive<u32> = 4..=64;
+const TILE_SHARE: f64 = 0.05;
+/// What a path of these takes of one that is looked up in maps, too.
+const PATH_SHARE: f64 = 0.5;
+/// Of the mean variance, what a tile is taken to have that showed none.
+const HIDDEN_VARIANCE: f64 = 0.1;
+
+/// The variance of a path's light relative to the square of all of it, and of each tile over their mean.
+struct OfTiles {
+    variance: f64,
+    shares: Vec<f64>,
+}
+
+/// `None` where nothing varies, or it would take too much of the run.
+fn of_tiles(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, first: Division, rounds: &Rounds) -> Result<Option<OfTiles>> {
+    let stop = &run.settings.stop;
+    let goal =
+        stop.error.map_or(f64::INFINITY, |error| rounds.until(first, error).1).min(stop.seconds.map_or(f64::INFINITY, |most| 1e9 * most));
+    let a_round = PATH_SHARE * f64::from(SAMPLES) * (rounds.cost.paths + f64::from(first.shadow_rays) * rounds.cost.shadow_rays);
+    let fits = TILE_SHARE * goal / a_round;
+    if fits < f64::from(*TILE_ROUNDS.start()) {
+        return Ok(None);
+    }
+    let settings = SceneSettings {
+        samples: SAMPLES,
+        shadow_rays: first.shadow_rays,
+        photons: PHOTONS,
+        caustic_photons: PHOTONS,
+        rounds: fits.min(f64::from(*TILE_ROUNDS.end())) as u32,
+        block: Some(1),
+        seed: bias_batches::seed(SEED, 1),
+        stop: Stop { measure: Measure::Rmse, ..Stop::default() },
+        ..run.settings.clone()
+    };
+    let (width, height) = run.sensor.size();
+    let mut plan = trial::plan(gpu, scene, view, &settings, run.sensor)?;
+    plan.paths_only = true;
+    let film = light(gpu, view, plan, &mut Control::default())?.film;
+    let mean = film.surface_means().map(|mean| mean.element_sum()).sum::<f64>() / film.pixels() as f64;
+    if mean <= 0.0 {
+        return Ok(None);
+    }
+    let columns = width.div_ceil(TILE);
+    let mut variances = vec![(0.0, 0u32); (columns * height.div_ceil(TILE)) as usize];
+    for pixel in 0..film.pixels() {
+        let (x, y) = (pixel as u32 % width, pixel as u32 / width);
+        let (variance, count) = &mut variances[(y / TILE * columns + x / TILE) as usize];
+        *variance += film.surface_error(pixel).length_squared();
+        *count += 1;
+    }
+    let all = variances.iter().map(|(variance, _)| variance).sum::<f64>() / film.pixels() as f64;
+    // Of the mean of three channels.
+    let of_path = 3.0 * all / (mean * mean) * f64::from(SAMPLES) * f64::from(film.rounds);
+    if std::env::var("PM_DEBUG").is_ok() {
+        eprintln!("of_path {of_path} mean {mean} all {all} rounds {} samples {} first {first:?} {:?}", film.rounds, film.plan.samples, rounds.variance);
+    }
+    let shares = variances.into_iter().map(|(variance, count)| variance / f64::from(count.max(1)) / all);
+    Ok((all > 0.0).then(|| OfTiles { variance: of_path, shares: shares.collect() }))
+}
+
+/// A tile's variance is little known: that of its neighbours tells some of it.
+fn smooth(shares: &[f64], columns: usize) -> Vec<f64> {
+    let rows = shares.len() / columns;
+    let at = |x: usize, y: usize| {
+        let near = |place: usize, count: usize| place.saturating_sub(1)..(place + 2).min(count);
+        let weights = near(y, rows).flat_map(|other_y| near(x, columns).map(move |other_x| (other_x, other_y)));
+        let (mut sum, mut all) = (0.0, 0.0);
+        for (other_x, other_y) in weights {
+            let weight = if other_x == x { 2.0 } else { 1.0 } * if other_y == y { 2.0 } else { 1.0 };
+            sum += weight * shares[other_y * columns + other_x];
+            all += weight;
+        }
+        HIDDEN_VARIANCE + (1.0 - HIDDEN_VARIANCE) * sum / all
+    };
+    (0..shares.len()).map(|tile| at(tile % columns, tile / columns)).collect()
+}
+
+/// Samples of all pixels, and how often they double in each tile, for a mean of so many and what each tile is to have of that.
+fn tile_samples(mean: u32, shares: &[f64], size: (u32, u32)) -> (u32, TileSamples) {
+    let least = shares.iter().copied().fold(f64::INFINITY, f64::min) * f64::from(mean);
+    let samples = least.log2().round().exp2().clamp(1.0, f64::from(MAX_SAMPLES)) as u32;
+    let most = f64::from((MAX_SAMPLES / samples).ilog2().min(9));
+    let doublings = |share: &f64| (share * f64::from(mean) / f64::from(samples)).log2().round().clamp(0.0, most) as u32;
+    (samples, TileSamples::new(&shares.iter().map(doublings).collect::<Vec<u32>>(), size))
 }
 
 /// What a round's parts are like: the variance of a path's light, or of a map's, and the light itself, relative to all light.
@@ -119,6 +243,7 @@ struct Parts {
 fn parts(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, shadow_rays: u32) -> Result<Parts> {
     let settings = SceneSettings {
         samples: SAMPLES,
+        tiles: None,
         shadow_rays,
         photons: PHOTONS,
         caustic_photons: PHOTONS,

@@ -69,7 +69,8 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
     let goes_on = plan.chains_go_on();
     let emitter_count = geometry.emitters.len() as u32;
     let draws = |domain| Draws { seed: words(plan.settings.seed), round, domain };
-    in_pieces(commands, plan, plan.sensor.pixels(), plan.pixels_at_once(rays), 64 * u64::from(rays), |commands, first, end| {
+    let pixels = plan.sensor.pixels();
+    let mut record = |commands: &mut Commands, first: u32, end: u32| {
         if goes_on {
             commands.fill(camera_path_counts, 0, 1, 0);
         }
@@ -97,13 +98,13 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                     lens_radius: (lens.radius / geometry.unit) as f32,
                     focus: (lens.focus / geometry.unit) as f32,
                     emitter_count,
-                    // Each sample has its share of the pixel's light; exact, as their number is a power of two.
                     footprint: plan.footprint as f32,
-                    film_scale: (plan.film.scale / f64::from(plan.samples())) as f32,
-                    film_limit: (plan.film.limit / f64::from(plan.samples())) as f32,
+                    film_scale: plan.film.scale as f32,
+                    film_limit: plan.film.limit as f32,
                 };
-                let kernel = camera_kernel!(View, resources, next_camera_paths: camera_paths);
-                commands.dispatch(kernel, &push, Extent::Items(u64::from(end - first) * u64::from(plan.samples())))?;
+                let kernel = camera_kernel!(View, resources, next_camera_paths: camera_paths, extra_samples: &resources.extra_samples);
+                let paths_of_each = if first < pixels { plan.samples() } else { 1 };
+                commands.dispatch(kernel, &push, Extent::Items(u64::from(end - first) * u64::from(paths_of_each)))?;
             }
             Sensor::Receivers { .. } => {
                 let receivers = &resources.receivers[round as usize % resources.receivers.len()];
@@ -128,6 +129,13 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
             go_on(commands, resources, geometry, plan, round)?;
         }
         Ok(())
+    };
+    in_pieces(commands, plan, pixels, plan.pixels_at_once(rays), 64 * u64::from(rays), &mut record)?;
+    // Extra samples, behind all pixels.
+    let rays = rays / plan.samples();
+    let most = plan.pixels_at_once(rays).min(plan.camera_paths_at_once());
+    in_pieces(commands, plan, plan.extra_samples.count, most, 64 * u64::from(rays), |commands, first, end| {
+        record(commands, pixels + first, pixels + end)
     })
 }
 
@@ -144,11 +152,12 @@ fn go_on(commands: &mut Commands, resources: &SceneResources, geometry: &Geometr
         let push = GoOnPush {
             draws: Draws { seed: words(plan.settings.seed), round, domain },
             work: plan.work(),
+            most_samples: plan.film.samples,
             path_count,
             pixel_count: plan.sensor.pixels(),
             emitter_count: geometry.emitters.len() as u32,
-            film_scale: (plan.film.scale / f64::from(plan.samples())) as f32,
-            film_limit: (plan.film.limit / f64::from(plan.samples())) as f32,
+            film_scale: plan.film.scale as f32,
+            film_limit: plan.film.limit as f32,
             rounding: rounding(plan, round),
         };
         let kernel = camera_kernel!(GoOn, resources, camera_paths: &resources.camera_paths[parity], next_camera_paths: &resources.camera_paths[1 - parity]);

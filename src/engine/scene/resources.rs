@@ -49,6 +49,8 @@ buffers! {
         photons: Option<PhotonBuffers> = plan.maps().next().map(|_| PhotonBuffers::made(planned, commands, plan)).transpose()?,
         // What the sensor sees in the round under way.
         visible_points: Buffer<VisiblePoint> = planned.one("visible points")?,
+        /// Written once.
+        extra_samples: Buffer<u32> = planned.filled(commands, "extra samples", &plan.extra_samples.table)?,
         matt_lobes: Buffer<MattLobes> = planned.one("matt lobes")?,
         matt_covers: Buffer<MattCover> = planned.one("matt covers")?,
         pass_sums: Buffer<u64> = planned.one("pass sums")?,

@@ -82,17 +82,20 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, lights: Option<Li
         caustic_photons: PHOTONS,
         rounds: 1,
         seed: bias_batches::seed(SEED, 0),
+        // Radii and lights are those of places, whatever the paths there.
+        samples: 1,
+        tiles: None,
         // Parts of a picture have the radii and lights of the whole, so that they add up to it.
         part: Part::All,
         stop: Stop::default(),
         ..run.settings.clone()
     };
     // Of the whole too.
-    let points_per_pixel = match run.settings.part {
-        Part::All => run.points_per_pixel,
-        _ => ScenePlan::new(scene, view.geometry, &settings, run.sensor, limits)?.points_per_pixel,
+    let points_per_path = match run.settings.part {
+        Part::All => run.points_per_path,
+        _ => ScenePlan::new(scene, view.geometry, &settings, run.sensor, limits)?.points_per_path,
     };
-    let most_points = (POINTS / points_per_pixel).max(1);
+    let most_points = POINTS / points_per_path;
     let (sensor, phases) = match run.sensor {
         Sensor::Picture { width, height } => {
             let smaller = (f64::from(most_points) / (f64::from(width) * f64::from(height))).sqrt().min(1.0);
