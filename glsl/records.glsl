@@ -774,6 +774,8 @@ struct ResolvePush {
     uint pixel_count;
     // Visible points of a path that photons may have lit.
     uint points_per_path;
+    // Whether what paths find counts.
+    uint counts_paths;
     uint block;
     // 1: it is the last round of its block.
     uint ends_block;

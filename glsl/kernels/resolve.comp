@@ -40,7 +40,9 @@ void main()
         uint place = 3 * pixel + channel;
         uvec2 sum = uvec2(0);
         for (uint number = 0; number < samples; number++) {
-            sum = add64(sum, pass_sums[place_of_sums(place_of_sample(pixel, number, push.pixel_count)) + channel]);
+            if (push.counts_paths != 0) {
+                sum = add64(sum, pass_sums[place_of_sums(place_of_sample(pixel, number, push.pixel_count)) + channel]);
+            }
             for (uint k = 0; k < push.points_per_path; k++) {
                 sum = add64(sum, estimates[3 * place_of_point(k, place_of_sample(pixel, number, push.pixel_count), push.pixel_count) + channel]);
             }

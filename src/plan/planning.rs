@@ -11,7 +11,7 @@ use super::film::{BiasPlan, FilmPlan};
 use super::light_choice::LightChoice;
 use super::maps::Maps;
 use super::radius::Trial;
-use super::scene::{MapPlan, SEGMENT_BOUNCES, ScenePlan};
+use super::scene::{LightOf, MapPlan, SEGMENT_BOUNCES, ScenePlan};
 use super::sensor::Sensor;
 use crate::constants::*;
 use crate::error::{Error, Result, require};
@@ -153,7 +153,7 @@ impl ScenePlan {
             arrivals,
             chain_steps,
             film,
-            paths_only: false,
+            light_of: LightOf::All,
             footprint: 1.0,
             work_per_submission: limits.pair_tests_per_submission,
             bytes: 0,

@@ -118,8 +118,8 @@ pub struct ScenePlan {
     /// Surfaces that one dispatch follows a camera path over.
     pub chain_steps: u32,
     pub film: FilmPlan,
-    /// Light that photons bring is left out: of a pilot that looks at paths alone.
-    pub paths_only: bool,
+    /// The light that counts: of a pilot that looks at one kind alone.
+    pub light_of: LightOf,
     /// Width of a pixel's filter over the distance between pixels, which are spread where it is less than 1.
     pub footprint: f64,
     /// Rays or pair tests after which commands are handed to the device.
@@ -128,6 +128,26 @@ pub struct ScenePlan {
     pub bytes: u64,
     /// Time that planning took.
     pub planned_in: Duration,
+}
+
+/// Light of a picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LightOf {
+    All,
+    /// That paths find, and that of one of the two maps.
+    Paths,
+    GlobalMap,
+    CausticMap,
+}
+
+impl LightOf {
+    pub fn has_paths(self) -> bool {
+        matches!(self, LightOf::All | LightOf::Paths)
+    }
+
+    pub fn has_map(self, caustic_only: bool) -> bool {
+        self == LightOf::All || self == if caustic_only { LightOf::CausticMap } else { LightOf::GlobalMap }
+    }
 }
 
 /// Candidates of a point, roughly: what a lookup counts as work.
@@ -163,6 +183,11 @@ impl ScenePlan {
     /// What traces the photons: the settings' builder, or the one that was chosen.
     pub fn builder(&self) -> Builder {
         self.settings.builder.expect("the plan chose a builder")
+    }
+
+    /// Of the light that counts.
+    pub fn traced_maps(&self) -> impl Iterator<Item = &MapPlan> {
+        self.maps().filter(|map| self.light_of.has_map(map.caustic_only))
     }
 
     pub fn maps(&self) -> impl Iterator<Item = &MapPlan> {

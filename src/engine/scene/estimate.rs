@@ -173,6 +173,7 @@ pub fn resolve(commands: &mut Commands, round: Round, ends_block: bool) -> Resul
             end_pixel,
             pixel_count,
             points_per_path,
+            counts_paths: u32::from(plan.light_of.has_paths()),
             block,
             ends_block: u32::from(ends_block),
         };

@@ -114,7 +114,7 @@ pub fn light_from(gpu: &Gpu, view: &View, plan: ScenePlan, map: Option<&MapFile>
     commands.warm_up()?;
     commands.submit()?;
     let identity = control.keep.identity(|name| identity(name, view, &plan, map.map(|map| map.hash.as_str()), gpu.facts()))?;
-    let photons_per_round = if plan.paths_only { 0 } else { plan.maps().map(|map| u64::from(map.photons)).sum() };
+    let photons_per_round = plan.traced_maps().map(|map| u64::from(map.photons)).sum();
     let task = Task {
         device: Some((gpu, pipelines_before)),
         identity,
@@ -348,7 +348,7 @@ impl SceneOnGpu<'_> {
             let sums = 3 * u64::from(plan.visible_points()) * u64::from(plan.arrival_sets);
             commands.fill(&resources.estimates, 0, sums, 0);
         }
-        if let Some(photons) = resources.photons.as_ref().filter(|_| !plan.paths_only) {
+        if let Some(photons) = resources.photons.as_ref().filter(|_| plan.traced_maps().next().is_some()) {
             if plan.film.bias == BiasPlan::Blocks {
                 commands.fill(&resources.near_sums, 0, plan.near_sums(), 0);
             }
@@ -357,7 +357,7 @@ impl SceneOnGpu<'_> {
                 None => grids.insert(commands.scope("radii", |commands| radius_class::find(commands, round, photons, view))?),
             };
             let mut traced = [0; 2];
-            for map in plan.maps() {
+            for map in plan.traced_maps() {
                 let in_round = MapInRound { photons, map, grids: &grids[usize::from(map.caustic_only)] };
                 let of_map = commands.scope(map.name, |commands| match stored {
                     Some(stored) => one_stored_map(commands, round, &in_round, stored, state),

@@ -4,7 +4,7 @@
 //! Its pixels are spread over the picture and as small as the picture's own. They tell how much each part of the light varies from path to
 //! path, from shadow ray to shadow ray, and with the photons.
 
-use super::{View, light, trial};
+use super::{SceneFilm, View, light, trial};
 use crate::constants::PART_COUNT;
 use crate::engine;
 use crate::engine::{Control, bias_batches};
@@ -12,7 +12,7 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::plan::film::BiasPlan;
 use crate::plan::radius::RadiusFrom;
-use crate::plan::scene::ScenePlan;
+use crate::plan::scene::{LightOf, ScenePlan};
 use crate::plan::sensor::Sensor;
 use crate::plan::work_division::{Division, Free, MOST_PHOTONS, MOST_SAMPLES, MapVariance, Rounds, Variance, best, cost};
 use crate::scene::Scene;
@@ -113,18 +113,25 @@ pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Fre
     if free.samples
         && !settings.paranoid
         && let Sensor::Picture { width, .. } = plan.sensor
-        && let Some(found) = of_tiles(gpu, scene, view, plan, first, &rounds)?
+        && let Some(found) = of_picture(gpu, scene, view, plan, first, &rounds)?
     {
-        // Rare light that few pixels showed.
-        let seen = found.variance * (1.0 - of_many.light[2] - of_many.light[3]).max(0.0).powi(2);
-        rounds.variance.path = (seen - variance.shadow_ray / f64::from(first.shadow_rays)).max(variance.path);
-        let shares = smooth(&found.shares, width.div_ceil(TILE) as usize);
+        // Few pixels did not show rare light.
+        let known = &mut rounds.variance;
+        known.shadow_ray = known.shadow_ray.min(found.paths * f64::from(first.shadow_rays));
+        known.path = found.paths - known.shadow_ray / f64::from(first.shadow_rays);
+        for (map, [variance, share]) in [&mut known.global, &mut known.caustic].into_iter().zip(found.maps) {
+            (map.of_round, map.share) = (variance, share);
+        }
+        if std::env::var("PM_DEBUG").is_ok() {
+            eprintln!("{known:?} {first:?}");
+        }
+        let shares = smooth(&found.tiles, width.div_ceil(TILE) as usize);
         // Where samples go by the root of the variance, the mean variance is the square of the mean root (Neyman 1934).
         let roots: Vec<f64> = shares.iter().map(|share| share.sqrt()).collect();
         let root = roots.iter().sum::<f64>() / roots.len() as f64;
         if root * root < LEAST_TILES {
-            rounds.variance.path *= root * root;
-            rounds.variance.shadow_ray *= root * root;
+            known.path *= root * root;
+            known.shadow_ray *= root * root;
             tiles = Some(roots.into_iter().map(|own| own / root).collect::<Vec<f64>>());
         }
     }
@@ -145,65 +152,82 @@ pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Fre
 
 /// Less than this of the variance must be left for tiles to be worth their while.
 const LEAST_TILES: f64 = 0.8;
-/// Rounds of all pixels' paths, and the share of the run that these may take.
-const TILE_ROUNDS: std::ops::RangeInclusive<u32> = 4..=64;
-const TILE_SHARE: f64 = 0.05;
-/// What a path of these takes of one that is looked up in maps, too.
-const PATH_SHARE: f64 = 0.5;
+/// Rounds of all pixels with each kind of light, and the share of the run that these may take.
+const PICTURE_ROUNDS: std::ops::RangeInclusive<u32> = 4..=64;
+const PICTURE_SHARE: f64 = 0.05;
 /// Of the mean variance, what a tile is taken to have that showed none.
 const HIDDEN_VARIANCE: f64 = 0.1;
 
-/// The variance of a path's light relative to the square of all of it, and of each tile over their mean.
-struct OfTiles {
-    variance: f64,
-    shares: Vec<f64>,
+/// What all pixels tell, relative to all light.
+struct OfPicture {
+    /// The variance of a path, and that of each tile over their mean.
+    paths: f64,
+    tiles: Vec<f64>,
+    /// Of the global and of the caustic map: the variance of a round, and the light.
+    maps: [[f64; 2]; 2],
 }
 
 /// `None` where nothing varies, or it would take too much of the run.
-fn of_tiles(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, first: Division, rounds: &Rounds) -> Result<Option<OfTiles>> {
+fn of_picture(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, first: Division, rounds: &Rounds) -> Result<Option<OfPicture>> {
     let stop = &run.settings.stop;
-    let goal =
-        stop.error.map_or(f64::INFINITY, |error| rounds.until(first, error).1).min(stop.seconds.map_or(f64::INFINITY, |most| 1e9 * most));
-    let a_round = PATH_SHARE * f64::from(SAMPLES) * (rounds.cost.paths + f64::from(first.shadow_rays) * rounds.cost.shadow_rays);
-    let fits = TILE_SHARE * goal / a_round;
-    if fits < f64::from(*TILE_ROUNDS.start()) {
+    let seconds = stop.seconds.map_or(f64::INFINITY, |most| 1e9 * most);
+    let goal = stop.error.map_or(f64::INFINITY, |error| rounds.until(first, error).1).min(seconds);
+    let maps: Vec<LightOf> = run.maps().map(|map| if map.caustic_only { LightOf::CausticMap } else { LightOf::GlobalMap }).collect();
+    let paths = f64::from(SAMPLES) + maps.len() as f64;
+    let a_round = paths * (rounds.cost.paths + f64::from(first.shadow_rays) * rounds.cost.shadow_rays)
+        + maps.len() as f64 * f64::from(PHOTONS) * rounds.cost.photon;
+    let fits = PICTURE_SHARE * goal / a_round;
+    if fits < f64::from(*PICTURE_ROUNDS.start()) {
         return Ok(None);
     }
-    let settings = SceneSettings {
-        samples: SAMPLES,
-        shadow_rays: first.shadow_rays,
-        photons: PHOTONS,
-        caustic_photons: PHOTONS,
-        rounds: fits.min(f64::from(*TILE_ROUNDS.end())) as u32,
-        block: Some(1),
-        seed: bias_batches::seed(SEED, 1),
-        stop: Stop { measure: Measure::Rmse, ..Stop::default() },
-        ..run.settings.clone()
+    let look = |light_of: LightOf, samples: u32| {
+        let settings = SceneSettings {
+            samples,
+            shadow_rays: first.shadow_rays,
+            rounds: fits.min(f64::from(*PICTURE_ROUNDS.end())) as u32,
+            seed: bias_batches::seed(SEED, 1),
+            ..pilot_settings(&run.settings)
+        };
+        let mut plan = trial::plan(gpu, scene, view, &settings, run.sensor)?;
+        plan.light_of = light_of;
+        Ok(light(gpu, view, plan, &mut Control::default())?.film)
     };
-    let (width, height) = run.sensor.size();
-    let mut plan = trial::plan(gpu, scene, view, &settings, run.sensor)?;
-    plan.paths_only = true;
-    let film = light(gpu, view, plan, &mut Control::default())?.film;
-    let mean = film.surface_means().map(|mean| mean.element_sum()).sum::<f64>() / film.pixels() as f64;
-    if mean <= 0.0 {
+    let mean = |film: &SceneFilm| film.surface_means().map(|mean| mean.element_sum()).sum::<f64>() / film.pixels() as f64;
+    // Of a round's light.
+    let square = |film: &SceneFilm| {
+        let all = (0..film.pixels()).map(|pixel| film.surface_error(pixel).length_squared()).sum::<f64>();
+        all / film.pixels() as f64 * f64::from(film.rounds)
+    };
+    let of_paths = look(LightOf::Paths, SAMPLES)?;
+    let mut of_maps = [[0.0; 2]; 2];
+    for map in maps {
+        let film = look(map, 1)?;
+        of_maps[usize::from(map == LightOf::CausticMap)] = [square(&film), mean(&film)];
+    }
+    let all = mean(&of_paths) + of_maps[0][1] + of_maps[1][1];
+    if all <= 0.0 {
         return Ok(None);
     }
+    let (width, height) = run.sensor.size();
     let columns = width.div_ceil(TILE);
-    let mut variances = vec![(0.0, 0u32); (columns * height.div_ceil(TILE)) as usize];
-    for pixel in 0..film.pixels() {
+    let mut tiles = vec![(0.0, 0u32); (columns * height.div_ceil(TILE)) as usize];
+    for pixel in 0..of_paths.pixels() {
         let (x, y) = (pixel as u32 % width, pixel as u32 / width);
-        let (variance, count) = &mut variances[(y / TILE * columns + x / TILE) as usize];
-        *variance += film.surface_error(pixel).length_squared();
+        let (variance, count) = &mut tiles[(y / TILE * columns + x / TILE) as usize];
+        *variance += of_paths.surface_error(pixel).length_squared();
         *count += 1;
     }
-    let all = variances.iter().map(|(variance, _)| variance).sum::<f64>() / film.pixels() as f64;
-    // Of the mean of three channels.
-    let of_path = 3.0 * all / (mean * mean) * f64::from(SAMPLES) * f64::from(film.rounds);
-    if std::env::var("PM_DEBUG").is_ok() {
-        eprintln!("of_path {of_path} mean {mean} all {all} rounds {} samples {} first {first:?} {:?}", film.rounds, film.plan.samples, rounds.variance);
+    let sum = tiles.iter().map(|(variance, _)| variance).sum::<f64>() / of_paths.pixels() as f64;
+    if sum == 0.0 {
+        return Ok(None);
     }
-    let shares = variances.into_iter().map(|(variance, count)| variance / f64::from(count.max(1)) / all);
-    Ok((all > 0.0).then(|| OfTiles { variance: of_path, shares: shares.collect() }))
+    // The mean of three channels.
+    let relative = |square: f64| 3.0 * square / (all * all);
+    Ok(Some(OfPicture {
+        paths: f64::from(SAMPLES) * relative(square(&of_paths)),
+        tiles: tiles.into_iter().map(|(variance, count)| variance / f64::from(count) / sum).collect(),
+        maps: of_maps.map(|[variance, light]| [relative(variance), light / all]),
+    }))
 }
 
 /// A tile's variance is little known: that of its neighbours tells some of it.
@@ -239,23 +263,25 @@ struct Parts {
     light: [f64; PART_COUNT as usize],
 }
 
-/// Of a path through each pixel with so many shadow rays.
-fn parts(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, shadow_rays: u32) -> Result<Parts> {
-    let settings = SceneSettings {
-        samples: SAMPLES,
+/// Settings that all rounds of a pilot have.
+fn pilot_settings(run: &SceneSettings) -> SceneSettings {
+    SceneSettings {
         tiles: None,
-        shadow_rays,
         photons: PHOTONS,
         caustic_photons: PHOTONS,
         neighbours: NEIGHBOURS,
-        rounds: ROUNDS,
         block: Some(1),
-        seed: bias_batches::seed(SEED, 0),
         // The radii stay those of the first round.
         alpha: 1.0,
         stop: Stop { measure: Measure::Rmse, ..Stop::default() },
-        ..run.settings.clone()
-    };
+        ..run.clone()
+    }
+}
+
+/// Of a path through each pixel with so many shadow rays.
+fn parts(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, shadow_rays: u32) -> Result<Parts> {
+    let seed = bias_batches::seed(SEED, 0);
+    let settings = SceneSettings { samples: SAMPLES, shadow_rays, rounds: ROUNDS, seed, ..pilot_settings(&run.settings) };
     let (sensor, phases, footprint) = match run.sensor {
         Sensor::Picture { width, height } => {
             let smaller = (PIXELS / (f64::from(width) * f64::from(height))).sqrt().min(1.0);
