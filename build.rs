@@ -259,6 +259,9 @@ fn reflect(words: &[u32]) -> Kernel {
         }
     }
     kernel.buffers.sort_by_key(|buffer| buffer.binding);
+    if let Some([one, two]) = kernel.buffers.windows(2).find(|pair| pair[0].binding == pair[1].binding) {
+        panic!("{} and {} have the same binding, {}", one.name, two.name, one.binding);
+    }
     kernel.constants.sort();
     // A record inside a record has a twin of its own.
     let mut next = 0;

@@ -1,6 +1,6 @@
 // The samples that pixels of some tiles have on top. Of each pixel the first one and how many; then of no pixel the most that one has; then
 // the pixel of each (src/plan/extra_samples.rs).
-layout(set = 1, binding = 20, scalar) readonly buffer ExtraSamples { uint extra_samples[]; };
+layout(set = 1, binding = 22, scalar) readonly buffer ExtraSamples { uint extra_samples[]; };
 
 uint samples_of(uint pixel)
 {

@@ -107,31 +107,38 @@ pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Fre
     // As many photons as are traced at once.
     let most = Division { photons: MOST_PHOTONS, caustic_photons: MOST_PHOTONS, ..before };
     let at_once = plan_of(most).map_or(before.photons, |plan| plan.maps().map(|map| map.chunk_photons).min().unwrap_or(before.photons));
-    let first = best(&rounds, before, free, &settings.stop, (MOST_SAMPLES, at_once));
     let mut tiles = None;
     // What is to name each pixel knows of no tiles.
     if free.samples
         && !settings.paranoid
         && let Sensor::Picture { width, .. } = plan.sensor
-        && let Some(found) = of_picture(gpu, scene, view, plan, first, &rounds)?
     {
-        // Few pixels did not show rare light.
-        let known = &mut rounds.variance;
-        known.shadow_ray = known.shadow_ray.min(found.paths * f64::from(first.shadow_rays));
-        known.path = found.paths - known.shadow_ray / f64::from(first.shadow_rays);
-        for (map, [variance, share]) in [&mut known.global, &mut known.caustic].into_iter().zip(found.maps) {
-            (map.of_round, map.share) = (variance, share);
+        let mut found = None;
+        // The more a run takes, the more of its pilot is worth its while: that is known better each time.
+        let mut count = PICTURE_ROUNDS;
+        loop {
+            let first = best(&rounds, before, free, &settings.stop, (MOST_SAMPLES, at_once));
+            let fits = picture_rounds(plan, first, &rounds) * if found.is_none() { LEAST_PICTURE } else { 1.0 };
+            if fits < f64::from(count) || count > MOST_PICTURE_ROUNDS {
+                break;
+            }
+            let Some(seen) = of_picture(gpu, scene, view, plan, first.shadow_rays, count)? else { break };
+            let known = &mut rounds.variance;
+            known.shadow_ray = known.shadow_ray.min(seen.paths * f64::from(first.shadow_rays));
+            known.path = seen.paths - known.shadow_ray / f64::from(first.shadow_rays);
+            for (map, [variance, share]) in [&mut known.global, &mut known.caustic].into_iter().zip(seen.maps) {
+                (map.of_round, map.share) = (variance, share);
+            }
+            found = Some(seen.tiles);
+            count *= 4;
         }
-        if std::env::var("PM_DEBUG").is_ok() {
-            eprintln!("{known:?} {first:?}");
-        }
-        let shares = smooth(&found.tiles, width.div_ceil(TILE) as usize);
         // Where samples go by the root of the variance, the mean variance is the square of the mean root (Neyman 1934).
+        let shares = found.map_or_else(Vec::new, |tiles| smooth(&tiles, width.div_ceil(TILE) as usize));
         let roots: Vec<f64> = shares.iter().map(|share| share.sqrt()).collect();
         let root = roots.iter().sum::<f64>() / roots.len() as f64;
         if root * root < LEAST_TILES {
-            known.path *= root * root;
-            known.shadow_ray *= root * root;
+            rounds.variance.path *= root * root;
+            rounds.variance.shadow_ray *= root * root;
             tiles = Some(roots.into_iter().map(|own| own / root).collect::<Vec<f64>>());
         }
     }
@@ -152,9 +159,12 @@ pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Fre
 
 /// Less than this of the variance must be left for tiles to be worth their while.
 const LEAST_TILES: f64 = 0.8;
-/// Rounds of all pixels with each kind of light, and the share of the run that these may take.
-const PICTURE_ROUNDS: std::ops::RangeInclusive<u32> = 4..=64;
+/// Rounds of all pixels with each kind of light: at first and at most, and the share of the run that these may take, at first several times
+/// as much, as few pixels may have told too little of the run.
+const PICTURE_ROUNDS: u32 = 4;
+const MOST_PICTURE_ROUNDS: u32 = 64;
 const PICTURE_SHARE: f64 = 0.05;
+const LEAST_PICTURE: f64 = 4.0;
 /// Of the mean variance, what a tile is taken to have that showed none.
 const HIDDEN_VARIANCE: f64 = 0.1;
 
@@ -167,27 +177,21 @@ struct OfPicture {
     maps: [[f64; 2]; 2],
 }
 
-/// `None` where nothing varies, or it would take too much of the run.
-fn of_picture(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, first: Division, rounds: &Rounds) -> Result<Option<OfPicture>> {
+/// Rounds of all pixels that are worth their while in a run so far as it is known.
+fn picture_rounds(run: &ScenePlan, first: Division, rounds: &Rounds) -> f64 {
     let stop = &run.settings.stop;
     let seconds = stop.seconds.map_or(f64::INFINITY, |most| 1e9 * most);
     let goal = stop.error.map_or(f64::INFINITY, |error| rounds.until(first, error).1).min(seconds);
+    let maps = run.maps().count() as f64;
+    let paths = (f64::from(SAMPLES) + maps) * (rounds.cost.paths + f64::from(first.shadow_rays) * rounds.cost.shadow_rays);
+    PICTURE_SHARE * goal / (paths + maps * f64::from(PHOTONS) * rounds.cost.photon)
+}
+
+/// `None` where nothing varies.
+fn of_picture(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, shadow_rays: u32, rounds: u32) -> Result<Option<OfPicture>> {
     let maps: Vec<LightOf> = run.maps().map(|map| if map.caustic_only { LightOf::CausticMap } else { LightOf::GlobalMap }).collect();
-    let paths = f64::from(SAMPLES) + maps.len() as f64;
-    let a_round = paths * (rounds.cost.paths + f64::from(first.shadow_rays) * rounds.cost.shadow_rays)
-        + maps.len() as f64 * f64::from(PHOTONS) * rounds.cost.photon;
-    let fits = PICTURE_SHARE * goal / a_round;
-    if fits < f64::from(*PICTURE_ROUNDS.start()) {
-        return Ok(None);
-    }
     let look = |light_of: LightOf, samples: u32| {
-        let settings = SceneSettings {
-            samples,
-            shadow_rays: first.shadow_rays,
-            rounds: fits.min(f64::from(*PICTURE_ROUNDS.end())) as u32,
-            seed: bias_batches::seed(SEED, 1),
-            ..pilot_settings(&run.settings)
-        };
+        let settings = SceneSettings { samples, shadow_rays, rounds, seed: bias_batches::seed(SEED, 1), ..pilot_settings(&run.settings) };
         let mut plan = trial::plan(gpu, scene, view, &settings, run.sensor)?;
         plan.light_of = light_of;
         Ok(light(gpu, view, plan, &mut Control::default())?.film)
@@ -230,19 +234,13 @@ fn of_picture(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, first: Div
     }))
 }
 
-/// A tile's variance is little known: that of its neighbours tells some of it.
+/// A tile's variance is little known, and rare light beside it is rare in it too: the mean of it and its neighbours.
 fn smooth(shares: &[f64], columns: usize) -> Vec<f64> {
     let rows = shares.len() / columns;
+    let near = |place: usize, count: usize| place.saturating_sub(1)..(place + 2).min(count);
     let at = |x: usize, y: usize| {
-        let near = |place: usize, count: usize| place.saturating_sub(1)..(place + 2).min(count);
-        let weights = near(y, rows).flat_map(|other_y| near(x, columns).map(move |other_x| (other_x, other_y)));
-        let (mut sum, mut all) = (0.0, 0.0);
-        for (other_x, other_y) in weights {
-            let weight = if other_x == x { 2.0 } else { 1.0 } * if other_y == y { 2.0 } else { 1.0 };
-            sum += weight * shares[other_y * columns + other_x];
-            all += weight;
-        }
-        HIDDEN_VARIANCE + (1.0 - HIDDEN_VARIANCE) * sum / all
+        let found: Vec<f64> = near(y, rows).flat_map(|y| near(x, columns).map(move |x| shares[y * columns + x])).collect();
+        HIDDEN_VARIANCE + (1.0 - HIDDEN_VARIANCE) * found.iter().sum::<f64>() / found.len() as f64
     };
     (0..shares.len()).map(|tile| at(tile % columns, tile / columns)).collect()
 }
