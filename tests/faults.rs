@@ -290,7 +290,7 @@ fn inputs_and_pipes_stay_what_they_are() {
             std::fs::rename(place.at("pipe.ply"), place.at("pipe")).unwrap();
         }
     }
-    let (_, stderr) = place.succeed("render cornell --size 8x8 --photons 500 --time 1ms -q -o y.exr --checkpoint none.pms");
+    let (_, stderr) = place.succeed("render cornell --size 8x8 --samples 1 --photons 4000000 --time 1ms -q -o y.exr --checkpoint none.pms");
     assert!(stderr.contains("warning: --checkpoint none.pms: is not written, as no block of rounds was done"), "{stderr}");
     place.succeed("merge 1.pms 2.pms -o both.exr --checkpoint both.pms");
     let (_, stderr) = place.succeed(&format!("render cornell {SMALL} --rounds 1 -o y.exr --resume both.pms"));

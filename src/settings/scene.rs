@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 pub use super::stop::Stop;
-use super::tile_samples::TileSamples;
+use super::tile_samples::{MAX_SAMPLES, TileSamples};
 use super::{Builder, MAX_PHOTONS, Math, check_common};
 use crate::constants::{self, MAX_BOUNCES};
 use crate::error::{Error, Result, require, within};
@@ -207,8 +207,6 @@ pub const MAX_BLOCK: u32 = 1 << 10;
 const MAX_NEIGHBOURS: u32 = 10_000;
 /// A visible point's rays are one loop.
 const MAX_SHADOW_RAYS: u32 = 64;
-/// A pixel's paths are summed by one invocation.
-pub const MAX_SAMPLES: u32 = 1024;
 
 impl SceneSettings {
     pub fn validate(&self) -> Result<()> {

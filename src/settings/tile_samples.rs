@@ -2,9 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::scene::MAX_SAMPLES;
 use crate::error::{Error, Result};
 
+/// A pixel's paths are summed by one invocation.
+pub const MAX_SAMPLES: u32 = 1024;
 /// Pixels along the side of a tile.
 pub const TILE: u32 = 4;
 

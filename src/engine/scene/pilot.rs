@@ -16,9 +16,9 @@ use crate::plan::scene::{LightOf, ScenePlan};
 use crate::plan::sensor::Sensor;
 use crate::plan::work_division::{Division, Free, MOST_PHOTONS, MOST_SAMPLES, MapVariance, Rounds, Variance, best, cost};
 use crate::scene::Scene;
-use crate::settings::scene::{MAX_SAMPLES, SAMPLES_PER_BLOCK, SceneSettings};
+use crate::settings::scene::{SAMPLES_PER_BLOCK, SceneSettings};
 use crate::settings::stop::{Measure, Stop};
-use crate::settings::tile_samples::{TILE, TileSamples};
+use crate::settings::tile_samples::{MAX_SAMPLES, TILE, TileSamples};
 
 /// Pixels at most: of so many all that is known is kept.
 const PIXELS: f64 = 1024.0;
