@@ -46,7 +46,7 @@ impl TileSamples {
         let (columns, rows) = (width.div_ceil(TILE) as usize, height.div_ceil(TILE) as usize);
         let is_row = |row: &String| row.len() == columns && row.bytes().all(|digit| digit.is_ascii_digit());
         if self.rows.len() != rows || !self.rows.iter().all(is_row) {
-            let allowed = format!("holds tiles of another picture than one of {width} x {height} pixels; leave it out, or make a new one"); choose them anew");
+            let allowed = format!("holds tiles of another picture than one of {width} x {height} pixels; leave it out, or make a new one");
             return Err(Error::setting("--settings", "tiles", allowed));
         }
         if u64::from(samples) << self.most() > u64::from(MAX_SAMPLES) {

@@ -4,6 +4,8 @@
 //! Its pixels are spread over the picture and as small as the picture's own. They tell how much each part of the light varies from path to
 //! path, from shadow ray to shadow ray, and with the photons.
 
+use glam::DVec3;
+
 use super::{SceneFilm, View, light, trial};
 use crate::constants::PART_COUNT;
 use crate::engine;
@@ -196,7 +198,7 @@ fn of_picture(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, shadow_ray
         plan.light_of = light_of;
         Ok(light(gpu, view, plan, &mut Control::default())?.film)
     };
-    let mean = |film: &SceneFilm| film.surface_means().map(|mean| mean.element_sum()).sum::<f64>() / film.pixels() as f64;
+    let mean = |film: &SceneFilm| film.surface_means().map(DVec3::element_sum).sum::<f64>() / film.pixels() as f64;
     // Of a round's light.
     let square = |film: &SceneFilm| {
         let all = (0..film.pixels()).map(|pixel| film.surface_error(pixel).length_squared()).sum::<f64>();
