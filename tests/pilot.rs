@@ -147,7 +147,7 @@ fn tiles_with_more_samples_change_no_mean() {
         let squares = squares / even.pixels() as f64;
         println!("final gather {final_gather}: squared differences over their variance {squares:.2}");
         assert!(squares < 2.0, "{squares}");
-        let [one, other] = [&even, &tiled].map(|film| film.surface_means().map(|mean| mean.element_sum()).sum::<f64>());
+        let [one, other] = [&even, &tiled].map(|film| film.surface_means().map(glam::DVec3::element_sum).sum::<f64>());
         assert!((one / other - 1.0).abs() < 0.02, "{one} {other}");
         // A column of tiles of one path has the same bits of its own paths; one of eight has less noise.
         let noise = |film: &SceneFilm, column: u32| {

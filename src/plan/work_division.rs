@@ -12,7 +12,6 @@
 //! are a pilot's ([`crate::engine::scene::pilot`]). Costs are those of a class of devices and no run's own times, so that the same
 //! is chosen on each device of its class.
 
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::radius::mean_squared_radius;
@@ -284,19 +283,36 @@ pub fn best(rounds: &Rounds, before: Division, free: Free, stop: &Stop, (most_sa
     let photons = powers(free.photons && global.photons > 0, LEAST_PHOTONS, most_photons, before.photons);
     let caustic_photons = powers(free.caustic_photons && caustic.photons > 0, LEAST_PHOTONS, most_photons, before.caustic_photons);
     let neighbours = if free.neighbours { CHOICE_OF_NEIGHBOURS.to_vec() } else { vec![before.neighbours] };
-    let mut all = vec![before];
-    for samples in powers(free.samples, 1, most_samples, before.samples) {
-        for shadow_rays in powers(free.shadow_rays, 1, MOST_SHADOW_RAYS, before.shadow_rays) {
-            for photons in photons.iter().copied() {
-                for caustic_photons in caustic_photons.iter().copied() {
-                    let of = |neighbours: &u32| Division { samples, shadow_rays, photons, caustic_photons, neighbours: *neighbours };
-                    all.extend(neighbours.iter().map(of));
-                }
-            }
+    let samples = powers(free.samples, 1, most_samples, before.samples);
+    let shadow_rays = powers(free.shadow_rays, 1, MOST_SHADOW_RAYS, before.shadow_rays);
+    let mut least = (rounds.loss(before, stop), before);
+    let pairs = |some: &[u32], others: &[u32]| -> Vec<(u32, u32)> {
+        some.iter().flat_map(|one| others.iter().map(move |other| (*one, *other))).collect()
+    };
+    // What goes together is chosen together, in turn, until nothing is better.
+    loop {
+        let (_, at) = least;
+        let of_paths = pairs(&samples, &shadow_rays);
+        let of_paths = of_paths.iter().map(|&(samples, shadow_rays)| Division { samples, shadow_rays, ..least.1 });
+        least = of_paths.map(|division| (rounds.loss(division, stop), division)).fold(least, less);
+        let of_global = pairs(&photons, &neighbours);
+        let of_global = of_global.iter().map(|&(photons, neighbours)| Division { photons, neighbours, ..least.1 });
+        least = of_global.map(|division| (rounds.loss(division, stop), division)).fold(least, less);
+        let of_caustic = pairs(&caustic_photons, &neighbours);
+        let of_caustic = of_caustic.iter().map(|&(caustic_photons, neighbours)| Division { caustic_photons, neighbours, ..least.1 });
+        least = of_caustic.map(|division| (rounds.loss(division, stop), division)).fold(least, less);
+        let of_both = pairs(&photons, &caustic_photons);
+        let of_both = of_both.iter().map(|&(photons, caustic_photons)| Division { photons, caustic_photons, ..least.1 });
+        least = of_both.map(|division| (rounds.loss(division, stop), division)).fold(least, less);
+        if least.1 == at {
+            return at;
         }
     }
-    let losses = all.into_par_iter().map(|division| (rounds.loss(division, stop), division)).collect::<Vec<_>>();
-    losses.into_iter().reduce(|least, other| if other.0 < least.0 { other } else { least }).expect("there is one").1
+}
+
+/// The first of two whose loss is no more.
+fn less(one: (f64, Division), other: (f64, Division)) -> (f64, Division) {
+    if other.0 < one.0 { other } else { one }
 }
 
 #[cfg(test)]
