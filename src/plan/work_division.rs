@@ -285,29 +285,35 @@ pub fn best(rounds: &Rounds, before: Division, free: Free, stop: &Stop, (most_sa
     let neighbours = if free.neighbours { CHOICE_OF_NEIGHBOURS.to_vec() } else { vec![before.neighbours] };
     let samples = powers(free.samples, 1, most_samples, before.samples);
     let shadow_rays = powers(free.shadow_rays, 1, MOST_SHADOW_RAYS, before.shadow_rays);
-    let mut least = (rounds.loss(before, stop), before);
     let pairs = |some: &[u32], others: &[u32]| -> Vec<(u32, u32)> {
         some.iter().flat_map(|one| others.iter().map(move |other| (*one, *other))).collect()
     };
-    // What goes together is chosen together, in turn, until nothing is better.
-    loop {
-        let (_, at) = least;
-        let of_paths = pairs(&samples, &shadow_rays);
-        let of_paths = of_paths.iter().map(|&(samples, shadow_rays)| Division { samples, shadow_rays, ..least.1 });
-        least = of_paths.map(|division| (rounds.loss(division, stop), division)).fold(least, less);
-        let of_global = pairs(&photons, &neighbours);
-        let of_global = of_global.iter().map(|&(photons, neighbours)| Division { photons, neighbours, ..least.1 });
-        least = of_global.map(|division| (rounds.loss(division, stop), division)).fold(least, less);
-        let of_caustic = pairs(&caustic_photons, &neighbours);
-        let of_caustic = of_caustic.iter().map(|&(caustic_photons, neighbours)| Division { caustic_photons, neighbours, ..least.1 });
-        least = of_caustic.map(|division| (rounds.loss(division, stop), division)).fold(least, less);
-        let of_both = pairs(&photons, &caustic_photons);
-        let of_both = of_both.iter().map(|&(photons, caustic_photons)| Division { photons, caustic_photons, ..least.1 });
-        least = of_both.map(|division| (rounds.loss(division, stop), division)).fold(least, less);
-        if least.1 == at {
-            return at;
+    let (of_paths, of_both) = (pairs(&samples, &shadow_rays), pairs(&photons, &caustic_photons));
+    let (of_global, of_caustic) = (pairs(&photons, &neighbours), pairs(&caustic_photons, &neighbours));
+    let better = |least: (f64, Division), pairs: &[(u32, u32)], set: fn(&mut Division, (u32, u32))| {
+        let changed = pairs.iter().map(|pair| {
+            let mut division = least.1;
+            set(&mut division, *pair);
+            (rounds.loss(division, stop), division)
+        });
+        changed.fold(least, less)
+    };
+    // What goes together is chosen together, in turn, until nothing is better; from several beginnings, as none leads to the best for certain.
+    let from = |begin: Division| {
+        let mut least = (rounds.loss(begin, stop), begin);
+        loop {
+            let at = least.1;
+            least = better(least, &of_paths, |division, pair| (division.samples, division.shadow_rays) = pair);
+            least = better(least, &of_global, |division, pair| (division.photons, division.neighbours) = pair);
+            least = better(least, &of_caustic, |division, pair| (division.caustic_photons, division.neighbours) = pair);
+            least = better(least, &of_both, |division, pair| (division.photons, division.caustic_photons) = pair);
+            if least.1 == at {
+                return least;
+            }
         }
-    }
+    };
+    let begins = pairs(&samples, &neighbours).into_iter().map(|(samples, neighbours)| Division { samples, neighbours, ..before });
+    begins.map(from).fold((rounds.loss(before, stop), before), less).1
 }
 
 /// The first of two whose loss is no more.
