@@ -155,10 +155,15 @@ pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Fre
         chosen = before;
     }
     let size = plan.sensor.size();
-    let tiles = tiles.map(|tiles| tile_samples(chosen.samples, &tiles, size)).filter(|(_, tiles)| tiles.most() > 0);
+    // Of fewer samples a block takes more rounds, of which a short run has few.
+    let is_short = rounds.expected(chosen, &settings.stop) < FEW_BLOCKS * SAMPLES_PER_BLOCK;
+    let least_samples = if is_short { chosen.samples.min(SAMPLES_PER_BLOCK) } else { 1 };
+    let tiles = tiles.map(|tiles| tile_samples(chosen.samples, least_samples, &tiles, size)).filter(|(_, tiles)| tiles.most() > 0);
     Ok(Some(Pilot { before, chosen, tiles, rounds, of_parts: parts.map(|part| part / all) }))
 }
 
+/// Blocks that a run may do with, which wants some more than its first look takes.
+const FEW_BLOCKS: u32 = 32;
 /// Less than this of the variance must be left for tiles to be worth their while.
 const LEAST_TILES: f64 = 0.8;
 /// Rounds of all pixels with each kind of light: at first and at most, and the share of the run that these may take, at first several times
@@ -248,9 +253,9 @@ fn smooth(shares: &[f64], columns: usize) -> Vec<f64> {
 }
 
 /// Samples of all pixels, and how often they double in each tile, for a mean of so many and what each tile is to have of that.
-fn tile_samples(mean: u32, shares: &[f64], size: (u32, u32)) -> (u32, TileSamples) {
+fn tile_samples(mean: u32, least_samples: u32, shares: &[f64], size: (u32, u32)) -> (u32, TileSamples) {
     let least = shares.iter().copied().fold(f64::INFINITY, f64::min) * f64::from(mean);
-    let samples = least.log2().round().exp2().clamp(1.0, f64::from(MAX_SAMPLES)) as u32;
+    let samples = least.log2().round().exp2().clamp(f64::from(least_samples), f64::from(MAX_SAMPLES)) as u32;
     let most = f64::from((MAX_SAMPLES / samples).ilog2().min(9));
     let doublings = |share: &f64| (share * f64::from(mean) / f64::from(samples)).log2().round().clamp(0.0, most) as u32;
     (samples, TileSamples::new(&shares.iter().map(doublings).collect::<Vec<u32>>(), size))
