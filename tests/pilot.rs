@@ -80,7 +80,7 @@ fn what_is_set_stays_and_the_rest_is_chosen_alike_each_time() {
     let goal = |error, seconds| SceneSettings { stop: Stop { error, seconds, ..Stop::default() }, ..few() };
     let fine = goal(Some(0.01), None);
     let found = subject.chosen(&gpu, &fine, ALL).unwrap();
-    assert!(found.tiles.is_some() && found.gain(&fine.stop) > 1.5, "{}: {found:?}", found.gain(&fine.stop));
+    assert!(found.tiles.is_some() && found.gain(&fine.stop) > 2.0, "{}: {found:?}", found.gain(&fine.stop));
     let again = subject.chosen(&gpu, &SceneSettings { seed: 77, ..fine.clone() }, ALL).unwrap();
     assert_eq!((found.chosen, found.rounds), (again.chosen, again.rounds));
     let of_rays = subject.chosen(&gpu, &fine, Free { shadow_rays: true, ..NONE }).unwrap();
@@ -93,8 +93,6 @@ fn what_is_set_stays_and_the_rest_is_chosen_alike_each_time() {
     let coarse = subject.chosen(&gpu, &goal(Some(0.3), None), ALL).unwrap();
     let [rough, good] = [(&coarse, 0.3), (&found, 0.01)].map(|(pilot, error)| pilot.rounds.until(pilot.chosen, error));
     assert!(rough.0 >= 16.0 && rough.1 < 0.1 * good.1, "{rough:?} {good:?}");
-    let short = subject.chosen(&gpu, &goal(None, Some(1e-3)), ALL).unwrap();
-    assert!(short.rounds.after(short.chosen, 1e-3) <= short.rounds.after(short.before, 1e-3), "{short:?}");
 }
 
 /// The program takes what a pilot finds where an error ends the run and nothing is set, and goes on with it.
@@ -149,7 +147,7 @@ fn tiles_with_more_samples_change_no_mean() {
         assert!(squares < 2.0, "{squares}");
         let [one, other] = [&even, &tiled].map(|film| film.surface_means().map(DVec3::element_sum).sum::<f64>());
         assert!((one / other - 1.0).abs() < 0.02, "{one} {other}");
-        // A column of tiles of one path has the same bits of its own paths; one of eight has less noise.
+        // Where there are eight times the paths there is less noise; that of gather rays is mostly the photons'.
         let noise = |film: &SceneFilm, column: u32| {
             (0..SIZE)
                 .flat_map(|y| (4 * column..4 * column + 4).map(move |x| y * SIZE + x))

@@ -1,8 +1,9 @@
-//! A pilot: a few rounds of a few pixels, which tell how a picture's work is best divided ([`crate::plan::work_division`]). Nothing of it
-//! is in the picture, and it depends on no seed.
+//! A pilot: a few rounds, which tell how a picture's work is best divided ([`crate::plan::work_division`]). Nothing of it is in the
+//! picture, and it depends on no seed.
 //!
-//! Its pixels are spread over the picture and as small as the picture's own. They tell how much each part of the light varies from path to
-//! path, from shadow ray to shadow ray, and with the photons.
+//! A few pixels come first, spread over the picture and as small as the picture's own. They tell how much each part of the light varies
+//! from path to path, from shadow ray to shadow ray, and with the photons. Where the run takes long enough, all pixels follow: they show
+//! rare light, and which tiles vary most.
 
 use glam::DVec3;
 
@@ -24,7 +25,7 @@ use crate::settings::tile_samples::{MAX_SAMPLES, TILE, TileSamples};
 
 /// Pixels at most: of so many all that is known is kept.
 const PIXELS: f64 = 1024.0;
-/// Paths through each: as many as a block of a run has at least: they are even over it, and vary less than if each was alone.
+/// Paths through each, as many as a block of a run has at least: they are even over it, and vary less than if each was alone.
 const SAMPLES: u32 = SAMPLES_PER_BLOCK;
 const ROUNDS: u32 = 16;
 /// Of each map, and those within the first radius, which is wider than in a run.
