@@ -438,6 +438,8 @@ struct CameraPath {
     // and 5: visible points found; bit 6: it ends there; from bit 8 on: surfaces that it has met.
     uint state;
     vec3 weight;
+    // Of its smooth ways, where the others were followed too (glsl/world/scene/other_ways.glsl).
+    float chance;
     // What it runs through (glsl/material/media.glsl).
     uint media;
     // Of a direction that a sharp lobe gave it, 1/sr, and the point and the normal there; 0: none.

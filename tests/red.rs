@@ -184,7 +184,7 @@ struct Fault {
 }
 
 #[rustfmt::skip]
-const FAULTS: [Fault; 138] = [
+const FAULTS: [Fault; 139] = [
     Fault { what: "what rounding takes from a pair of floats is forgotten",
         file: "film/float_u64.glsl", from: "precise float rest = sum.y + (", to: "precise float rest = 0.0 * (",
         kernels: &["gather_brute_u64", "gather_grid_u64"], noticed_by: &[(Pairs, SumsTooSmall)] },
@@ -195,9 +195,13 @@ const FAULTS: [Fault; 138] = [
     Fault { what: "what one sample gathers for all counts for itself alone",
         file: "world/scene/camera_path.glsl", from: "chain.weight *= for_all ? float(own.count) : 1.0;", to: "",
         kernels: &["view"], noticed_by: &[(GlassInFurnace(4, true), TooDark)] },
-    Fault { what: "what glass mirrors weighs as much as it is looked at",
-        file: "material/scatter.glsl", from: "float weight = as_much ? 1.0 : divide(reflectance, chance);", to: "float weight = 1.0;",
+    Fault { what: "what shines counts for the way that was taken and for the others",
+        file: "world/scene/camera_path.glsl", from: "vec3 light = chain.chance * chain.weight * radiance;",
+        to: "vec3 light = chain.weight * radiance;",
         kernels: &["view"], noticed_by: &[(GlassInFurnace(4, false), TooBright)] },
+    Fault { what: "ways that a path did not take at layered glass are forgotten",
+        file: "world/scene/other_ways.glsl", from: "add_way(surface, other, coverage * other.weight, media, depth);", to: "",
+        kernels: &["view"], noticed_by: &[(EyeInGlass, TooDark)] },
     Fault { what: "every other lane of a subgroup writes over its neighbour",
         file: "builder/place.glsl", from: "subgroupBallotExclusiveBitCount(survivors);",
         to: "(subgroupBallotExclusiveBitCount(survivors) & 0xfffffffeu);",
@@ -355,7 +359,8 @@ const FAULTS: [Fault; 138] = [
         kernels: &["trace_persistent_scene", "emit_scene", "trace_scene_ballot", "trace_scene_atomic", "receive", "view"],
         noticed_by: &[(LampInBox(Illumination::Photons), Leak)] },
     Fault { what: "glass reflects one and a half times as much",
-        file: "material/scatter.glsl", from: "if (u.x < chance) {", to: "if (u.x < 1.5 * chance) {",
+        file: "material/scatter.glsl", from: "cos_t_squared > 0.0 ? fresnel(cos_i, cos_t, eta) : 1.0);",
+        to: "cos_t_squared > 0.0 ? min(1.5 * fresnel(cos_i, cos_t, eta), 1.0) : 1.0);",
         kernels: &["view"], noticed_by: &[(ClosedForm("glass slab, at 60 degrees: radiance"), TooDark)] },
     Fault { what: "strict quotients are cut instead of rounded",
         file: "math/math.glsl", from: "quotient += uint(off) + uint(2 * remainder > d);", to: "quotient += uint(off);",

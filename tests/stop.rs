@@ -20,8 +20,8 @@ const CONFIDENCE: f64 = 0.9;
 /// What claims are of the error at most, on the mean of all scenes.
 const MOST_WIDTH: f64 = 1.6;
 
-/// Scenes of which the light is random, with every kind of lamp, surface and path.
-const SCENES: [&str; 10] = [
+/// Scenes of which the light is random, with every kind of lamp, surface and path. `glass-slab` has no noise: both ways at glass are followed.
+const SCENES: [&str; 9] = [
     "open-box",
     "open-box-phong",
     "cornell",
@@ -29,7 +29,6 @@ const SCENES: [&str; 10] = [
     "caustic-sphere",
     "furnace",
     "integrating-sphere",
-    "glass-slab",
     "disc-over-plane",
     "mirror-corridor",
 ];

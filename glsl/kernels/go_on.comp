@@ -21,7 +21,8 @@ void main()
     own = path.own;
     uint index = own.pixel;
     uint depth = path.state >> 8;
-    start_chain(path.position, path.direction, path.weight, vec2(0.0));
+    start_chain(path.position, path.direction, path.weight);
+    chain.chance = path.chance;
     chain.saw_specular = (path.state & 1u) != 0;
     chain.gathers = (path.state & 2u) != 0;
     chain.starts_nowhere = (path.state & 4u) != 0;
@@ -34,9 +35,7 @@ void main()
     chain.from = path.from;
     chain.from_normal = path.from_normal;
     chain.point_count = (path.state >> 4) & 3u;
-    if (follow(push.pixel_count, push.draws, push.emitter_count, depth)) {
-        put_off(depth + CHAIN_STEPS);
-    }
+    follow(push.pixel_count, push.draws, push.emitter_count, depth);
     note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), NONFINITE_LIGHT, push.draws.domain,
                 push.draws.round, index);
     note_surface(chain.met_surface && !met_surface, push.most_samples / own.count);

@@ -29,7 +29,7 @@ void main()
     vec3 ns = receiver.shading_normal;
     vec3 position = off_the_walls(receiver.position, ng);
     Target here = plain_target(position, position_error(position), ng, ns, ns, SURFACE_RECEIVER, 0.0);
-    start_chain(position, ns, vec3(1.0), vec2(0.0));
+    start_chain(position, ns, vec3(1.0));
     if (HAS_MEDIA) {
         chain.media = media_at(position);
         here.media = chain.media;
@@ -62,9 +62,7 @@ void main()
         if (HAS_ALL_ARRIVALS) {
             chain.sees_emission = !on_surface;
         }
-        if (follow(push.point_count, push.draws, push.emitter_count, 0)) {
-            put_off(CHAIN_STEPS);
-        }
+        follow(push.point_count, push.draws, push.emitter_count, 0);
     }
     note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), NONFINITE_LIGHT, push.draws.domain,
                 push.draws.round, index);

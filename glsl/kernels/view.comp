@@ -47,13 +47,11 @@ void main()
     }
     vec3 direction = normalize(way);
 
-    start_chain(origin, direction, vec3(1.0), u.zw);
+    start_chain(origin, direction, vec3(1.0));
     if (HAS_MEDIA) {
         chain.media = media_at(origin);
     }
-    if (follow(pixel_count, push.draws, push.emitter_count, 0)) {
-        put_off(CHAIN_STEPS);
-    }
+    follow(pixel_count, push.draws, push.emitter_count, 0);
     note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), NONFINITE_LIGHT, push.draws.domain,
                 push.draws.round, pixel);
     note_surface(chain.met_surface, most_samples(pixel_count) / own.count);

@@ -44,6 +44,27 @@ ChosenLobe choose_lobe(Lobes lobes, float u)
     return chosen;
 }
 
+// Whether light may leave by this lobe in one direction alone.
+bool is_smooth_lobe(Layers layers, Lobes lobes, uint lobe)
+{
+    bool is_smooth = false;
+    if (lobe == LOBE_REFLECTION) {
+        is_smooth = lobes.reflection_chance > 0.0 && layers.alpha < DELTA_ALPHA;
+    }
+    if (HAS_COATS) {
+        if (lobe == LOBE_COAT) {
+            is_smooth = lobes.coat_chance > 0.0 && layers.coat_alpha < DELTA_ALPHA;
+        }
+    }
+    if (HAS_TRANSMISSION) {
+        if (lobe == LOBE_TRANSMISSION) {
+            bool goes_straight = layers.is_solid && abs(lobes.eta - 1.0) < SAME_INDEX;
+            is_smooth = lobes.transmission_chance > 0.0 && (layers.alpha < DELTA_ALPHA || goes_straight);
+        }
+    }
+    return is_smooth;
+}
+
 // A direction by the cosine, for the diffuse lobe or the sheen.
 Scatter sample_broad_lobe(Surface surface, Lobes lobes, vec3 wo, vec2 u, ChosenLobe chosen)
 {

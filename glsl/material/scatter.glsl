@@ -33,10 +33,50 @@ vec3 on_side(vec3 direction, vec3 side)
 #include "material/layered_lobes.glsl"
 #include "material/layered_sampling.glsl"
 
+// What smooth glass does with light that came from wo.
+struct Glass {
+    vec3 normal;
+    float eta; // index where wo is over that beyond
+    float cos_i;
+    float cos_t;
+    float reflectance;
+};
+
+// The path has met `depth` surfaces before.
+Glass glass_at(Surface surface, vec3 wo, uint depth)
+{
+    float eta = surface.front ? divide(1.0, surface.parameter) : surface.parameter;
+    vec3 normal = surface.ns;
+    float cos_i = min(dot(wo, normal), 1.0);
+    float cos_t_squared = refracted_cosine_squared(cos_i, eta);
+    if (HAS_SMOOTH_NORMALS) {
+        // Smooth normals do not keep phase space: without an end, some of what enters a coarse sphere is reflected in it
+        // for ever. What enters a solid by its triangles alone also leaves it.
+        if (cos_t_squared <= 0.0 && depth >= SMOOTH_TOTAL_REFLECTIONS) {
+            normal = surface.ng;
+            cos_i = min(dot(wo, normal), 1.0);
+            cos_t_squared = refracted_cosine_squared(cos_i, eta);
+        }
+    }
+    float cos_t = sqrt(max(cos_t_squared, 0.0));
+    return Glass(normal, eta, cos_i, cos_t, cos_t_squared > 0.0 ? fresnel(cos_i, cos_t, eta) : 1.0);
+}
+
+// Where light goes on that glass reflects or refracts, as if it did all of it.
+Scatter way_of_glass(Surface surface, Glass glass, vec3 wo, bool reflects, bool carries_radiance)
+{
+    if (reflects) {
+        vec3 wi = on_side(mirrored(wo, glass.normal), surface.ng);
+        return Scatter(wi, surface.base_colour, dot(wi, surface.ng) > 0.0, true, false, 0.0);
+    }
+    vec3 wi = on_side(normalize((glass.eta * glass.cos_i - glass.cos_t) * glass.normal - glass.eta * wo), -surface.ng);
+    float weight = carries_radiance ? glass.eta * glass.eta : 1.0;
+    return Scatter(wi, weight * surface.base_colour, dot(wi, surface.ng) < 0.0, true, false, 0.0);
+}
+
 // Samples where a path goes on that came from wo; u = (choice, two for the direction). A camera path
-// carries radiance, which refraction compresses; a photon carries flux. Glass that reflects some light and refracts some
-// does the first with the chance `mirror_chance`; 0: as much as it reflects. The path has met `depth` surfaces before.
-Scatter sample_scatter(Surface surface, vec3 wo, vec3 u, uint depth, bool carries_radiance, float mirror_chance)
+// carries radiance, which refraction compresses; a photon carries flux. The path has met `depth` surfaces before.
+Scatter sample_scatter(Surface surface, vec3 wo, vec3 u, uint depth, bool carries_radiance)
 {
     vec3 ns = surface.ns;
     if (HAS_MIRROR) {
@@ -47,31 +87,8 @@ Scatter sample_scatter(Surface surface, vec3 wo, vec3 u, uint depth, bool carrie
     }
     if (HAS_DIELECTRIC) {
         if (surface.kind == SURFACE_DIELECTRIC) {
-            float eta = surface.front ? divide(1.0, surface.parameter) : surface.parameter;
-            float cos_i = min(dot(wo, ns), 1.0);
-            float cos_t_squared = refracted_cosine_squared(cos_i, eta);
-            if (HAS_SMOOTH_NORMALS) {
-                // Smooth normals do not keep phase space: without an end, some of what enters a coarse sphere is reflected in it
-                // for ever. What enters a solid by its triangles alone also leaves it.
-                if (cos_t_squared <= 0.0 && depth >= SMOOTH_TOTAL_REFLECTIONS) {
-                    ns = surface.ng;
-                    cos_i = min(dot(wo, ns), 1.0);
-                    cos_t_squared = refracted_cosine_squared(cos_i, eta);
-                }
-            }
-            float cos_t = sqrt(max(cos_t_squared, 0.0));
-            float reflectance = cos_t_squared > 0.0 ? fresnel(cos_i, cos_t, eta) : 1.0;
-            bool as_much = mirror_chance == 0.0 || reflectance == 0.0 || reflectance == 1.0;
-            float chance = as_much ? reflectance : mirror_chance;
-            if (u.x < chance) {
-                vec3 wi = on_side(mirrored(wo, ns), surface.ng);
-                float weight = as_much ? 1.0 : divide(reflectance, chance);
-                return Scatter(wi, weight * surface.base_colour, dot(wi, surface.ng) > 0.0, true, false, 0.0);
-            }
-            vec3 wi = on_side(normalize((eta * cos_i - cos_t) * ns - eta * wo), -surface.ng);
-            float weight = as_much ? 1.0 : divide(1.0 - reflectance, 1.0 - chance);
-            weight *= carries_radiance ? eta * eta : 1.0;
-            return Scatter(wi, weight * surface.base_colour, dot(wi, surface.ng) < 0.0, true, false, 0.0);
+            Glass glass = glass_at(surface, wo, depth);
+            return way_of_glass(surface, glass, wo, u.x < glass.reflectance, carries_radiance);
         }
     }
     if (HAS_GLOSSY) {

@@ -1,7 +1,7 @@
 //! The core of all films: exact sums over blocks of rounds and of the squares of what each block left, whose spread tells the
 //! error. Sums are integers, so that it does not matter in which order photons, chunks, blocks or devices add to them.
 
-use super::degrees_of_freedom::DegreesOfFreedom;
+use super::degrees_of_freedom::{DegreesOfFreedom, concentration};
 use crate::constants::KEPT_BLOCKS;
 use crate::plan::latest_blocks::{kept_count, kept_place};
 
@@ -79,19 +79,21 @@ impl LatestBlocks {
     }
 
     /// How far errors of places go together in a film of so many blocks: `value` makes what counts of a kept place of what is kept of
-    /// it, `size` numbers.
-    pub fn degrees_of_freedom(
+    /// it, from `size` numbers; `variances` are those of all places.
+    pub fn degrees_of_freedom<const N: usize>(
         &self,
         size: usize,
         places: usize,
         blocks: u32,
-        value: impl Fn(usize, &[f32]) -> Vec<f64>,
+        value: impl Fn(usize, &[f32]) -> [f64; N],
+        variances: impl Iterator<Item = f64>,
     ) -> DegreesOfFreedom {
         let weighted = |block: &KeptBlock| -> Vec<f64> {
             let kept = block.values.chunks_exact(size).take(kept_count(places)).enumerate();
             kept.filter_map(|(number, values)| Some(value(kept_place(number, places)?, values))).flatten().collect()
         };
-        DegreesOfFreedom::of(&self.0.iter().map(weighted).collect::<Vec<_>>(), blocks)
+        let latest: Vec<Vec<f64>> = self.0.iter().map(weighted).collect();
+        DegreesOfFreedom::of(&latest, N, blocks, concentration(variances))
     }
 }
 

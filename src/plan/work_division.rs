@@ -5,7 +5,8 @@
 //! ```text
 //! noise of paths   (path + shadow ray / R) / (S n)
 //! noise of maps    of a round / neighbours x the mean of 1 / r^2 of the rounds / n
-//! bias             (BIAS x share of light from maps x (neighbours / photons x the mean of r^2)^BIAS_POWER)^2
+//! bias             (of a map's light x its share x (neighbours / photons x the mean of r^2)^BIAS_POWER)^2
+//! unseen           (of a path / (samples of those that have fewest x n))^2
 //! ```
 //!
 //! with what is not known of the bias, which falls with the noise of the maps. Radii shrink as Knaus and Zwicker (2011) have them. Variances
@@ -74,6 +75,8 @@ pub struct MapVariance {
     pub neighbours: u32,
     /// The share of all light that the map gives.
     pub share: f64,
+    /// The bias of that light relative to it at the same radius; `None` where it is not known.
+    pub bias: Option<f64>,
     /// The radius is given, whatever the photons.
     pub is_radius_set: bool,
 }
@@ -85,6 +88,12 @@ impl MapVariance {
             true => 1.0,
             false => f64::from(neighbours) / f64::from(NEIGHBOURS) * USUAL_PHOTONS / f64::from(photons),
         }
+    }
+
+    /// The bias of all light for a squared radius over the usual one.
+    fn bias(&self, squared_radius: f64) -> f64 {
+        let (found, at) = self.bias.map_or((BIAS, 1.0), |bias| (bias, self.squared_radius(self.photons, self.neighbours)));
+        found * self.share * (squared_radius / at).powf(if self.bias.is_some() { BIAS_POWER_FOUND } else { BIAS_POWER })
     }
 
     /// The variance of the first round's light.
@@ -126,6 +135,10 @@ struct Costs {
     /// What a round and each of its maps take in any case.
     round: f64,
     map: [f64; 2],
+    /// Of paths over mirrors and glass the longest ones, for which all others wait.
+    chains: f64,
+    /// How many times as long a path takes, and these do, where surfaces have layers.
+    of_layers: f64,
 }
 
 const FEW_TRIANGLES: f64 = 32.0;
@@ -134,24 +147,52 @@ const FEW_TRIANGLES: f64 = 32.0;
 /// the host's memory were not measured.
 fn costs(kind: &str) -> Costs {
     match kind {
-        "cpu" => Costs { path: [1500.0, 200.0], shadow_ray: [60.0, 35.0], photon: [1100.0, 150.0], round: 1e6, map: [2e6, 0.0] },
-        "discrete" => Costs { path: [0.6, 0.22], shadow_ray: [0.04, 0.01], photon: [0.6, 0.5], round: 1.5e5, map: [1e5, 5e4] },
-        _ => Costs { path: [15.0, 5.0], shadow_ray: [1.0, 0.5], photon: [15.0, 12.0], round: 3e5, map: [2e5, 1e5] },
+        "cpu" => Costs {
+            path: [1500.0, 200.0],
+            shadow_ray: [60.0, 35.0],
+            photon: [1100.0, 150.0],
+            round: 1e6,
+            map: [2e6, 0.0],
+            chains: 0.0,
+            of_layers: 1.5,
+        },
+        "discrete" => Costs {
+            path: [0.6, 0.22],
+            shadow_ray: [0.04, 0.01],
+            photon: [0.6, 0.5],
+            round: 1.5e5,
+            map: [1e5, 5e4],
+            chains: 1.1e6,
+            of_layers: 2.0,
+        },
+        _ => Costs {
+            path: [15.0, 5.0],
+            shadow_ray: [1.0, 0.5],
+            photon: [15.0, 12.0],
+            round: 3e5,
+            map: [2e5, 1e5],
+            chains: 2e6,
+            of_layers: 2.0,
+        },
     }
 }
 
 /// More neighbours make a path's lookups longer: by this share for as many again as usual.
-const OF_NEIGHBOURS: f64 = 0.08;
+const OF_NEIGHBOURS: f64 = 0.15;
+/// How many times as long a photon takes that is sent through mirrors and glass.
+const OF_CAUSTIC_PHOTON: f64 = 2.0;
 
 /// Of a plan's scene and pixels on a class of devices.
 pub fn cost(plan: &ScenePlan, triangles: usize, kind: &str) -> Cost {
-    let Costs { path, shadow_ray, photon, round, map } = costs(kind);
+    let Costs { path, shadow_ray, photon, round, map, chains, of_layers } = costs(kind);
+    let has = |constant: &str| f64::from(plan.constant(constant));
+    let layers = 1.0 + (of_layers - 1.0) * has("HAS_LAYERS");
     let doublings = (triangles as f64 / FEW_TRIANGLES).log2().max(0.0);
     let of = |[few, more]: [f64; 2]| few + more * doublings;
     let pixels = f64::from(plan.sensor.pixels());
     Cost {
-        round: round + of(map) * plan.maps().count() as f64,
-        paths: pixels * of(path),
+        round: round + of(map) * plan.maps().count() as f64 + layers * chains * has("HAS_SPECULAR_CHAINS"),
+        paths: pixels * layers * of(path),
         shadow_rays: if plan.shadow_rays() == 0 { 0.0 } else { pixels * of(shadow_ray) },
         photon: of(photon),
     }
@@ -159,10 +200,12 @@ pub fn cost(plan: &ScenePlan, triangles: usize, kind: &str) -> Cost {
 
 /// Photons and radius at which [`BIAS`] is: with [`NEIGHBOURS`].
 const USUAL_PHOTONS: f64 = 131_072.0;
-/// The bias of light from a map at the usual first radius, relative to it: 1 to 3 % in the built-in scenes. A pilot cannot tell it from noise.
+/// The bias of light from a map at the usual first radius, relative to it, where it was not measured: 1 to 3 % in the built-in scenes.
 const BIAS: f64 = 0.027;
 /// The power of the squared radius that it goes by: 1 where light is smooth, less along edges and in corners.
 const BIAS_POWER: f64 = 0.57;
+/// Where it was measured, at a wide radius.
+const BIAS_POWER_FOUND: f64 = 0.75;
 /// The bound of the bias over the bias, and over the root of how well a squared difference of two radii is known, which falls with the
 /// number of discs that have no photon in common: about so many at the usual radius.
 const BOUND_OF_BIAS: f64 = 2.1;
@@ -171,6 +214,8 @@ const QUANTILE: f64 = 1.645;
 const DISCS: f64 = 2000.0;
 /// The bound of noise over noise, squared.
 const BOUND_OF_NOISE: f64 = 1.3;
+/// Samples of pixels that have fewest, over the mean of all: these may miss what is rare.
+const LEAST_SAMPLES: f64 = 0.4;
 /// Blocks that a run has at least: its error is looked at first after so many.
 const LEAST_BLOCKS: u32 = 16;
 
@@ -183,6 +228,8 @@ pub struct Rounds {
     pub alpha: f64,
     /// Whether the bias is part of the error.
     pub counts_bias: bool,
+    /// What light may add that is so rare that one path of each pixel misses it ([`crate::engine::error_bound::FilmError::unseen`]).
+    pub unseen: f64,
 }
 
 impl Rounds {
@@ -191,7 +238,8 @@ impl Rounds {
         let Cost { round, paths, shadow_rays, photon } = self.cost;
         let Division { samples, shadow_rays: rays, photons, caustic_photons, neighbours } = division;
         let has = |map: MapVariance| f64::from(u8::from(map.photons > 0));
-        let of_maps = has(self.variance.global) * f64::from(photons) + has(self.variance.caustic) * f64::from(caustic_photons);
+        let of_maps =
+            has(self.variance.global) * f64::from(photons) + OF_CAUSTIC_PHOTON * has(self.variance.caustic) * f64::from(caustic_photons);
         let lookups = 1.0 + OF_NEIGHBOURS * (f64::from(neighbours) / f64::from(NEIGHBOURS) - 1.0);
         round + photon * of_maps + f64::from(samples) * (paths * lookups + f64::from(rays) * shadow_rays)
     }
@@ -212,10 +260,11 @@ impl Rounds {
             let discs = (DISCS / squared_radius).min(3.0 * self.pixels);
             of_maps += noise;
             unknown += noise * QUANTILE * (2.0 / discs).sqrt();
-            bias += BIAS * map.share * squared_radius.powf(BIAS_POWER);
+            bias += map.bias(squared_radius);
         }
         let of_bias = if self.counts_bias { BOUND_OF_BIAS.powi(2) * (bias * bias + TWO_RADII.powi(2) * unknown) } else { 0.0 };
-        (BOUND_OF_NOISE * (of_paths + of_maps) + of_bias).sqrt()
+        let unseen = self.unseen / (LEAST_SAMPLES * f64::from(samples) * rounds);
+        (BOUND_OF_NOISE * (of_paths + of_maps) + of_bias + unseen * unseen).sqrt()
     }
 
     /// Rounds after which the error is so small, if ever, and their nanoseconds.
@@ -329,7 +378,7 @@ mod tests {
     const OF_PATHS: Free = Free { samples: true, shadow_rays: true, photons: false, caustic_photons: false, neighbours: false };
 
     fn rounds(variance: Variance, cost: Cost) -> Rounds {
-        Rounds { variance, cost, pixels: 1e6, alpha: 2.0 / 3.0, counts_bias: true }
+        Rounds { variance, cost, pixels: 1e6, alpha: 2.0 / 3.0, counts_bias: true, unseen: 0.0 }
     }
 
     fn goal(error: f64) -> Stop {
@@ -364,8 +413,14 @@ mod tests {
 
     #[test]
     fn photons_go_where_the_noise_is() {
-        let of_map =
-            |of_round: f64, share: f64| MapVariance { of_round, photons: 1 << 17, neighbours: NEIGHBOURS, share, is_radius_set: false };
+        let of_map = |of_round: f64, share: f64| MapVariance {
+            of_round,
+            photons: 1 << 17,
+            neighbours: NEIGHBOURS,
+            share,
+            bias: None,
+            is_radius_set: false,
+        };
         let variance = Variance { path: 0.1, global: of_map(0.05, 0.5), caustic: of_map(1e-4, 0.01), ..Variance::default() };
         let found = rounds(variance, Cost { round: 1e6, paths: 1e6, shadow_rays: 1e5, photon: 5.0 });
         let free = Free { samples: true, shadow_rays: true, photons: true, caustic_photons: true, neighbours: true };

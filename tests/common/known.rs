@@ -312,7 +312,6 @@ fn coarse_sphere(material: Material, segments: u32, light: LightKind) -> Scene {
 pub fn coarse_sphere_in_a_furnace(gpu: &Gpu, material: Material, segments: u32) -> Check<Complaint> {
     let scene = coarse_sphere(material, segments, LightKind::Environment { radiance: Vec3::ONE });
     let camera = Camera::looking_at("front", DVec3::new(0.3, 0.4, 4.0), DVec3::ZERO, DVec3::Y, 0.55);
-    // One sample a round: of more, some would look for what the glass reflects, with weights of their own.
     let settings = SceneSettings { samples: 1, rounds: 16, photons: 1000, ..by_rounds() };
     let lit = seen(gpu, &scene, &settings, &camera, [48, 48]);
     let pixels = (0..lit.film.pixels()).map(|pixel| lit.film.mean(pixel).x);

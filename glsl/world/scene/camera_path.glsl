@@ -5,7 +5,9 @@ struct Chain {
     vec3 position;
     vec3 direction;
     vec3 weight; // radiance at the eye for radiance that arrives along the ray
-    vec2 choices; // of a path from the eye: whether the first two panes of glass mirror, as even as where it starts
+    float chance; // of the smooth ways it took where the others are followed too; what shines counts so often less
+    bool is_smooth; // it has met nothing yet but mirrors, panes and what they show
+    bool is_other_way; // that a path did not take: it sees what shines
     bool saw_specular; // before the first visible point
     bool gathers; // the first visible point, or a receiver, lies behind
     bool starts_nowhere; // at a receiver that no photon can reach
@@ -23,13 +25,17 @@ struct Chain {
     vec3 seen; // what shines by itself and is met by the eye's ray, before any surface that scatters
 };
 
-// The path of this thread. No argument: drivers keep copies of one that has arrays.
+// The path of this thread, and ways that it has not taken. No arguments: drivers keep copies of one that has arrays.
 Chain chain;
+uint ways_found;
+uint ways_left;
 
-void start_chain(vec3 position, vec3 direction, vec3 weight, vec2 choices)
+void start_chain(vec3 position, vec3 direction, vec3 weight)
 {
-    chain = Chain(position, direction, weight, choices, false, false, false, true, false, 0, 0.0, vec3(0.0), vec3(0.0), 0,
+    chain = Chain(position, direction, weight, 1.0, true, false, false, false, false, true, false, 0, 0.0, vec3(0.0), vec3(0.0), 0,
                   false, vec3[](vec3(0.0), vec3(0.0), vec3(0.0)), vec3(0.0));
+    ways_found = 0;
+    ways_left = 0;
 }
 
 // The part of the picture that light of the current vertex belongs to, when it arrived in this way.
@@ -40,13 +46,18 @@ uint part_of(uint arrival)
                               : (arrival == ARRIVED_DIRECT ? PART_DIRECT : (arrival == ARRIVED_CAUSTIC ? PART_CAUSTIC : PART_INDIRECT));
 }
 
-void add_light(vec3 radiance)
+void add_weighted_light(vec3 light)
 {
     uint part = part_of(ARRIVED_DIRECT);
     if ((PARTS & part) != 0) {
         uint place = part == PART_DIRECT ? 0 : (part == PART_SPECULAR ? 1 : 2);
-        chain.light[place] += chain.weight * radiance;
+        chain.light[place] += light;
     }
+}
+
+void add_light(vec3 radiance)
+{
+    add_weighted_light(chain.weight * radiance);
 }
 
 // Whether the eye's ray has met nothing but gaps so far.
@@ -62,10 +73,11 @@ void add_shining(vec3 radiance)
     if (HAS_SEEN_LIGHT) {
         is_seen = is_straight() && (PARTS & PART_DIRECT) != 0;
     }
+    vec3 light = chain.chance * chain.weight * radiance;
     if (is_seen) {
-        chain.seen += chain.weight * radiance;
+        chain.seen += light;
     } else {
-        add_light(radiance);
+        add_weighted_light(light);
     }
 }
 
@@ -127,11 +139,6 @@ bool gathers_here(Surface surface)
     }
     return GATHER_RAYS == GATHER_ALL;
 }
-
-// Of samples enough, so many see what the first two panes of glass mirror, however faint that is: a lamp in them may be
-// brighter than all else.
-const float MIRROR_CHANCES[2] = float[](0.5, 0.25);
-const uint MIRROR_SAMPLES = 4;
 
 // Surfaces that one dispatch follows a chain over; what is still under way then goes on in another (kernels/go_on.comp).
 layout(constant_id = 46) const uint CHAIN_STEPS = MAX_BOUNCES;
@@ -206,173 +213,184 @@ bool leave_point(Surface surface, Lobes lobes, vec3 wo, vec3 scale, bool for_all
     return gathers;
 }
 
-// Follows the path of a sample, which is over `first_depth` surfaces already. Says whether it is still under way. Random
+#include "world/scene/other_ways.glsl"
+
+// Follows the path of a sample to its next surface and over it; it is over `depth` surfaces already. Says whether it goes on. Random
 // numbers: block 1 + VERTEX_BLOCKS * depth goes on, the one after it is for direct light.
-bool follow(uint pixel_count, Draws draws, uint emitter_count, uint first_depth)
+bool step(uint pixel_count, Draws draws, uint emitter_count, uint depth)
 {
     uint index = own.pixel;
     uint number = own.number;
-    uint end_depth = min(first_depth + CHAIN_STEPS, MAX_BOUNCES);
-    for (uint depth = first_depth; depth < end_depth; depth++) {
-        note_unless(is_finite(chain.position) && is_finite(chain.direction) && is_finite(chain.weight), NONFINITE_LIGHT, draws.domain,
-                    draws.round, index);
-        vec3 wo = -chain.direction;
-        Hit hit = closest_hit(chain.position, chain.direction);
-        if (hit.triangle == NONE) {
-            see_sky(emitter_count);
-            return false;
-        }
-        if (HAS_MEDIA) {
-            chain.weight *= transmittance(chain.media, hit.t);
-        }
-        Surface surface = surface_at(hit, wo);
-        uint block = 1 + VERTEX_BLOCKS * depth;
-        bool is_layered = false;
-        if (HAS_LAYERS) {
-            is_layered = surface.kind == SURFACE_LAYERED;
-        }
-        Lobes lobes;
-        Scatter scatter;
-        float matt = 1.0;
-        if (is_layered) {
-            uint channel = 1;
-            if (HAS_DISPERSION) {
-                if (is_dispersive(surface, chain.media)) {
-                    // Once a path: of one channel it stays.
-                    channel = choose_channel(chain.weight, stratified_at(number, index, CHANNEL_BLOCK, draws).x);
-                    chain.weight = light_of_channel(chain.weight, channel);
-                }
-            }
-            float eta = index_ratio(surface, chain.media, channel);
-            surface.ns = normal_of_refraction(surface, wo, eta, depth);
-            lobes = lobes_of(surface, wo, eta);
-            // The eye does not see the back of what has one side.
-            bool is_culled = !surface.scatters && !chain.gathers && !chain.ends_at_light;
-            scatter = sample_layered(surface, lobes, wo, stratified_at(number, index, block, draws).zxy, true);
-            if (is_culled || scatter.passes) {
-                chain.weight *= is_culled ? vec3(1.0) : scatter.weight;
-                // It stops light samples.
-                chain.density = is_culled ? 0.0 : chain.density;
-                chain.position = offset_origin(surface.position, surface.error, surface.ng, chain.direction);
-                continue;
-            }
-            if (HAS_PASSING) {
-                chain.weight *= divide(surface.layers.coverage, 1.0 - lobes.pass_chance);
-            }
-            matt = matt_chance(lobes, surface.layers);
-            if (surface.layers.is_unlit && !chain.gathers && !chain.ends_at_light) {
-                add_shining(surface.base_colour);
-            }
-        }
-        see_lamp(surface, hit, emitter_count);
-        if (!surface.scatters || chain.ends_at_light) {
-            return false;
-        }
-        if (HAS_SEEN_LIGHT) {
-            bool is_unlit = is_layered && surface.layers.is_unlit;
-            chain.met_surface = chain.met_surface || (is_straight() && !is_unlit);
-        }
-        bool specular = is_layered ? scatter.is_specular : is_specular(surface);
-        vec3 scale = is_layered ? vec3(1.0) : surface.base_colour * scatter_scale(surface.kind, surface.parameter);
-        bool wants_direct = (PARTS & part_of(ARRIVED_DIRECT)) != 0;
-        bool asks_lights = false;
-        if (HAS_SHADOW_RAYS) {
-            asks_lights = is_layered || (!specular && wants_direct);
-        }
-        if (is_layered) {
-            chain.density = 0.0;
-        }
-        if (asks_lights) {
-            Target here = plain_target(surface.position, surface.error, surface.ng, surface.ns, wo, surface.kind, surface.parameter);
-            here.surface = surface;
-            here.lobes = lobes;
-            here.media = chain.media;
-            here.asks_lobes = is_layered && seeks_light();
-            vec3 light = scale * direct_light(here, emitter_count, draws, index, number, block + 1);
-            if (wants_direct) {
-                add_light(light);
-            }
-            // Of what a gather ray meets the caustic map has counted the light of sharp lobes.
-            if (is_layered && (!chain.gathers || chain.starts_nowhere)) {
-                bool saw_specular = chain.saw_specular;
-                chain.saw_specular = saw_specular || !chain.gathers;
-                add_light(sharp_light);
-                chain.saw_specular = saw_specular;
-                chain.density = scatter.density;
-                chain.from = surface.position;
-                chain.from_normal = surface.ns;
-            }
-            note_shadow_rays(index, divide(chain.weight * scale, float(own.count)));
-        }
-        // Matt lobes are followed no further but for a gather.
-        if (is_layered && !specular && matt == 0.0) {
-            return false;
-        }
-        if (!specular) {
-            if (is_layered) {
-                scale = vec3(divide(0.31830988618379067, matt));
-            }
-            // Where it is by chance that a path gets here, each counts for itself.
-            bool for_all = !chain.saw_specular && !chain.gathers && matt == 1.0;
-            if (leave_point(surface, lobes, wo, scale, for_all, pixel_count)) {
-                chain.gathers = true;
-                chain.density = 0.0;
-                chain.weight *= for_all ? float(own.count) : 1.0;
-                // Shadow rays and the caustic map have counted what shines from here on.
-                chain.sees_emission = false;
-            } else if (asks_lights && is_layered && seeks_light()) {
-                chain.ends_at_light = true;
-                chain.density = density_of_matt_lobes(surface, lobes, wo, scatter.direction);
-            } else {
-                return false;
-            }
-        }
-        bool ends = specular && !chain.gathers;
-        if (HAS_SPECULAR_CHAINS) {
-            ends = false;
-        }
-        if (ends) {
-            return false;
-        }
-        vec3 u = stratified_at(number, index, block, draws).zxy;
-        float mirror_chance = 0.0;
-        if (own.count * work.rounds_per_block >= MIRROR_SAMPLES && specular && depth < 2 && !chain.gathers) {
-            mirror_chance = MIRROR_CHANCES[depth];
-            u.x = chain.choices[depth];
-        }
-        if (!is_layered) {
-            scatter = sample_scatter(surface, wo, u, depth, true, mirror_chance);
-        }
-        if (!scatter.alive) {
-            return false;
-        }
-        if (depth >= ROULETTE_DEPTH) {
-            float most = depth < LOSSLESS_DEPTH ? 1.0 : MAX_SURVIVAL;
-            float survival = min(max(scatter.weight.x, max(scatter.weight.y, scatter.weight.z)), most);
-            if (stratified_at(number, index, ROULETTE_BLOCK + depth, draws).x >= survival) {
-                return false;
-            }
-            scatter.weight = divide(scatter.weight, survival);
-        }
-        if (surface.kind == SURFACE_PAPER_PHONG) {
-            scatter.weight *= lobe_weight(surface.kind, surface.parameter, surface.ns, wo, scatter.direction);
-        }
-        chain.weight *= scatter.weight;
-        // No caustic map holds what reaches a receiver in the air over mirrors and glass.
-        chain.sees_emission = chain.sees_emission || (chain.starts_nowhere && specular);
-        chain.saw_specular = chain.saw_specular || (specular && !chain.gathers);
-        if (HAS_MEDIA) {
-            if (is_layered && surface.layers.medium != 0 && dot(scatter.direction, surface.ng) < 0.0) {
-                chain.media = media_beyond(surface, chain.media);
-            }
-        }
-        chain.position = offset_origin(surface.position, surface.error, surface.ng, scatter.direction);
-        chain.direction = scatter.direction;
-    }
-    if (end_depth == MAX_BOUNCES) {
-        note_cut_path(max(chain.weight.x, max(chain.weight.y, chain.weight.z)));
+    note_unless(is_finite(chain.position) && is_finite(chain.direction) && is_finite(chain.weight), NONFINITE_LIGHT, draws.domain,
+                draws.round, index);
+    vec3 wo = -chain.direction;
+    Hit hit = closest_hit(chain.position, chain.direction);
+    if (hit.triangle == NONE) {
+        see_sky(emitter_count);
         return false;
     }
+    if (HAS_MEDIA) {
+        chain.weight *= transmittance(chain.media, hit.t);
+    }
+    Surface surface = surface_at(hit, wo);
+    uint block = 1 + VERTEX_BLOCKS * depth;
+    bool is_layered = false;
+    if (HAS_LAYERS) {
+        is_layered = surface.kind == SURFACE_LAYERED;
+    }
+    Lobes lobes;
+    Scatter scatter;
+    float matt = 1.0;
+    // Beyond this surface.
+    float chance = chain.chance;
+    if (is_layered) {
+        uint channel = 1;
+        if (HAS_DISPERSION) {
+            if (is_dispersive(surface, chain.media)) {
+                // Once a path: of one channel it stays.
+                channel = choose_channel(chain.weight, stratified_at(number, index, CHANNEL_BLOCK, draws).x);
+                chain.weight = light_of_channel(chain.weight, channel);
+            }
+        }
+        float eta = index_ratio(surface, chain.media, channel);
+        surface.ns = normal_of_refraction(surface, wo, eta, depth);
+        lobes = lobes_of(surface, wo, eta);
+        // The eye does not see the back of what has one side.
+        bool is_culled = !surface.scatters && !chain.gathers && !chain.ends_at_light;
+        vec3 u = stratified_at(number, index, block, draws).zxy;
+        scatter = sample_layered(surface, lobes, wo, u, true);
+        if (follows_other_ways(depth) && !is_culled) {
+            chance *= part_at_layers(surface, lobes, wo, choose_lobe(lobes, u.x), scatter.passes, depth);
+        }
+        if (is_culled || scatter.passes) {
+            chain.weight *= is_culled ? vec3(1.0) : scatter.weight;
+            chain.chance = chance;
+            // It stops light samples.
+            chain.density = is_culled ? 0.0 : chain.density;
+            chain.position = offset_origin(surface.position, surface.error, surface.ng, chain.direction);
+            return true;
+        }
+        if (HAS_PASSING) {
+            chain.weight *= divide(surface.layers.coverage, 1.0 - lobes.pass_chance);
+        }
+        matt = matt_chance(lobes, surface.layers);
+        if (surface.layers.is_unlit && !chain.gathers && !chain.ends_at_light) {
+            add_shining(surface.base_colour);
+        }
+    }
+    see_lamp(surface, hit, emitter_count);
+    if (!surface.scatters || chain.ends_at_light) {
+        return false;
+    }
+    if (HAS_SEEN_LIGHT) {
+        bool is_unlit = is_layered && surface.layers.is_unlit;
+        chain.met_surface = chain.met_surface || (is_straight() && !is_unlit);
+    }
+    bool specular = is_layered ? scatter.is_specular : is_specular(surface);
+    bool is_smooth = specular;
+    if (is_layered) {
+        is_smooth = specular && scatter.density == 0.0;
+    }
+    if (chain.is_other_way && !is_smooth) {
+        return false;
+    }
+    vec3 scale = is_layered ? vec3(1.0) : surface.base_colour * scatter_scale(surface.kind, surface.parameter);
+    bool wants_direct = (PARTS & part_of(ARRIVED_DIRECT)) != 0;
+    bool asks_lights = false;
+    if (HAS_SHADOW_RAYS) {
+        asks_lights = !chain.is_other_way && (is_layered || (!specular && wants_direct));
+    }
+    if (is_layered) {
+        chain.density = 0.0;
+    }
+    if (asks_lights) {
+        Target here = plain_target(surface.position, surface.error, surface.ng, surface.ns, wo, surface.kind, surface.parameter);
+        here.surface = surface;
+        here.lobes = lobes;
+        here.media = chain.media;
+        here.asks_lobes = is_layered && seeks_light();
+        vec3 light = scale * direct_light(here, emitter_count, draws, index, number, block + 1);
+        if (wants_direct) {
+            add_light(light);
+        }
+        // Of what a gather ray meets the caustic map has counted the light of sharp lobes.
+        if (is_layered && (!chain.gathers || chain.starts_nowhere)) {
+            bool saw_specular = chain.saw_specular;
+            chain.saw_specular = saw_specular || !chain.gathers;
+            add_light(sharp_light);
+            chain.saw_specular = saw_specular;
+            chain.density = scatter.density;
+            chain.from = surface.position;
+            chain.from_normal = surface.ns;
+        }
+        note_shadow_rays(index, divide(chain.weight * scale, float(own.count)));
+    }
+    // Matt lobes are followed no further but for a gather.
+    if (is_layered && !specular && matt == 0.0) {
+        return false;
+    }
+    if (!specular) {
+        if (is_layered) {
+            scale = vec3(divide(0.31830988618379067, matt));
+        }
+        // Where it is by chance that a path gets here, each counts for itself.
+        bool for_all = !chain.saw_specular && !chain.gathers && matt == 1.0;
+        if (leave_point(surface, lobes, wo, scale, for_all, pixel_count)) {
+            chain.gathers = true;
+            chain.density = 0.0;
+            chain.weight *= for_all ? float(own.count) : 1.0;
+            // Shadow rays and the caustic map have counted what shines from here on.
+            chain.sees_emission = false;
+        } else if (asks_lights && is_layered && seeks_light()) {
+            chain.ends_at_light = true;
+            chain.density = density_of_matt_lobes(surface, lobes, wo, scatter.direction);
+        } else {
+            return false;
+        }
+    }
+    bool ends = specular && !chain.gathers;
+    if (HAS_SPECULAR_CHAINS) {
+        ends = false;
+    }
+    if (ends) {
+        return false;
+    }
+    vec3 u = stratified_at(number, index, block, draws).zxy;
+    if (!is_layered) {
+        scatter = sample_scatter(surface, wo, u, depth, true);
+        if (HAS_DIELECTRIC) {
+            if (surface.kind == SURFACE_DIELECTRIC && follows_other_ways(depth)) {
+                chance *= part_at_glass(surface, wo, dot(scatter.direction, surface.ng) > 0.0, depth);
+            }
+        }
+    }
+    chain.chance = is_smooth ? chance : 1.0;
+    chain.is_smooth = chain.is_smooth && is_smooth;
+    if (!scatter.alive) {
+        return false;
+    }
+    if (depth >= ROULETTE_DEPTH) {
+        float most = depth < LOSSLESS_DEPTH ? 1.0 : MAX_SURVIVAL;
+        float survival = min(max(scatter.weight.x, max(scatter.weight.y, scatter.weight.z)), most);
+        if (stratified_at(number, index, ROULETTE_BLOCK + depth, draws).x >= survival) {
+            return false;
+        }
+        scatter.weight = divide(scatter.weight, survival);
+    }
+    if (surface.kind == SURFACE_PAPER_PHONG) {
+        scatter.weight *= lobe_weight(surface.kind, surface.parameter, surface.ns, wo, scatter.direction);
+    }
+    chain.weight *= scatter.weight;
+    // No caustic map holds what reaches a receiver in the air over mirrors and glass.
+    chain.sees_emission = chain.sees_emission || (chain.starts_nowhere && specular);
+    chain.saw_specular = chain.saw_specular || (specular && !chain.gathers);
+    if (HAS_MEDIA) {
+        if (is_layered && surface.layers.medium != 0 && dot(scatter.direction, surface.ng) < 0.0) {
+            chain.media = media_beyond(surface, chain.media);
+        }
+    }
+    chain.position = offset_origin(surface.position, surface.error, surface.ng, scatter.direction);
+    chain.direction = scatter.direction;
     return true;
 }
 
@@ -386,8 +404,8 @@ void put_off(uint depth)
     uint flags = uint(chain.saw_specular) | uint(chain.gathers) << 1 | uint(chain.starts_nowhere) << 2 | uint(chain.sees_emission) << 3
                | uint(chain.ends_at_light) << 6 | uint(chain.met_surface) << 7;
     next_camera_paths[atomicAdd(camera_path_counts[0], 1)] =
-        CameraPath(chain.position, own, chain.direction, flags | chain.point_count << 4 | depth << 8, chain.weight, chain.media, chain.density, chain.from,
-                   chain.from_normal);
+        CameraPath(chain.position, own, chain.direction, flags | chain.point_count << 4 | depth << 8, chain.weight, chain.chance, chain.media,
+                   chain.density, chain.from, chain.from_normal);
 }
 
 // Visible points that the path has not found: nothing arrives there.
@@ -395,5 +413,29 @@ void write_missing_points(uint pixel_count)
 {
     for (uint k = chain.point_count; k < points_per_path(); k++) {
         visible_points[place_of_point(k, own.place, pixel_count)] = no_point();
+    }
+}
+
+// Follows the path of a sample, which is over `depth` surfaces already, and ways that it has not taken. What is under way when the
+// dispatch ends is put off.
+void follow(uint pixel_count, Draws draws, uint emitter_count, uint depth)
+{
+    uint end = min(depth + CHAIN_STEPS, MAX_BOUNCES);
+    while (true) {
+        bool goes_on = step(pixel_count, draws, emitter_count, depth);
+        depth++;
+        if (goes_on && depth < end) {
+            continue;
+        }
+        if (goes_on && (chain.is_other_way || end == MAX_BOUNCES)) {
+            note_cut_path(max(chain.weight.x, max(chain.weight.y, chain.weight.z)));
+        } else if (goes_on) {
+            put_off(depth);
+        }
+        if (ways_left == 0) {
+            break;
+        }
+        depth = take_way();
+        end = depth + STEPS_OF_WAY;
     }
 }

@@ -114,14 +114,18 @@ impl RoomFilm {
         let measure = self.measure(weights, stop.measure);
         let weighted = |point: usize, values: &[f32]| {
             let weight = weights[point];
-            vec![measure.relative(weight * f64::from(values[0]), weight * self.flux(point))]
+            [measure.relative(weight * f64::from(values[0]), weight * self.flux(point))]
         };
+        let variances = weights
+            .iter()
+            .enumerate()
+            .map(|(point, weight)| measure.relative(weight * self.flux_error(point), weight * self.flux(point)).powi(2));
         FilmError {
             bias: None,
             rounds: self.rounds,
             blocks: self.blocks,
             noise: self.relative_error(weights, stop.measure),
-            freedom: self.latest.degrees_of_freedom(1, weights.len(), self.blocks, weighted),
+            freedom: self.latest.degrees_of_freedom(1, weights.len(), self.blocks, weighted, variances),
             unknown: self.unknown(weights, unit, stop),
             unseen: 0.0,
             places: None,

@@ -339,13 +339,17 @@ impl SceneFilm {
                 // As an error counts that goes with it.
                 sum * measure.relative(1.0, mean[channel])
             };
-            [0, 1, 2].map(of_channel).to_vec()
+            [0, 1, 2].map(of_channel)
         };
+        let variances = (0..self.pixels()).map(|pixel| {
+            let (error, mean) = (self.surface_error(pixel), self.surface_mean(pixel));
+            [0, 1, 2].map(|channel| measure.relative(error[channel], mean[channel]).powi(2)).iter().sum()
+        });
         FilmError {
             rounds: self.rounds,
             blocks: self.blocks,
             noise: self.relative_error(),
-            freedom: self.latest.degrees_of_freedom(PART_VALUES as usize, self.pixels(), self.blocks, value),
+            freedom: self.latest.degrees_of_freedom(PART_VALUES as usize, self.pixels(), self.blocks, value, variances),
             unknown: self.unknown(confidence),
             unseen: self.unseen(confidence),
             bias: self.bias(confidence, &measure),

@@ -28,7 +28,7 @@ const PIXELS: f64 = 1024.0;
 /// Paths through each, as many as a block of a run has at least: they are even over it, and vary less than if each was alone.
 const SAMPLES: u32 = SAMPLES_PER_BLOCK;
 const ROUNDS: u32 = 16;
-/// Of each map, and those within the first radius, which is wider than in a run.
+/// Of each map, and those within the first radius, which is wider than in a run: the bias stands out.
 const PHOTONS: u32 = 1 << 12;
 const NEIGHBOURS: u32 = 4;
 const MANY_SHADOW_RAYS: u32 = 4;
@@ -87,6 +87,7 @@ pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Fre
             photons: PHOTONS,
             neighbours: NEIGHBOURS,
             share: of_many.light[part],
+            bias: None,
             is_radius_set: map.radius_from == RadiusFrom::User,
         }
     };
@@ -102,7 +103,9 @@ pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Fre
     }
     let cost = cost(plan, view.geometry.triangles.len(), gpu.facts().kind);
     let counts_bias = plan.film.bias == BiasPlan::Blocks;
-    let mut rounds = Rounds { variance, cost, pixels: f64::from(plan.sensor.pixels()), alpha: settings.alpha, counts_bias };
+    let pixels = f64::from(plan.sensor.pixels());
+    let unseen = of_many.unseen / pixels.sqrt();
+    let mut rounds = Rounds { variance, cost, pixels, alpha: settings.alpha, counts_bias, unseen };
     let limits = engine::limits(gpu.facts());
     let plan_of =
         |division: Division| ScenePlan::with_trial(scene, view.geometry, &division.set(settings), plan.sensor, &limits, plan.trial.clone());
@@ -129,8 +132,9 @@ pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Fre
             let known = &mut rounds.variance;
             known.shadow_ray = known.shadow_ray.min(seen.paths * f64::from(first.shadow_rays));
             known.path = seen.paths - known.shadow_ray / f64::from(first.shadow_rays);
-            for (map, [variance, share]) in [&mut known.global, &mut known.caustic].into_iter().zip(seen.maps) {
-                (map.of_round, map.share) = (variance, share);
+            for (map, of_light) in [&mut known.global, &mut known.caustic].into_iter().zip(seen.maps) {
+                let [variance, share, bias] = of_light;
+                (map.of_round, map.share, map.bias) = (variance, share, (bias > 0.0).then_some(bias));
             }
             found = Some(seen.tiles);
             count *= 4;
@@ -176,13 +180,16 @@ const LEAST_PICTURE: f64 = 4.0;
 /// Of the mean variance, what a tile is taken to have that showed none.
 const HIDDEN_VARIANCE: f64 = 0.1;
 
+/// Pixels that tell enough of a map, whose light varies little from one to the next.
+const PIXELS_OF_MAP: f64 = 4096.0;
+
 /// What all pixels tell, relative to all light.
 struct OfPicture {
     /// The variance of a path, and that of each tile over their mean.
     paths: f64,
     tiles: Vec<f64>,
-    /// Of the global and of the caustic map: the variance of a round, and the light.
-    maps: [[f64; 2]; 2],
+    /// Of the global and of the caustic map: the variance of a round, the light, and the bias of this light, 0 where it is not known.
+    maps: [[f64; 3]; 2],
 }
 
 /// Rounds of all pixels that are worth their while in a run so far as it is known.
@@ -200,8 +207,12 @@ fn of_picture(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, shadow_ray
     let maps: Vec<LightOf> = run.maps().map(|map| if map.caustic_only { LightOf::CausticMap } else { LightOf::GlobalMap }).collect();
     let look = |light_of: LightOf, samples: u32| {
         let settings = SceneSettings { samples, shadow_rays, rounds, seed: bias_batches::seed(SEED, 1), ..pilot_settings(&run.settings) };
-        let mut plan = trial::plan(gpu, scene, view, &settings, run.sensor)?;
-        plan.light_of = light_of;
+        let (sensor, footprint) = match (light_of, run.sensor) {
+            (LightOf::GlobalMap | LightOf::CausticMap, Sensor::Picture { width, height }) => fewer(width, height, PIXELS_OF_MAP),
+            _ => (run.sensor, 1.0),
+        };
+        let mut plan = trial::plan(gpu, scene, view, &settings, sensor)?;
+        (plan.light_of, plan.footprint) = (light_of, footprint);
         Ok(light(gpu, view, plan, &mut Control::default())?.film)
     };
     let mean = |film: &SceneFilm| film.surface_means().map(DVec3::element_sum).sum::<f64>() / film.pixels() as f64;
@@ -211,10 +222,11 @@ fn of_picture(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, shadow_ray
         all / film.pixels() as f64 * f64::from(film.rounds)
     };
     let of_paths = look(LightOf::Paths, SAMPLES)?;
-    let mut of_maps = [[0.0; 2]; 2];
+    let mut of_maps = [[0.0; 3]; 2];
     for map in maps {
         let film = look(map, 1)?;
-        of_maps[usize::from(map == LightOf::CausticMap)] = [square(&film), mean(&film)];
+        let bias = film.error(run.settings.stop.confidence).bias.filter(|bias| bias.lower > 0.0).map_or(0.0, |bias| bias.relative);
+        of_maps[usize::from(map == LightOf::CausticMap)] = [square(&film), mean(&film), bias];
     }
     let all = mean(&of_paths) + of_maps[0][1] + of_maps[1][1];
     if all <= 0.0 {
@@ -238,7 +250,7 @@ fn of_picture(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, shadow_ray
     Ok(Some(OfPicture {
         paths: f64::from(SAMPLES) * relative(square(&of_paths)),
         tiles: tiles.into_iter().map(|(variance, count)| variance / f64::from(count) / sum).collect(),
-        maps: of_maps.map(|[variance, light]| [relative(variance), light / all]),
+        maps: of_maps.map(|[variance, light, bias]| [relative(variance), light / all, bias]),
     }))
 }
 
@@ -267,6 +279,8 @@ fn tile_samples(mean: u32, least_samples: u32, shares: &[f64], size: (u32, u32))
 struct Parts {
     variance: [f64; PART_COUNT as usize],
     light: [f64; PART_COUNT as usize],
+    /// What one pixel may have of light that its only path has missed, relative to the light of a pixel.
+    unseen: f64,
 }
 
 /// Settings that all rounds of a pilot have.
@@ -284,16 +298,21 @@ fn pilot_settings(run: &SceneSettings) -> SceneSettings {
     }
 }
 
+/// About so many pixels at most, spread over a picture, and the side of each over that between two.
+fn fewer(width: u32, height: u32, pixels: f64) -> (Sensor, f64) {
+    let smaller = (pixels / (f64::from(width) * f64::from(height))).sqrt().min(1.0);
+    let length = |length: u32| ((f64::from(length) * smaller) as u32).max(1);
+    (Sensor::Picture { width: length(width), height: length(height) }, f64::from(length(width)) / f64::from(width))
+}
+
 /// Of a path through each pixel with so many shadow rays.
 fn parts(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, shadow_rays: u32) -> Result<Parts> {
     let seed = bias_batches::seed(SEED, 0);
     let settings = SceneSettings { samples: SAMPLES, shadow_rays, rounds: ROUNDS, seed, ..pilot_settings(&run.settings) };
     let (sensor, phases, footprint) = match run.sensor {
         Sensor::Picture { width, height } => {
-            let smaller = (PIXELS / (f64::from(width) * f64::from(height))).sqrt().min(1.0);
-            let length = |length: u32| ((f64::from(length) * smaller) as u32).max(1);
-            let sensor = Sensor::Picture { width: length(width), height: length(height) };
-            (sensor, Vec::new(), f64::from(length(width)) / f64::from(width))
+            let (sensor, footprint) = fewer(width, height, PIXELS);
+            (sensor, Vec::new(), footprint)
         }
         Sensor::Receivers { .. } => {
             let all = &view.phases[0];
@@ -310,6 +329,7 @@ fn parts(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, shadow_rays: u3
     let of_round = error.noise * error.noise * f64::from(lit.film.rounds);
     let [direct, specular, caustic, indirect] = error.places.map_or([0.0; PART_COUNT as usize], |places| places.of_parts);
     let of_path = f64::from(samples) * of_round;
+    let of_unseen = f64::from(samples) * f64::from(lit.film.rounds) * (lit.film.pixels() as f64).sqrt();
     let light: Vec<f64> = lit.film.part_totals.iter().map(|total| *total as f64).collect();
     // Without lamps and sky that are seen straight.
     let surfaces = lit.film.of_surfaces.as_ref().unwrap_or(&lit.film.of_blocks);
@@ -317,5 +337,6 @@ fn parts(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, shadow_rays: u3
     Ok(Parts {
         variance: [direct * of_path, specular * of_path, caustic * of_round, indirect * of_round],
         light: std::array::from_fn(|part| light[part] / all),
+        unseen: error.unseen * of_unseen,
     })
 }
