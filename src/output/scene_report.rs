@@ -74,7 +74,8 @@ pub fn pilot(pilot: &Pilot, stop: &Stop, point: &str) -> String {
         false => format!(", {:.1} times as fast as the usual settings", pilot.gain(stop)),
     };
     let why = shares(pilot.of_parts);
-    format!("pilot: {paths}{maps} a round{against}, as the noise sits in {why}; {}", expected(pilot, stop))
+    let spent = if pilot.spent > 0.0 { format!("; {:.2} s of the device for the pilot", 1e-3 * pilot.spent) } else { String::new() };
+    format!("pilot: {paths}{maps} a round{against}, as the noise sits in {why}; {}{spent}", expected(pilot, stop))
 }
 
 /// Seconds until the error that is wanted, and until half of it; or the error after the time that there is.

@@ -24,6 +24,7 @@ pub mod losses;
 pub mod map_file;
 mod on_gpu;
 pub mod pilot;
+mod pilot_rounds;
 pub mod points;
 pub mod radius_class;
 pub mod replay;
