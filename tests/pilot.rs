@@ -87,7 +87,7 @@ fn what_is_set_stays_and_the_rest_is_chosen_alike_each_time() {
     assert_eq!(of_rays.chosen, Division { shadow_rays: of_rays.chosen.shadow_rays, ..of_rays.before });
     let three = SceneSettings { shadow_rays: 3, ..fine.clone() };
     let of_others = subject.chosen(&gpu, &three, Free { shadow_rays: false, ..ALL }).unwrap();
-    assert!(of_others.chosen.shadow_rays == 3 && of_others.chosen.photons != 8192, "{of_others:?}");
+    assert!(of_others.chosen.shadow_rays == 3 && of_others.chosen != of_others.before, "{of_others:?}");
     assert_eq!(subject.chosen(&gpu, &fine, NONE), None);
     // A small error takes more of it.
     let coarse = subject.chosen(&gpu, &goal(Some(0.3), None), ALL).unwrap();
