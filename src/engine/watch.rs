@@ -13,7 +13,7 @@ use super::saved::SavedRun;
 use crate::error::{Error, Result, require};
 use crate::ledger::Ledger;
 use crate::plan::radius::mean_squared_radius;
-use crate::settings::stop::Stop;
+use crate::settings::stop::{FIRST_LOOK, Stop};
 use serde::Serialize;
 
 /// How a caller watches a run and ends it early.
@@ -145,13 +145,10 @@ pub enum End {
     Cancelled,
 }
 
-/// Blocks before the error is looked at first: a spread of fewer says little. Looks come at numbers of blocks that grow by a
-/// quarter, as each is one more chance to stop too early; they are the same in every run.
-const FIRST_LOOK: u32 = 16;
-
 /// Between two looks that decide nothing: each takes a tenth of a second in a picture of 512 x 512.
 const LOOK_FOR_PEOPLE: Duration = Duration::from_secs(2);
 
+/// Looks come at numbers of blocks that grow by a quarter, as each is one more chance to stop too early; they are the same in every run.
 fn next_look(look: u32) -> u32 {
     look + (look / 4).max(1)
 }

@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 use super::radius::mean_squared_radius;
 use super::scene::ScenePlan;
 use crate::settings::scene::{NEIGHBOURS, SAMPLES_PER_BLOCK, SceneSettings};
-use crate::settings::stop::Stop;
+use crate::settings::stop::{FIRST_LOOK, Stop};
 
 /// What each round does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -216,8 +216,6 @@ const DISCS: f64 = 2000.0;
 const BOUND_OF_NOISE: f64 = 1.3;
 /// Samples of pixels that have fewest, over the mean of all: these may miss what is rare.
 const LEAST_SAMPLES: f64 = 0.4;
-/// Blocks that a run has at least: its error is looked at first after so many.
-const LEAST_BLOCKS: u32 = 16;
 
 /// What is known of a picture's rounds.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -290,7 +288,7 @@ impl Rounds {
     }
 
     fn least_rounds(&self, division: Division) -> f64 {
-        f64::from(LEAST_BLOCKS * (SAMPLES_PER_BLOCK / division.samples).max(1))
+        f64::from(FIRST_LOOK * (SAMPLES_PER_BLOCK / division.samples).max(1))
     }
 
     /// Rounds that a goal takes.

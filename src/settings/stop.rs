@@ -15,6 +15,9 @@ named! {
     }
 }
 
+/// Blocks before the error is looked at first: a spread of fewer says little.
+pub const FIRST_LOOK: u32 = 16;
+
 /// Levels of confidence with which errors may be stated.
 pub const CONFIDENCES: std::ops::RangeInclusive<f64> = 0.5..=0.9999;
 
