@@ -32,23 +32,18 @@ fn reflectance(cos_i: f64, ior: f64) -> f64 {
 }
 
 /// The radiance that arrives from beyond slabs of one index, which shines with 1 on one side only: a white lamp behind, black before.
-/// Of what enters they keep the share `down`, and of what is reflected back through them the share `up`. A metre takes `absorption` of it.
-fn slab_check(
-    gpu: &Gpu,
-    materials: Vec<Material>,
-    slabs: Vec<Mesh>,
-    angle: f64,
-    [down, up]: [f64; 2],
-    absorption: f64,
-) -> Check<Complaint> {
+/// Of what enters they keep the share `down`, and of what is reflected back through them the share `up`.
+fn slab_check(gpu: &Gpu, materials: Vec<Material>, slabs: Vec<Mesh>, angle: f64, [down, up]: [f64; 2]) -> Check<Complaint> {
     let lamp = Material { emission: Vec3::ONE, ..Material::lambert("lamp", Vec3::ZERO) };
+    // Wider than what is seen of it through the slabs.
+    let half = 20.0 / 9.0 * slabs[0].positions.iter().map(|at| at.x).fold(0.0, f64::max);
     let mut scene = Scene { materials, meshes: slabs, ..Scene::default() };
     scene.materials.push(lamp);
     scene.meshes.push(Mesh::parallelogram(
         "lamp",
-        DVec3::new(-20.0, -20.0, -4.0),
-        40.0 * DVec3::X,
-        40.0 * DVec3::Y,
+        DVec3::new(-half, -half, -4.0),
+        2.0 * half * DVec3::X,
+        2.0 * half * DVec3::Y,
         scene.materials.len() - 1,
     ));
     let eye = DVec3::new(4.0 * angle.tan(), 0.0, 4.0);
@@ -61,9 +56,7 @@ fn slab_check(
     let r = reflectance(angle.cos(), 1.5);
     let expected = (1.0 - r).powi(2) * down / (1.0 - r * r * down * up);
     println!("at {angle}: {found} +- {error}, {expected} expected");
-    // Where a ray starts is known to 2^-23 of the 40 m.
-    let of_length = expected * absorption * 40.0 * f64::from(f32::EPSILON);
-    estimate_check(&format!("slabs at {angle}"), found, expected, error.max(2e-5 + of_length))
+    estimate_check(&format!("slabs at {angle}"), found, expected, error.max(2e-5))
 }
 
 /// Between two heights, `width` wide.
@@ -74,14 +67,7 @@ fn slab(width: f64, bottom: f64, top: f64, material: usize) -> Vec<Mesh> {
 pub fn absorbing_slab(gpu: &Gpu, angle: f64, transmittance: f32, thickness: f64) -> Check<Complaint> {
     let cos_t = (1.0 - (angle.sin() / 1.5).powi(2)).sqrt();
     let left = f64::from(transmittance).powf(thickness / cos_t);
-    slab_check(
-        gpu,
-        vec![solid("slab", 1.5, Vec3::splat(transmittance))],
-        slab(9.0, -thickness, 0.0, 0),
-        angle,
-        [left; 2],
-        -f64::from(transmittance).ln(),
-    )
+    slab_check(gpu, vec![solid("slab", 1.5, Vec3::splat(transmittance))], slab(9.0, -thickness, 0.0, 0), angle, [left; 2])
 }
 
 #[test]
@@ -90,12 +76,13 @@ fn slabs_absorb_by_the_way_inside() {
     for (angle, transmittance, thickness) in [(0.0, 0.5, 1.0), (1.0, 0.5, 1.0), (0.6, 0.1, 0.4)] {
         assert_holds("a slab", absorbing_slab(&gpu, angle, transmittance, thickness));
     }
-    // So strong a tint that no number of single precision is left after a metre.
+    // So strong a tint that no number of single precision is left after a metre. Where a ray starts is known to some parts in ten million
+    // of the scene, and a hundredth of a millimetre takes a thousandth of the light: a small scene.
     let ink = Material {
         layers: Layers { medium: Some(Medium { transmittance: Vec3::splat(0.1), metres: 0.02 }), ..solid("slab", 1.5, Vec3::ONE).layers },
         ..solid("slab", 1.5, Vec3::ONE)
     };
-    assert_holds("ink", slab_check(&gpu, vec![ink], slab(9.0, -0.01, 0.0, 0), 0.0, [0.1f64.sqrt(); 2], 10f64.ln() / 0.02));
+    assert_holds("ink", slab_check(&gpu, vec![ink], slab(0.05, -0.01, 0.0, 0), 0.0, [0.1f64.sqrt(); 2]));
 }
 
 fn two_media() -> Vec<Material> {
@@ -104,7 +91,7 @@ fn two_media() -> Vec<Material> {
 
 pub fn nested_slabs(gpu: &Gpu) -> Check<Complaint> {
     let left = 0.5f64.powf(0.6) * 0.1f64.powf(0.4);
-    slab_check(gpu, two_media(), [slab(9.0, -1.0, 0.0, 0), slab(8.0, -0.7, -0.3, 1)].concat(), 0.0, [left; 2], 10f64.ln())
+    slab_check(gpu, two_media(), [slab(9.0, -1.0, 0.0, 0), slab(8.0, -0.7, -0.3, 1)].concat(), 0.0, [left; 2])
 }
 
 /// A solid within another of the same index is seen by its absorption alone; the inner medium counts where both are.
@@ -117,14 +104,7 @@ fn nested_solids_of_one_index_make_one_slab() {
 /// Whoever comes from above leaves the pale one first, and from below the dark one.
 pub fn overlapping_slabs(gpu: &Gpu) -> Check<Complaint> {
     let left = |pale: f64, dark: f64| 0.5f64.powf(pale) * 0.1f64.powf(dark);
-    slab_check(
-        gpu,
-        two_media(),
-        [slab(9.0, -1.0, 0.0, 0), slab(8.0, -1.5, -0.5, 1)].concat(),
-        0.0,
-        [left(0.5, 1.0), left(1.0, 0.5)],
-        10f64.ln(),
-    )
+    slab_check(gpu, two_media(), [slab(9.0, -1.0, 0.0, 0), slab(8.0, -1.5, -0.5, 1)].concat(), 0.0, [left(0.5, 1.0), left(1.0, 0.5)])
 }
 
 /// Where solids overlap, the one that was entered last counts.

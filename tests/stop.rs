@@ -231,7 +231,6 @@ fn errors_of_a_hundred_runs_lie_within_the_claim_as_often_as_claimed() {
     claims_hold(100);
 }
 
-/// A mirror ball under a small lamp, whose image in the ball few paths meet.
 /// Of a large picture few pixels are kept, and those with most of the noise are seldom among them.
 #[test]
 #[ignore = "large pictures: for a real GPU"]
@@ -255,6 +254,7 @@ fn errors_of_large_pictures_lie_within_the_claim_as_often_as_claimed() {
     }
 }
 
+/// A mirror ball under a small lamp, whose image in the ball few paths meet.
 fn mirror_ball() -> Scene {
     let mut room = scene("cornell-spheres");
     room.meshes.retain(|mesh| mesh.name == "mirror sphere" || mesh.material < 3);
