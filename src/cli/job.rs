@@ -171,6 +171,7 @@ impl Job<'_> {
                 photons: of_run("photons", settings.photons, free.photons),
                 caustic_photons: of_run("caustic_photons", settings.caustic_photons, free.caustic_photons),
                 neighbours: of_run("neighbours", settings.neighbours, free.neighbours),
+                caustic_neighbours: of_run("caustic_neighbours", settings.caustic_neighbours, free.caustic_neighbours),
             };
             let tiles = run.identity.settings.get("tiles").and_then(|tiles| serde_json::from_value(tiles.clone()).ok());
             let tiles = tiles.filter(|_| free.samples).or_else(|| settings.tiles.clone());

@@ -138,14 +138,17 @@ pub(super) struct TransportArgs {
     #[arg(long, help_heading = "Light transport")]
     final_gather: bool,
 
-    /// Photons of a round that the first radius of the global map is to hold at the median pixel, texel or point, as a trial finds it; of
-    /// the caustic map a quarter of them [default: 24; what a pilot finds best of a picture that ends at an error or a time]
+    /// Photons of a round that the first radius of the global map is to hold at the median pixel, texel or point, as a trial finds it
+    /// [default: 24; what a pilot finds best of a picture that ends at an error or a time]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Density estimate")]
     neighbours: Option<u32>,
+    /// The same for the caustic map [default: 6, or a quarter of --neighbours; or what a pilot finds best]
+    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Density estimate")]
+    caustic_neighbours: Option<u32>,
     /// Radius of the density estimate of the global map in the first round, metres [default: what holds --neighbours]
     #[arg(long, value_name = "METRES", value_parser = parse_number::<f64>, allow_hyphen_values = true, help_heading = "Density estimate")]
     radius: Option<f64>,
-    /// The same for the caustic map [default: what holds a quarter of them]
+    /// The same for the caustic map [default: what holds --caustic-neighbours]
     #[arg(long, value_name = "METRES", value_parser = parse_number::<f64>, allow_hyphen_values = true, help_heading = "Density estimate")]
     caustic_radius: Option<f64>,
     /// How the radius shrinks from round to round, as alpha of Knaus and Zwicker (2011): above 0 and at most 1, which keeps the
@@ -396,7 +399,8 @@ impl TransportArgs {
             shadow_rays: self.shadow_rays.is_none(),
             photons: traces && self.light.photons.is_none(),
             caustic_photons: traces && self.light.caustic_photons.is_none(),
-            neighbours: self.neighbours.is_none() && self.radius.is_none() && self.caustic_radius.is_none(),
+            neighbours: self.neighbours.is_none() && self.radius.is_none(),
+            caustic_neighbours: self.caustic_neighbours.is_none() && self.neighbours.is_none() && self.caustic_radius.is_none(),
         }
     }
 
@@ -419,11 +423,13 @@ impl TransportArgs {
                 most_rounds(&stop, usual.photons.min(usual.caustic_photons)).unwrap_or(chosen.map_or(usual.rounds, |chosen| chosen.rounds))
             }
         };
+        let quarter = self.neighbours.map(|neighbours| (neighbours / 4).max(1));
         SceneSettings {
             block: self.block.or(usual.block),
             rounds: self.rounds.unwrap_or_else(most),
             stop,
             neighbours: self.neighbours.unwrap_or(usual.neighbours),
+            caustic_neighbours: self.caustic_neighbours.or(quarter).unwrap_or(usual.caustic_neighbours),
             radius: self.radius,
             caustic_radius: self.caustic_radius,
             alpha: if self.fixed_radius { 1.0 } else { self.alpha.unwrap_or(usual.alpha) },

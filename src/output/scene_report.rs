@@ -15,6 +15,7 @@ use crate::plan::evidence::EffectDecision;
 use crate::plan::radius::{RadiusFrom, Trial};
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
+use crate::plan::work_division::MapVariance;
 use crate::scene::geometry::Geometry;
 use crate::settings::scene::{Effect, SceneSettings};
 use crate::settings::stop::Stop;
@@ -61,13 +62,14 @@ pub fn rows<'a>(plan: &'a ScenePlan, run: Option<(&Timings, &[u64])>) -> Vec<Eff
 /// What a pilot has chosen and why, and what errors will take, in a line.
 pub fn pilot(pilot: &Pilot, stop: &Stop, point: &str) -> String {
     let Pilot { before, chosen, rounds, .. } = pilot;
-    let maps = [(rounds.variance.global, chosen.photons, "global"), (rounds.variance.caustic, chosen.caustic_photons, "caustic")];
-    let photons: Vec<String> =
-        maps.iter().filter(|(map, ..)| map.photons > 0).map(|(_, photons, name)| counted(*photons, &format!("{name} photon"))).collect();
-    let maps = match photons.is_empty() {
-        true => String::new(),
-        false => format!(", {} ({} within the first radius)", photons.join(" and "), chosen.neighbours),
+    let maps = [
+        (rounds.variance.global, chosen.photons, "global", chosen.neighbours),
+        (rounds.variance.caustic, chosen.caustic_photons, "caustic", chosen.caustic_neighbours),
+    ];
+    let of_map = |(map, photons, name, neighbours): (MapVariance, u32, &str, u32)| {
+        (map.at.photons > 0).then(|| format!(", {} ({neighbours} within the first radius)", counted(photons, &format!("{name} photon"))))
     };
+    let maps: String = maps.into_iter().filter_map(of_map).collect();
     let paths = format!("{} per {point} and {}", counted(chosen.samples, "path"), counted(chosen.shadow_rays, "shadow ray"));
     let against = match chosen == before {
         true => " as usual, as nothing else is much better".to_owned(),

@@ -79,13 +79,13 @@ fn map(
     trial: Option<&Trial>,
     landings_of_each: f64,
 ) -> Result<MapPlan> {
-    let (name, domain, photons, radius) = if caustic_only {
-        ("caustic", DOMAIN_CAUSTIC_PHOTONS, settings.caustic_photons, ("--caustic-radius", settings.caustic_radius))
+    let (name, domain, photons, neighbours, radius) = if caustic_only {
+        let radius = ("--caustic-radius", settings.caustic_radius);
+        ("caustic", DOMAIN_CAUSTIC_PHOTONS, settings.caustic_photons, settings.caustic_neighbours, radius)
     } else {
-        ("global", DOMAIN_PHOTONS, settings.photons, ("--radius", settings.radius))
+        ("global", DOMAIN_PHOTONS, settings.photons, settings.neighbours, ("--radius", settings.radius))
     };
-    let FirstRadius { radius, from, expected, classes } =
-        FirstRadius::new(geometry, (photons, settings.neighbours), caustic_only, radius, trial)?;
+    let FirstRadius { radius, from, expected, classes } = FirstRadius::new(geometry, (photons, neighbours), caustic_only, radius, trial)?;
     // Photons of a round land once at every bounce at most; a caustic's only once.
     let landings = if caustic_only { 1 } else { u64::from(settings.bounces.min(SEGMENT_BOUNCES)) };
     let chunk_photons = chunk_photons(photons, landings, settings, limits)?;
@@ -116,8 +116,7 @@ fn map(
         radius_from: from,
         classes,
         expected,
-        // A caustic has edges: half the radius.
-        neighbours: f64::from(settings.neighbours) * if caustic_only { 0.25 } else { 1.0 },
+        neighbours: f64::from(neighbours),
         lanes: capacity::lanes_of(expected / FOUND_BY_LANE, limits),
         target_count: 0,
         through_openings,

@@ -14,7 +14,7 @@ use crate::photon::MapPhoton;
 use crate::records::CausticTarget;
 use crate::rng::mix32;
 use crate::scene::geometry::Geometry;
-use crate::settings::scene::NEIGHBOURS;
+use crate::settings::scene::{CAUSTIC_NEIGHBOURS, NEIGHBOURS};
 
 /// Where the radius of a map's first round comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -136,7 +136,7 @@ impl FirstRadius {
         };
         let Some(metres) = asked else {
             let of_area = area_radius(geometry, photons, neighbours, caustic_only);
-            let expected = PHOTONS_PER_ESTIMATE * f64::from(neighbours) / f64::from(NEIGHBOURS);
+            let expected = PHOTONS_PER_ESTIMATE * over_usual(neighbours, caustic_only);
             return Ok(match tried {
                 Some(tried) => {
                     let radius = tried * trial.and_then(|trial| trial.factor).unwrap_or(1.0);
@@ -157,6 +157,11 @@ fn share(caustic_only: bool) -> f64 {
     if caustic_only { CAUSTIC_RADIUS_SHARE } else { 1.0 }
 }
 
+/// Neighbours over the usual ones.
+pub fn over_usual(neighbours: u32, caustic_only: bool) -> f64 {
+    f64::from(neighbours) / f64::from(if caustic_only { CAUSTIC_NEIGHBOURS } else { NEIGHBOURS })
+}
+
 /// Radius, normalised, in which so many photons from lamps leave `PHOTONS_PER_ESTIMATE` on average: each lands about twice.
 pub fn usual_radius(geometry: &Geometry, photons: f64) -> f64 {
     (PHOTONS_PER_ESTIMATE * geometry.area / (PI * 2.0 * photons)).sqrt()
@@ -164,8 +169,7 @@ pub fn usual_radius(geometry: &Geometry, photons: f64) -> f64 {
 
 /// Radius of a map's first round, normalised, where nothing but the scene's area is known.
 pub fn area_radius(geometry: &Geometry, photons: u32, neighbours: u32, caustic_only: bool) -> f64 {
-    let as_usual = f64::from(photons) * f64::from(NEIGHBOURS) / f64::from(neighbours);
-    (usual_radius(geometry, as_usual) * share(caustic_only)).clamp(RADIUS_RANGE.0, MAX_DEFAULT_RADIUS)
+    (usual_radius(geometry, f64::from(photons) / over_usual(neighbours, caustic_only)) * share(caustic_only)).clamp(RADIUS_RANGE.0, MAX_DEFAULT_RADIUS)
 }
 
 /// Rounds of which the radius is multiplied out.

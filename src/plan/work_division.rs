@@ -15,13 +15,13 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::radius::mean_squared_radius;
+use super::radius::{mean_squared_radius, over_usual};
 use super::scene::ScenePlan;
-use crate::settings::scene::{NEIGHBOURS, SAMPLES_PER_BLOCK, SceneSettings};
+use crate::settings::scene::{SAMPLES_PER_BLOCK, SceneSettings};
 use crate::settings::stop::{FIRST_LOOK, Stop};
 
 /// What each round does.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Division {
     /// Paths through a pixel, and shadow rays from each visible point.
@@ -30,20 +30,36 @@ pub struct Division {
     /// Of the global and of the caustic map.
     pub photons: u32,
     pub caustic_photons: u32,
-    /// Photons of a round within the first radius.
+    /// Photons of a round within the first radius of each.
     pub neighbours: u32,
+    pub caustic_neighbours: u32,
 }
 
 impl Division {
     pub fn of(settings: &SceneSettings) -> Division {
-        let &SceneSettings { samples, shadow_rays, photons, caustic_photons, neighbours, .. } = settings;
-        Division { samples, shadow_rays, photons, caustic_photons, neighbours }
+        let &SceneSettings { samples, shadow_rays, photons, caustic_photons, neighbours, caustic_neighbours, .. } = settings;
+        Division { samples, shadow_rays, photons, caustic_photons, neighbours, caustic_neighbours }
     }
 
     pub fn set(self, settings: &SceneSettings) -> SceneSettings {
-        let Division { samples, shadow_rays, photons, caustic_photons, neighbours } = self;
-        SceneSettings { samples, shadow_rays, photons, caustic_photons, neighbours, ..settings.clone() }
+        let Division { samples, shadow_rays, photons, caustic_photons, neighbours, caustic_neighbours } = self;
+        SceneSettings { samples, shadow_rays, photons, caustic_photons, neighbours, caustic_neighbours, ..settings.clone() }
     }
+
+    pub fn global(self) -> PhotonsOfMap {
+        PhotonsOfMap { photons: self.photons, neighbours: over_usual(self.neighbours, false) }
+    }
+
+    pub fn caustic(self) -> PhotonsOfMap {
+        PhotonsOfMap { photons: self.caustic_photons, neighbours: over_usual(self.caustic_neighbours, true) }
+    }
+}
+
+/// Photons of a round, and those of them within the first radius over the usual ones.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct PhotonsOfMap {
+    pub photons: u32,
+    pub neighbours: f64,
 }
 
 /// What is to be chosen, as nobody has set it.
@@ -54,6 +70,12 @@ pub struct Free {
     pub photons: bool,
     pub caustic_photons: bool,
     pub neighbours: bool,
+    pub caustic_neighbours: bool,
+}
+
+impl Free {
+    pub const ALL: Free =
+        Free { samples: true, shadow_rays: true, photons: true, caustic_photons: true, neighbours: true, caustic_neighbours: true };
 }
 
 /// What light of a round varies by, relative to the square of all light.
@@ -69,10 +91,9 @@ pub struct Variance {
 /// The same of a map at its first radius.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct MapVariance {
-    /// With so many photons and neighbours.
+    /// With these photons; none without a map.
     pub of_round: f64,
-    pub photons: u32,
-    pub neighbours: u32,
+    pub at: PhotonsOfMap,
     /// The share of all light that the map gives.
     pub share: f64,
     /// The bias of that light relative to it at the same radius; `None` where it is not known.
@@ -83,26 +104,27 @@ pub struct MapVariance {
 
 impl MapVariance {
     /// The first radius's square over that of the usual photons and neighbours; one that is given is taken for that.
-    fn squared_radius(&self, photons: u32, neighbours: u32) -> f64 {
-        match self.is_radius_set {
-            true => 1.0,
-            false => f64::from(neighbours) / f64::from(NEIGHBOURS) * USUAL_PHOTONS / f64::from(photons),
-        }
+    fn squared_radius(&self, of: PhotonsOfMap) -> f64 {
+        if self.is_radius_set { 1.0 } else { of.neighbours * USUAL_PHOTONS / f64::from(of.photons) }
     }
 
     /// The bias of all light for a squared radius over the usual one.
     fn bias(&self, squared_radius: f64) -> f64 {
-        let (found, at) = self.bias.map_or((BIAS, 1.0), |bias| (bias, self.squared_radius(self.photons, self.neighbours)));
+        let (found, at) = self.bias.map_or((BIAS, 1.0), |bias| (bias, self.squared_radius(self.at)));
         found * self.share * (squared_radius / at).powf(if self.bias.is_some() { BIAS_POWER_FOUND } else { BIAS_POWER })
     }
 
     /// The variance of the first round's light.
-    pub fn of_first_round(&self, photons: u32, neighbours: u32) -> f64 {
-        let hits = |photons: u32, neighbours: u32| f64::from(photons) * self.squared_radius(photons, neighbours);
+    pub fn of_first_round(&self, of: PhotonsOfMap) -> f64 {
+        let hits = |of: PhotonsOfMap| f64::from(of.photons) * self.squared_radius(of);
         match self.of_round {
             0.0 => 0.0,
-            found => found * hits(self.photons, self.neighbours) / hits(photons, neighbours),
+            found => found * hits(self.at) / hits(of),
         }
+    }
+
+    fn has_photons(&self) -> bool {
+        self.at.photons > 0
     }
 }
 
@@ -177,7 +199,7 @@ fn costs(kind: &str) -> Costs {
     }
 }
 
-/// More neighbours make a path's lookups longer: by this share for as many again as usual.
+/// More neighbours make a path's lookups longer: by this share for as many again as usual of both maps.
 const OF_NEIGHBOURS: f64 = 0.15;
 /// How many times as long a photon takes that is sent through mirrors and glass.
 const OF_CAUSTIC_PHOTON: f64 = 2.0;
@@ -234,27 +256,32 @@ impl Rounds {
     /// Nanoseconds of a round.
     pub fn cost(&self, division: Division) -> f64 {
         let Cost { round, paths, shadow_rays, photon } = self.cost;
-        let Division { samples, shadow_rays: rays, photons, caustic_photons, neighbours } = division;
-        let has = |map: MapVariance| f64::from(u8::from(map.photons > 0));
-        let of_maps =
-            has(self.variance.global) * f64::from(photons) + OF_CAUSTIC_PHOTON * has(self.variance.caustic) * f64::from(caustic_photons);
-        let lookups = 1.0 + OF_NEIGHBOURS * (f64::from(neighbours) / f64::from(NEIGHBOURS) - 1.0);
-        round + photon * of_maps + f64::from(samples) * (paths * lookups + f64::from(rays) * shadow_rays)
+        let Variance { global, caustic, .. } = self.variance;
+        let maps = [(global, division.global(), 1.0), (caustic, division.caustic(), OF_CAUSTIC_PHOTON)];
+        let (mut of_photons, mut lookups) = (0.0, 1.0);
+        for (_, of, cost) in maps.into_iter().filter(|(map, ..)| map.has_photons()) {
+            of_photons += cost * photon * f64::from(of.photons);
+            lookups += 0.5 * OF_NEIGHBOURS * (of.neighbours - 1.0);
+        }
+        round + of_photons + f64::from(division.samples) * (paths * lookups + f64::from(division.shadow_rays) * shadow_rays)
     }
 
     /// The bound of the error after so many rounds.
     pub fn error(&self, division: Division, rounds: f64) -> f64 {
         let Variance { path, shadow_ray, global, caustic } = self.variance;
-        let Division { samples, shadow_rays, photons, caustic_photons, neighbours } = division;
+        let Division { samples, shadow_rays, .. } = division;
         let of_paths = (path + shadow_ray / f64::from(shadow_rays)) / (f64::from(samples) * rounds);
         let shrunk = mean_squared_radius(self.alpha, rounds.ceil() as u32);
         // The mean of 1 / r^2 over rounds is n^(1 - alpha) / (2 - alpha), and that of the first round 1.
         let inverse = 1.0 / (2.0 - self.alpha);
         let of_radii = rounds.powf(-self.alpha) * (inverse + (1.0 - inverse) / rounds);
         let (mut of_maps, mut unknown, mut bias) = (0.0, 0.0, 0.0);
-        for (map, photons) in [(global, photons), (caustic, caustic_photons)] {
-            let noise = map.of_first_round(photons, neighbours) * of_radii;
-            let squared_radius = map.squared_radius(photons.max(1), neighbours) * shrunk;
+        for (map, of) in [(global, division.global()), (caustic, division.caustic())] {
+            if !map.has_photons() {
+                continue;
+            }
+            let noise = map.of_first_round(of) * of_radii;
+            let squared_radius = map.squared_radius(of) * shrunk;
             let discs = (DISCS / squared_radius).min(3.0 * self.pixels);
             of_maps += noise;
             unknown += noise * QUANTILE * (2.0 / discs).sqrt();
@@ -318,7 +345,9 @@ const MOST_SHADOW_RAYS: u32 = 16;
 pub const MOST_SAMPLES: u32 = 256;
 const LEAST_PHOTONS: u32 = 1 << 12;
 pub const MOST_PHOTONS: u32 = 1 << 22;
+/// From an eighth of the usual ones to 16 times as many, and of the caustic map from a sixth.
 const CHOICE_OF_NEIGHBOURS: [u32; 8] = [3, 6, 12, 24, 48, 96, 192, 384];
+const CHOICE_OF_CAUSTIC_NEIGHBOURS: [u32; 9] = [1, 2, 3, 6, 12, 24, 48, 96, 192];
 
 /// The division whose loss is least: what is free in powers of two, up to so many samples and photons.
 pub fn best(rounds: &Rounds, before: Division, free: Free, stop: &Stop, (most_samples, most_photons): (u32, u32)) -> Division {
@@ -327,16 +356,18 @@ pub fn best(rounds: &Rounds, before: Division, free: Free, stop: &Stop, (most_sa
         false => vec![own],
     };
     let Variance { global, caustic, .. } = rounds.variance;
-    let photons = powers(free.photons && global.photons > 0, LEAST_PHOTONS, most_photons, before.photons);
-    let caustic_photons = powers(free.caustic_photons && caustic.photons > 0, LEAST_PHOTONS, most_photons, before.caustic_photons);
+    let photons = powers(free.photons && global.has_photons(), LEAST_PHOTONS, most_photons, before.photons);
+    let caustic_photons = powers(free.caustic_photons && caustic.has_photons(), LEAST_PHOTONS, most_photons, before.caustic_photons);
     let neighbours = if free.neighbours { CHOICE_OF_NEIGHBOURS.to_vec() } else { vec![before.neighbours] };
+    let caustic_neighbours =
+        if free.caustic_neighbours { CHOICE_OF_CAUSTIC_NEIGHBOURS.to_vec() } else { vec![before.caustic_neighbours] };
     let samples = powers(free.samples, 1, most_samples, before.samples);
     let shadow_rays = powers(free.shadow_rays, 1, MOST_SHADOW_RAYS, before.shadow_rays);
     let pairs = |some: &[u32], others: &[u32]| -> Vec<(u32, u32)> {
         some.iter().flat_map(|one| others.iter().map(move |other| (*one, *other))).collect()
     };
     let (of_paths, of_both) = (pairs(&samples, &shadow_rays), pairs(&photons, &caustic_photons));
-    let (of_global, of_caustic) = (pairs(&photons, &neighbours), pairs(&caustic_photons, &neighbours));
+    let (of_global, of_caustic) = (pairs(&photons, &neighbours), pairs(&caustic_photons, &caustic_neighbours));
     let better = |least: (f64, Division), pairs: &[(u32, u32)], set: fn(&mut Division, (u32, u32))| {
         let changed = pairs.iter().map(|pair| {
             let mut division = least.1;
@@ -352,7 +383,7 @@ pub fn best(rounds: &Rounds, before: Division, free: Free, stop: &Stop, (most_sa
             let at = least.1;
             least = better(least, &of_paths, |division, pair| (division.samples, division.shadow_rays) = pair);
             least = better(least, &of_global, |division, pair| (division.photons, division.neighbours) = pair);
-            least = better(least, &of_caustic, |division, pair| (division.caustic_photons, division.neighbours) = pair);
+            least = better(least, &of_caustic, |division, pair| (division.caustic_photons, division.caustic_neighbours) = pair);
             least = better(least, &of_both, |division, pair| (division.photons, division.caustic_photons) = pair);
             if least.1 == at {
                 return least;
@@ -371,9 +402,17 @@ fn less(one: (f64, Division), other: (f64, Division)) -> (f64, Division) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::scene::{CAUSTIC_NEIGHBOURS, NEIGHBOURS};
 
-    const BEFORE: Division = Division { samples: 1, shadow_rays: 1, photons: 1 << 17, caustic_photons: 1 << 17, neighbours: NEIGHBOURS };
-    const OF_PATHS: Free = Free { samples: true, shadow_rays: true, photons: false, caustic_photons: false, neighbours: false };
+    const BEFORE: Division = Division {
+        samples: 1,
+        shadow_rays: 1,
+        photons: 1 << 17,
+        caustic_photons: 1 << 17,
+        neighbours: NEIGHBOURS,
+        caustic_neighbours: CAUSTIC_NEIGHBOURS,
+    };
+    const OF_PATHS: Free = Free { photons: false, caustic_photons: false, neighbours: false, caustic_neighbours: false, ..Free::ALL };
 
     fn rounds(variance: Variance, cost: Cost) -> Rounds {
         Rounds { variance, cost, pixels: 1e6, alpha: 2.0 / 3.0, counts_bias: true, unseen: 0.0 }
@@ -413,21 +452,21 @@ mod tests {
     fn photons_go_where_the_noise_is() {
         let of_map = |of_round: f64, share: f64| MapVariance {
             of_round,
-            photons: 1 << 17,
-            neighbours: NEIGHBOURS,
+            at: BEFORE.global(),
             share,
             bias: None,
             is_radius_set: false,
         };
         let variance = Variance { path: 0.1, global: of_map(0.05, 0.5), caustic: of_map(1e-4, 0.01), ..Variance::default() };
         let found = rounds(variance, Cost { round: 1e6, paths: 1e6, shadow_rays: 1e5, photon: 5.0 });
-        let free = Free { samples: true, shadow_rays: true, photons: true, caustic_photons: true, neighbours: true };
-        let of = |error: f64| best(&found, BEFORE, free, &goal(error), (MOST_SAMPLES, MOST_PHOTONS));
+        let of = |error: f64| best(&found, BEFORE, Free::ALL, &goal(error), (MOST_SAMPLES, MOST_PHOTONS));
         assert!(of(0.02).photons > of(0.02).caustic_photons, "{:?}", of(0.02));
         let [chosen, usual] = [of(0.01), BEFORE].map(|division| found.until(division, 0.01).1);
         assert!(chosen < 0.5 * usual, "{chosen} {usual}");
         // A radius that is given has its bias, and more photons in it less noise.
         let set = MapVariance { is_radius_set: true, ..of_map(0.05, 0.5) };
-        assert_eq!((set.of_first_round(1 << 18, 1), of_map(0.05, 0.5).of_first_round(1 << 18, NEIGHBOURS)), (0.025, 0.05));
+        let twice = PhotonsOfMap { photons: 1 << 18, ..BEFORE.global() };
+        let few = PhotonsOfMap { neighbours: 0.1, ..twice };
+        assert_eq!((set.of_first_round(few), of_map(0.05, 0.5).of_first_round(twice)), (0.025, 0.05));
     }
 }

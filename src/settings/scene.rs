@@ -117,9 +117,10 @@ pub struct SceneSettings {
     #[serde(serialize_with = "cap")]
     pub bounces: u32,
     pub seed: u64,
-    /// Photons of a round that the first radius of the global map is to hold at the median point, where a trial finds it; of the caustic
-    /// map a quarter of them.
+    /// Photons of a round that the first radius of the global map is to hold at the median point, where a trial finds it.
     pub neighbours: u32,
+    /// The same of the caustic map.
+    pub caustic_neighbours: u32,
     /// Radius of the first pass's density estimate, metres; `None`: by a trial round
     /// (`engine::scene::trial`), or by the scene's area and the photons where none is made.
     pub radius: Option<f64>,
@@ -172,6 +173,7 @@ impl Default for SceneSettings {
             bounces: MAX_BOUNCES,
             seed: 1,
             neighbours: NEIGHBOURS,
+            caustic_neighbours: CAUSTIC_NEIGHBOURS,
             radius: None,
             caustic_radius: None,
             alpha: 2.0 / 3.0,
@@ -201,6 +203,8 @@ pub const MAX_ROUNDS: u32 = 1 << 20;
 /// Photons of a round within the first radius of a point of the global map, by default: about what a radius by the scene's area leaves of
 /// light that was scattered before, in closed rooms.
 pub const NEIGHBOURS: u32 = 24;
+/// A caustic has edges: half the radius.
+pub const CAUSTIC_NEIGHBOURS: u32 = 6;
 /// Camera paths through a pixel in a block of rounds, at least.
 pub const SAMPLES_PER_BLOCK: u32 = 4;
 pub const MAX_BLOCK: u32 = 1 << 10;
@@ -219,7 +223,9 @@ impl SceneSettings {
             let allowed = format!("traces the paper's box only; for a scene choose one of {known}");
             require(Builder::ON_GPU.contains(&builder), "--variant", builder.name(), allowed)?;
         }
-        within("--neighbours", self.neighbours, 1..=MAX_NEIGHBOURS, "photons of a round within the first radius")?;
+        for (option, neighbours) in [("--neighbours", self.neighbours), ("--caustic-neighbours", self.caustic_neighbours)] {
+            within(option, neighbours, 1..=MAX_NEIGHBOURS, "photons of a round within the first radius")?;
+        }
         within("--shadow-rays", self.shadow_rays, 1..=MAX_SHADOW_RAYS, "shadow rays from each visible point, each round")?;
         if let Some(block) = self.block {
             let is_allowed = block.is_power_of_two() && block <= MAX_BLOCK;

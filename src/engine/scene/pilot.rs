@@ -7,8 +7,8 @@
 
 use std::cell::Cell;
 
-use super::View;
-use super::pilot_rounds::{NEIGHBOURS, PHOTONS, PilotRounds, SAMPLES};
+use super::{View, pilot_rounds};
+use super::pilot_rounds::{PHOTONS, PilotRounds, SAMPLES};
 use crate::constants::PART_COUNT;
 use crate::engine;
 use crate::error::Result;
@@ -73,13 +73,13 @@ pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Fre
         true => Variance::of_paths(of_one.variance[part], of_many.variance[part], many),
         false => Variance { path: of_many.variance[part], ..Variance::default() },
     };
+    let at = Division::of(&pilot_rounds::settings(settings));
     let of_map = |part: usize, caustic_only: bool| {
         let Some(map) = plan.maps().find(|map| map.caustic_only == caustic_only) else { return MapVariance::default() };
         let found = 0.5 * (of_one.variance[part] + of_many.variance[part]);
         MapVariance {
             of_round: found,
-            photons: PHOTONS,
-            neighbours: NEIGHBOURS,
+            at: if caustic_only { at.caustic() } else { at.global() },
             share: of_many.light[part],
             bias: None,
             is_radius_set: map.radius_from == RadiusFrom::User,
@@ -88,9 +88,8 @@ pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Fre
     let (direct, specular, caustic, global) = (of_paths(0), of_paths(1), of_map(2, true), of_map(3, false));
     let variance = Variance { path: direct.path + specular.path, shadow_ray: direct.shadow_ray + specular.shadow_ray, global, caustic };
     let before = Division::of(settings);
-    let of_before = |map: &MapVariance, photons: u32| map.of_first_round(photons, before.neighbours);
     let varies = |of: Variance| of.path + of.shadow_ray / f64::from(before.shadow_rays);
-    let parts = [varies(direct), varies(specular), of_before(&caustic, before.caustic_photons), of_before(&global, before.photons)];
+    let parts = [varies(direct), varies(specular), caustic.of_first_round(before.caustic()), global.of_first_round(before.global())];
     let all: f64 = parts.iter().sum();
     if all <= 0.0 || !all.is_finite() {
         return Ok(None);

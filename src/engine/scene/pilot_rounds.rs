@@ -23,7 +23,8 @@ pub const SAMPLES: u32 = SAMPLES_PER_BLOCK;
 const ROUNDS: u32 = 16;
 /// Of each map, and those within the first radius, which is wider than in a run: the bias stands out.
 pub const PHOTONS: u32 = 1 << 12;
-pub const NEIGHBOURS: u32 = 4;
+const NEIGHBOURS: u32 = 4;
+const CAUSTIC_NEIGHBOURS: u32 = 1;
 const SEED: u64 = 0x0070_696c_6f74;
 /// Pixels that tell enough of a map, whose light varies little from one to the next.
 const PIXELS_OF_MAP: f64 = 4096.0;
@@ -61,7 +62,7 @@ impl PilotRounds<'_> {
     pub fn of_few(&self, shadow_rays: u32) -> Result<Parts> {
         let PilotRounds { gpu, scene, view, run, .. } = *self;
         let seed = bias_batches::seed(SEED, 0);
-        let settings = SceneSettings { samples: SAMPLES, shadow_rays, rounds: ROUNDS, seed, ..pilot_settings(&run.settings) };
+        let settings = SceneSettings { samples: SAMPLES, shadow_rays, rounds: ROUNDS, seed, ..settings(&run.settings) };
         let (sensor, phases, footprint) = match run.sensor {
             Sensor::Picture { width, height } => {
                 let (sensor, footprint) = fewer(width, height, PIXELS);
@@ -100,7 +101,7 @@ impl PilotRounds<'_> {
         let maps: Vec<LightOf> = run.maps().map(|map| if map.caustic_only { LightOf::CausticMap } else { LightOf::GlobalMap }).collect();
         let look = |light_of: LightOf, samples: u32| {
             let settings =
-                SceneSettings { samples, shadow_rays, rounds, seed: bias_batches::seed(SEED, 1), ..pilot_settings(&run.settings) };
+                SceneSettings { samples, shadow_rays, rounds, seed: bias_batches::seed(SEED, 1), ..settings(&run.settings) };
             let (sensor, footprint) = match (light_of, run.sensor) {
                 (LightOf::GlobalMap | LightOf::CausticMap, Sensor::Picture { width, height }) => fewer(width, height, PIXELS_OF_MAP),
                 _ => (run.sensor, 1.0),
@@ -156,12 +157,13 @@ impl PilotRounds<'_> {
 }
 
 /// Settings that all rounds of a pilot have.
-fn pilot_settings(run: &SceneSettings) -> SceneSettings {
+pub fn settings(run: &SceneSettings) -> SceneSettings {
     SceneSettings {
         tiles: None,
         photons: PHOTONS,
         caustic_photons: PHOTONS,
         neighbours: NEIGHBOURS,
+        caustic_neighbours: CAUSTIC_NEIGHBOURS,
         block: Some(1),
         // The radii stay those of the first round.
         alpha: 1.0,

@@ -4,7 +4,7 @@
 //!
 //! A radius by the scene's area is right where photons lie everywhere alike. Of a room on a plain it would be wider than the
 //! room. So a few photons are traced, with random numbers that no run has, and each of a few points is given the radius
-//! within which a round of the run will leave 24 photons (6 of the caustic map), or as many as `--neighbours` says. The median is taken, in steps of a fourth root of 2:
+//! within which a round of the run will leave as many photons as `--neighbours` says, and of the caustic map as `--caustic-neighbours` does. The median is taken, in steps of a fourth root of 2:
 //! an integer, so that nothing but these photons and points decides; but no more than the radius by the area. It depends on no
 //! seed, builder or split.
 
@@ -165,7 +165,8 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, lights: Option<Li
             .map(|point| own_radius(&visible_points[*point], &found, &view.geometry.planes, of_run.photons, of_run.neighbours))
             .collect();
         let clear: Vec<f64> = asked.iter().map(|point| f64::from(clearances[*point])).collect();
-        let by_area = area_radius(view.geometry, of_run.photons, run.settings.neighbours, map.caustic_only);
+        let neighbours = if map.caustic_only { run.settings.caustic_neighbours } else { run.settings.neighbours };
+        let by_area = area_radius(view.geometry, of_run.photons, neighbours, map.caustic_only);
         let radius = radius(&own, &clear, by_area);
         *(if map.caustic_only { &mut trial.caustic_radius } else { &mut trial.global_radius }) = Some(radius);
         trial.photons[usize::from(map.caustic_only)] = TrialPhotons::some_of(found);

@@ -17,10 +17,12 @@ pub enum Experiment {
     CausticSphere,
     Mesh,
     Effects,
+    Tuning,
 }
 
 impl Experiment {
-    pub const ALL: [Experiment; 11] = [
+    /// What runs where nothing is asked for; tuning takes long.
+    pub const USUAL: [Experiment; 11] = [
         Experiment::OpenBox,
         Experiment::Builders,
         Experiment::Table1,
@@ -34,6 +36,10 @@ impl Experiment {
         // Takes all the time that is left.
         Experiment::Compaction,
     ];
+
+    pub fn all() -> impl Iterator<Item = Experiment> {
+        Experiment::USUAL.into_iter().chain([Experiment::Tuning])
+    }
 
     pub fn name(self) -> &'static str {
         self.words().0
@@ -56,6 +62,7 @@ impl Experiment {
             Experiment::CausticSphere => ("caustic-sphere", "caustic-sphere: time to an error"),
             Experiment::Mesh => ("mesh", "many triangles"),
             Experiment::Effects => ("effects", "effects that a scene lacks"),
+            Experiment::Tuning => ("tuning", "what a pilot chooses beside the best of a search"),
         }
     }
 }

@@ -9,7 +9,7 @@ use super::room::{self, Counts, Timed};
 use super::scale::{BALL_ROOM, ball_room};
 use super::scene::{self, Job, named, radius_for, survey};
 use super::targets::findings;
-use super::{Bench, Lab, Size};
+use super::{Bench, Lab, Size, tuning};
 use crate::error::Result;
 use crate::measure::compaction::{self, Map};
 use crate::rng::Rng;
@@ -33,6 +33,12 @@ pub fn run(lab: &mut Lab, experiment: Experiment, bench: &mut Bench) -> Result<(
         Experiment::CornellSpheres | Experiment::CausticSphere => accuracy::measure(lab, experiment.name())?,
         Experiment::Mesh => mesh(lab)?,
         Experiment::Effects => effects(lab)?,
+        Experiment::Tuning => {
+            for scene in lab.scenes {
+                bench.tuning.push(tuning::measure(lab, scene)?);
+            }
+            Found::default()
+        }
     };
     bench.passes.append(&mut passes);
     bench.targets.extend(findings(lab, experiment, found));
@@ -118,7 +124,7 @@ fn compaction(lab: &mut Lab) -> Result<Map> {
         Size::Small => compaction::Request { survivals: vec![0.25, 0.75], turns: 1, ..all },
         Size::Full => all,
     };
-    compaction::measure(lab.gpu, &request, Some(lab.scene), lab.cancelled, lab.tell)
+    compaction::measure(lab.gpu, &request, lab.scenes.first(), lab.cancelled, lab.tell)
 }
 
 fn table_1(lab: &mut Lab) -> Result<Found> {

@@ -15,6 +15,7 @@ pub mod scale;
 pub mod scene;
 pub mod table;
 pub mod targets;
+pub mod tuning;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -32,6 +33,7 @@ use pass::Pass;
 use rates::Rates;
 use scale::Scale;
 use targets::Finding;
+use tuning::Tuned;
 
 /// How large the workloads are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -51,9 +53,9 @@ pub struct Request {
     pub size: Size,
     #[serde(skip)]
     pub experiments: Vec<Experiment>,
-    /// Builders are compared in it, beside the paper's box.
+    /// Builders are compared in the first, beside the paper's box, and settings in each.
     #[serde(skip)]
-    pub scene: Scene,
+    pub scenes: Vec<Scene>,
     /// Follow cost over photons and triangles instead.
     #[serde(skip)]
     pub scale: bool,
@@ -75,6 +77,8 @@ pub struct Bench {
     pub targets: Vec<Finding>,
     /// The fastest builder by photon count, in a closed room by survival, and in a scene.
     pub compaction: Option<Map>,
+    /// What a pilot chooses beside the best of a search.
+    pub tuning: Vec<Tuned>,
     pub scale: Option<Scale>,
     /// What was not measured, and why.
     pub left_out: Vec<String>,
@@ -84,8 +88,7 @@ pub struct Bench {
 pub struct Lab<'a> {
     pub gpu: &'a Gpu,
     pub rates: Rates,
-    /// That builders are compared in, beside the paper's box.
-    pub scene: &'a Scene,
+    pub scenes: &'a [Scene],
     pub size: Size,
     pub deadline: Instant,
     pub cancelled: &'a AtomicBool,
@@ -129,8 +132,8 @@ pub fn run(gpu: &Gpu, request: Request, cancelled: &AtomicBool, tell: &mut dyn F
     let deadline = Instant::now() + request.budget;
     tell("limits of the device");
     let rates = rates::measure(gpu, request.size)?;
-    let scene = &request.scene.clone();
-    let mut lab = Lab { gpu, rates, scene, size: request.size, deadline, cancelled, tell };
+    let scenes = &request.scenes.clone();
+    let mut lab = Lab { gpu, rates, scenes, size: request.size, deadline, cancelled, tell };
     let facts = gpu.facts();
     let mut bench = Bench {
         photonmill: env!("CARGO_PKG_VERSION"),
@@ -141,6 +144,7 @@ pub fn run(gpu: &Gpu, request: Request, cancelled: &AtomicBool, tell: &mut dyn F
         passes: Vec::new(),
         targets: Vec::new(),
         compaction: None,
+        tuning: Vec::new(),
         scale: None,
         left_out: Vec::new(),
         request,

@@ -1,6 +1,6 @@
 //! A bench as text: the device's rates, every pass with its limit, and the targets.
 
-use super::Bench;
+use super::{Bench, tuning};
 use super::pass::Pass;
 use super::rates::Rates;
 use super::scale::{Growth, PassTime, Series};
@@ -17,6 +17,9 @@ pub fn text(bench: &Bench) -> String {
     }
     if let Some(map) = &bench.compaction {
         text += &format!("\n{}", map.text());
+    }
+    if !bench.tuning.is_empty() {
+        text += &format!("\n{}", tuning::text(&bench.tuning));
     }
     bench.scale.iter().flat_map(|scale| &scale.series).for_each(|series| growth(&mut text, series));
     bench.left_out.iter().for_each(|line| text += &format!("not measured: {line}\n"));
