@@ -622,9 +622,9 @@ struct ViewPush {
     uint rounding;
     uint width;
     uint height;
-    // Pixels, and behind them extra samples.
-    uint first_pixel;
-    uint end_pixel;
+    // Paths of all pixels, those of each together, and behind them extra samples.
+    uint first_path;
+    uint end_path;
     vec3 eye;
     vec3 forward;
     // To the picture's right and upper edge: at unit distance, or where parallel rays start.

@@ -9,8 +9,6 @@ use photonmill::settings::stop::Stop;
 use photonmill::settings::tile_samples::TileSamples;
 
 const SIZE: u32 = 32;
-const ALL: Free = Free { samples: true, shadow_rays: true, photons: true, caustic_photons: true, neighbours: true };
-const NONE: Free = Free { samples: false, shadow_rays: false, photons: false, caustic_photons: false, neighbours: false };
 
 struct Subject {
     scene: Scene,
@@ -58,13 +56,12 @@ fn rounds_vary_as_the_pilot_expects() {
     let Some(gpu) = device() else { return };
     for name in ["cornell", "cornell-spheres"] {
         let subject = Subject::new(name);
-        let found = subject.chosen(&gpu, &few(), Free { photons: false, caustic_photons: false, ..ALL }).unwrap();
+        let found = subject.chosen(&gpu, &few(), Free { photons: false, caustic_photons: false, ..Free::ALL }).unwrap();
         for division in [found.before, found.chosen] {
             let measured = subject.variance(&gpu, &division.set(&few()));
             let variance = &found.rounds.variance;
-            let of_paths = (variance.path + variance.shadow_ray / f64::from(division.shadow_rays)) / f64::from(division.samples);
-            let of_maps = variance.global.of_first_round(division.photons, division.neighbours)
-                + variance.caustic.of_first_round(division.caustic_photons, division.neighbours);
+            let of_paths = variance.of_paths_in_round(division);
+            let of_maps = variance.global.of_first_round(division.global()) + variance.caustic.of_first_round(division.caustic());
             let expected = of_paths + of_maps;
             println!("{name}: {division:?}: {of_paths:.4} + {of_maps:.4} expected, {measured:.4} found");
             assert!((0.3..4.0).contains(&(expected / measured)), "{name}, {division:?}: {expected} of {measured}");
@@ -79,18 +76,18 @@ fn what_is_set_stays_and_the_rest_is_chosen_alike_each_time() {
     let subject = Subject::new("cornell-spheres");
     let goal = |error, seconds| SceneSettings { stop: Stop { error, seconds, ..Stop::default() }, ..few() };
     let fine = goal(Some(0.01), None);
-    let found = subject.chosen(&gpu, &fine, ALL).unwrap();
+    let found = subject.chosen(&gpu, &fine, Free::ALL).unwrap();
     assert!(found.tiles.is_some() && found.gain(&fine.stop) > 2.0, "{}: {found:?}", found.gain(&fine.stop));
-    let again = subject.chosen(&gpu, &SceneSettings { seed: 77, ..fine.clone() }, ALL).unwrap();
+    let again = subject.chosen(&gpu, &SceneSettings { seed: 77, ..fine.clone() }, Free::ALL).unwrap();
     assert_eq!((found.chosen, found.rounds), (again.chosen, again.rounds));
-    let of_rays = subject.chosen(&gpu, &fine, Free { shadow_rays: true, ..NONE }).unwrap();
+    let of_rays = subject.chosen(&gpu, &fine, Free { shadow_rays: true, ..Free::default() }).unwrap();
     assert_eq!(of_rays.chosen, Division { shadow_rays: of_rays.chosen.shadow_rays, ..of_rays.before });
     let three = SceneSettings { shadow_rays: 3, ..fine.clone() };
-    let of_others = subject.chosen(&gpu, &three, Free { shadow_rays: false, ..ALL }).unwrap();
+    let of_others = subject.chosen(&gpu, &three, Free { shadow_rays: false, ..Free::ALL }).unwrap();
     assert!(of_others.chosen.shadow_rays == 3 && of_others.chosen != of_others.before, "{of_others:?}");
-    assert_eq!(subject.chosen(&gpu, &fine, NONE), None);
+    assert_eq!(subject.chosen(&gpu, &fine, Free::default()), None);
     // A small error takes more of it.
-    let coarse = subject.chosen(&gpu, &goal(Some(0.3), None), ALL).unwrap();
+    let coarse = subject.chosen(&gpu, &goal(Some(0.3), None), Free::ALL).unwrap();
     let [rough, good] = [(&coarse, 0.3), (&found, 0.01)].map(|(pilot, error)| pilot.rounds.until(pilot.chosen, error));
     assert!(rough.0 >= 16.0 && rough.1 < 0.1 * good.1, "{rough:?} {good:?}");
 }
@@ -103,14 +100,12 @@ fn the_program_has_a_pilot_where_an_error_ends_the_run() {
     let line = "render cornell-spheres --size 16x16";
     let (_, stderr) = place.succeed(&format!("{line} --error 20% -o a.exr --json a.json --checkpoint a.pms"));
     let settings = place.json("a.json")["settings"].clone();
-    let names = ["samples", "shadow_rays", "photons", "caustic_photons", "neighbours"];
+    let names = ["samples", "shadow_rays", "photons", "caustic_photons", "neighbours", "caustic_neighbours"];
     let values = names.map(|name| settings[name].as_u64().unwrap());
     assert!(values[2] < 131_072 && stderr.contains(&format!("pilot: {} path", values[0])), "{stderr}");
     // By hand it is the same run.
-    let [samples, shadow_rays, photons, caustic_photons, neighbours] = values;
-    place.succeed(&format!(
-        "{line} --error 20% -o b.exr --samples {samples} --shadow-rays {shadow_rays} --photons {photons} --caustic-photons {caustic_photons} --neighbours {neighbours} -q"
-    ));
+    let by_hand: String = names.iter().zip(values).map(|(name, value)| format!(" --{} {value}", name.replace('_', "-"))).collect();
+    place.succeed(&format!("{line} --error 20% -o b.exr{by_hand} -q"));
     assert!(std::fs::read(place.at("a.exr")).unwrap() == std::fs::read(place.at("b.exr")).unwrap());
     // And it goes on without a pilot.
     let (_, stderr) = place.succeed(&format!("{line} --error 19% -o c.exr --json c.json --resume a.pms"));

@@ -191,6 +191,10 @@ void main()
     for (uint part = 0; part < PART_COUNT; part++) {
         add_part_total(part, totals[part]);
     }
+    uint triangle_count = subgroupAdd(triangles_found);
+    if (subgroupElect() && triangle_count != 0) {
+        add_to_anomaly(12, triangle_count);
+    }
     // What is not lit has sums of 0.
     if (is_lit) {
         for (uint channel = 0; channel < 3; channel++) {

@@ -41,5 +41,6 @@ void main()
     note_surface(chain.met_surface && !met_surface, push.most_samples / own.count);
     float share = divide(1.0, float(own.count));
     write_pass_sum(own.place, index, push.pixel_count, chain.light, chain.seen, share * push.film_scale, share * push.film_limit, mix32(push.rounding + depth), true);
+    note_nodes();
     write_missing_points(push.pixel_count);
 }

@@ -67,5 +67,6 @@ void main()
     note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), NONFINITE_LIGHT, push.draws.domain,
                 push.draws.round, index);
     write_pass_sum(index, index, push.point_count, chain.light, chain.seen, push.film_scale, push.film_limit, push.rounding, false);
+    note_nodes();
     write_missing_points(push.point_count);
 }

@@ -16,17 +16,16 @@ layout(push_constant, scalar) uniform Push { ViewPush push; };
 void main()
 {
     work = push.work;
-    uint item = invocation_index();
+    uint path = push.first_path + invocation_index();
     uint pixel_count = push.width * push.height;
-    bool is_extra = push.first_pixel >= pixel_count;
-    uint place_in_order = push.first_pixel + (is_extra ? item : item / work.samples);
-    if (place_in_order >= push.end_pixel) {
+    uint even = work.samples * pixel_count;
+    if (path >= push.end_path) {
         return;
     }
-    if (is_extra) {
-        own = extra_sample(place_in_order - pixel_count, pixel_count);
+    if (path < even) {
+        own = even_sample(pixel_in_tiles(path / work.samples, push.width, push.height), path % work.samples);
     } else {
-        own = even_sample(pixel_in_tiles(place_in_order, push.width, push.height), item % work.samples);
+        own = extra_sample(path - even, pixel_count);
     }
     uint pixel = own.pixel;
     uint number = own.number;
@@ -57,5 +56,6 @@ void main()
     note_surface(chain.met_surface, most_samples(pixel_count) / own.count);
     float share = divide(1.0, float(own.count));
     write_pass_sum(own.place, pixel, pixel_count, chain.light, chain.seen, share * push.film_scale, share * push.film_limit, push.rounding, false);
+    note_nodes();
     write_missing_points(pixel_count);
 }

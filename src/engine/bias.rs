@@ -78,14 +78,18 @@ impl Bias {
         self.upper.is_finite()
     }
 
+    /// How well its square is known.
+    pub fn uncertainty(&self) -> f64 {
+        ((self.upper / ALLOWANCE.1).powi(2) - self.relative.powi(2)).max(0.0)
+    }
+
     /// The bias and its upper end, as they may be expected of more rounds, whose radii have a mean square `shrunk` times and a variance of
     /// the light `quieter` times what they are now. The interval's square narrows as that variance while the bias does not stand out of
     /// the noise, and then as noise times bias.
     pub fn expected(&self, shrunk: f64, quieter: f64) -> [f64; 2] {
-        let uncertain = ((self.upper / ALLOWANCE.1).powi(2) - self.relative.powi(2)).max(0.0);
         let narrows = if self.lower > 0.0 { shrunk * quieter.sqrt() } else { quieter };
         let found = self.relative * shrunk;
-        [found, ALLOWANCE.1 * (found * found + uncertain * narrows).sqrt()]
+        [found, ALLOWANCE.1 * (found * found + self.uncertainty() * narrows).sqrt()]
     }
 
     /// Of radii whose mean square is so many times that of the one it was measured at.

@@ -58,8 +58,9 @@ fn nonfinite_values() -> PlannedBuffer {
     buffer::<u32>("nonfinite values", kinds * NONFINITE_KIND_WORDS as u64, "the nonfinite values that --paranoid found")
 }
 
-/// Words that kernels count clamped values, lost camera paths and samples of surfaces in (`glsl/world/scene/film_units.glsl`).
-pub const ANOMALY_WORDS: usize = 10;
+/// Words that kernels count clamped values, lost camera paths, samples of surfaces and what these
+/// cost in (`glsl/world/scene/film_units.glsl`).
+pub const ANOMALY_WORDS: usize = 14;
 
 /// Values of a place that are kept of a block: three channels of each part of light.
 pub const PART_VALUES: u64 = 3 * PART_COUNT as u64;
@@ -324,7 +325,7 @@ impl ScenePlan {
             buffer::<u32>("camera path counts", 1, "how many camera paths a dispatch leaves"),
             buffer::<u64>("part totals", u64::from(PART_COUNT) + kept, "light of each part of a path, and in some pixels"),
             buffer::<u64>("part totals of blocks", u64::from(PART_COUNT), "the same as the latest whole block left it"),
-            buffer::<u32>("anomalies", ANOMALY_WORDS as u64, "clamped values and lost camera paths"),
+            buffer::<u32>("anomalies", ANOMALY_WORDS as u64, "clamped values, lost camera paths, and what these cost"),
             buffer::<u32>("anomalies of blocks", ANOMALY_WORDS as u64, "the same as the latest whole block left them"),
             nonfinite_values(),
         ]

@@ -34,6 +34,9 @@ pub struct Trial {
     /// Radii of the first round at the median point, normalised; `None` where the map has none, or its radius is given.
     pub global_radius: Option<f64>,
     pub caustic_radius: Option<f64>,
+    /// Of the global and of the caustic map, how these follow from photons.
+    #[serde(skip)]
+    pub reach: [TrialRadius; 2],
     /// Its photons, of the global and of the caustic map: their density around a point tells the radius there.
     #[serde(skip)]
     pub photons: [TrialPhotons; 2],
@@ -52,6 +55,33 @@ pub struct Trial {
     /// is shorter. Of the map with the larger radius.
     pub too_wide: f64,
     pub seconds: f64,
+}
+
+/// The radius that leaves the wanted photons at the median point, and the widest that reaches round few corners, normalised.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct TrialRadius {
+    pub wanted: f64,
+    pub widest: f64,
+}
+
+impl TrialRadius {
+    pub fn radius(self) -> f64 {
+        self.wanted.min(self.widest).clamp(RADIUS_RANGE.0, MAX_DEFAULT_RADIUS)
+    }
+
+    /// The same of a round whose photons lie so many times as far apart.
+    pub fn scaled(self, times: f64) -> TrialRadius {
+        TrialRadius { wanted: self.wanted * times, ..self }
+    }
+}
+
+impl Trial {
+    /// The same for a run whose photons of each map lie so many times as far apart, and whose radii are not given.
+    pub fn scaled(&self, times: [f64; 2]) -> Trial {
+        let reach = [self.reach[0].scaled(times[0]), self.reach[1].scaled(times[1])];
+        let radius = |of_run: Option<f64>, map: usize| of_run.map(|_| reach[map].radius());
+        Trial { global_radius: radius(self.global_radius, 0), caustic_radius: radius(self.caustic_radius, 1), reach, ..self.clone() }
+    }
 }
 
 /// Photons of a trial, no more than a loop of a kernel may take.

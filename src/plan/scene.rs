@@ -255,10 +255,9 @@ impl ScenePlan {
         self.paths().saturating_mul(self.points_per_path)
     }
 
-    /// Pixels of one dispatch that casts `rays` rays each.
-    pub fn pixels_at_once(&self, rays: u32) -> u32 {
-        let least = ((1 << 12) / self.samples()).max(1);
-        (self.work_per_submission / (RAY_COST * u64::from(rays.max(1)))).clamp(u64::from(least), 1 << 22) as u32
+    /// Items of one dispatch that casts `rays` rays each.
+    pub fn items_at_once(&self, rays: u32) -> u32 {
+        (self.work_per_submission / (RAY_COST * u64::from(rays.max(1)))).clamp(1 << 12, 1 << 22) as u32
     }
 
     /// Photons that one dispatch traces from their light to their end, in a fraction of a second.
@@ -285,12 +284,12 @@ impl ScenePlan {
 
     /// Camera paths of one dispatch, at most.
     pub fn camera_paths_at_once(&self) -> u32 {
-        self.pixels_at_once(self.rays_per_pixel()).min(self.sensor.pixels()).saturating_mul(self.samples())
+        self.items_at_once(self.rays_per_path()).min(self.paths())
     }
 
-    /// Rays of one pixel, roughly.
-    pub fn rays_per_pixel(&self) -> u32 {
-        self.samples() * self.points_per_path * (1 + self.shadow_rays())
+    /// Rays of a camera path, roughly.
+    pub fn rays_per_path(&self) -> u32 {
+        self.points_per_path * (1 + self.shadow_rays())
     }
 
     /// Paths from the camera through each pixel, or from a receiver, in a round.

@@ -4,12 +4,13 @@
 //!
 //! ```text
 //! noise of paths   (path + shadow ray / R) / (S n)
-//! noise of maps    of a round / neighbours x the mean of 1 / r^2 of the rounds / n
-//! bias             (of a map's light x its share x (neighbours / photons x the mean of r^2)^BIAS_POWER)^2
+//! noise of maps    of a round / photons in the disc x the mean of 1 / r^2 of the rounds / n
+//! bias             (of a map's light x its share x the mean of r^2 to a power)^2
 //! unseen           (of a path / (samples of those that have fewest x n))^2
 //! ```
 //!
-//! with what is not known of the bias, which falls with the noise of the maps. Radii shrink as Knaus and Zwicker (2011) have them. Variances
+//! with what is not known of the bias, which falls with the noise of the maps. Where a path looks a map up is chance too, which is noise of
+//! paths. Radii shrink as Knaus and Zwicker (2011) have them. Variances
 //! are a pilot's ([`crate::engine::scene::pilot`]). Costs are those of a class of devices and no run's own times, so that the same
 //! is chosen on each device of its class.
 
@@ -62,6 +63,13 @@ pub struct PhotonsOfMap {
     pub neighbours: f64,
 }
 
+impl PhotonsOfMap {
+    /// The square of the radius over the usual one.
+    pub fn over_usual(self) -> f64 {
+        self.neighbours * USUAL_PHOTONS / f64::from(self.photons)
+    }
+}
+
 /// What is to be chosen, as nobody has set it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Free {
@@ -81,7 +89,7 @@ impl Free {
 /// What light of a round varies by, relative to the square of all light.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Variance {
-    /// Of one path through each pixel, and of one shadow ray of each.
+    /// Of one path of [`SAMPLES_PER_BLOCK`] through each pixel, and of one shadow ray of each.
     pub path: f64,
     pub shadow_ray: f64,
     pub global: MapVariance,
@@ -96,22 +104,37 @@ pub struct MapVariance {
     pub at: PhotonsOfMap,
     /// The share of all light that the map gives.
     pub share: f64,
-    /// The bias of that light relative to it at the same radius; `None` where it is not known.
+    /// The bias of that light relative to it at the same radius, and what is taken for it at the usual radius where it is not known.
     pub bias: Option<f64>,
-    /// The radius is given, whatever the photons.
-    pub is_radius_set: bool,
+    pub usual_bias: f64,
+    /// How well the bias's square is known, over the variance of the light.
+    pub uncertainty: f64,
+    /// The square of the widest first radius over that of the usual photons and neighbours; `None` where it is given, whatever the photons.
+    pub widest: Option<f64>,
+}
+
+/// What paths and photons meet on their way.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Counted {
+    /// Nodes of the hierarchy for a path from the camera, and for a shadow ray.
+    pub nodes: f64,
+    pub nodes_of_ray: f64,
+    /// Triangles that the discs of a path's estimates are cut to, at the pilot's radius.
+    pub triangles: f64,
+    /// From one surface to the next, of each photon of the global and of the caustic map.
+    pub flights: [f64; 2],
 }
 
 impl MapVariance {
     /// The first radius's square over that of the usual photons and neighbours; one that is given is taken for that.
     fn squared_radius(&self, of: PhotonsOfMap) -> f64 {
-        if self.is_radius_set { 1.0 } else { of.neighbours * USUAL_PHOTONS / f64::from(of.photons) }
+        self.widest.map_or(1.0, |widest| widest.min(of.over_usual()))
     }
 
     /// The bias of all light for a squared radius over the usual one.
     fn bias(&self, squared_radius: f64) -> f64 {
-        let (found, at) = self.bias.map_or((BIAS, 1.0), |bias| (bias, self.squared_radius(self.at)));
-        found * self.share * (squared_radius / at).powf(if self.bias.is_some() { BIAS_POWER_FOUND } else { BIAS_POWER })
+        let (found, at) = self.bias.map_or((self.usual_bias, 1.0), |bias| (bias, self.squared_radius(self.at)));
+        found * self.share * (squared_radius / at).powf(BIAS_POWER)
     }
 
     /// The variance of the first round's light.
@@ -131,9 +154,20 @@ impl MapVariance {
 impl Variance {
     /// From what a path with 1 shadow ray and with `many` had.
     pub fn of_paths(with_one: f64, with_many: f64, many: u32) -> Variance {
-        let shadow_ray = ((with_one - with_many) / (1.0 - 1.0 / f64::from(many))).clamp(0.0, with_one);
+        let shadow_ray = ((with_one - with_many) / (1.0 - of_samples(many))).clamp(0.0, with_one);
         Variance { path: with_one - shadow_ray, shadow_ray, ..Variance::default() }
     }
+
+    /// Of a round's paths.
+    pub fn of_paths_in_round(&self, division: Division) -> f64 {
+        let of_a_path = self.path + self.shadow_ray * of_samples(division.shadow_rays);
+        of_a_path / f64::from(SAMPLES_PER_BLOCK) * of_samples(division.samples) / of_samples(SAMPLES_PER_BLOCK)
+    }
+}
+
+/// The variance of the mean of so many samples of a pixel over that of one: many lie more evenly than few.
+pub fn of_samples(count: u32) -> f64 {
+    f64::from(count).powf(-SAMPLE_POWER)
 }
 
 /// What a round takes, nanoseconds.
@@ -144,133 +178,172 @@ pub struct Cost {
     /// Of a path through each pixel, and of a shadow ray of each.
     pub paths: f64,
     pub shadow_rays: f64,
-    pub photon: f64,
+    /// Of a path's lookups in each map with the usual neighbours, and to cut its discs to the surface at the pilot's radius.
+    pub lookups: f64,
+    pub discs: f64,
+    /// Of the global and of the caustic map.
+    pub photons: [f64; 2],
 }
 
-/// What work costs on a class of devices, nanoseconds: in scenes of at most [`FEW_TRIANGLES`], and more for each doubling of these.
+/// What work costs on a class of devices, nanoseconds.
 struct Costs {
-    /// A path from the camera to what it sees, with its lookups in the maps.
-    path: [f64; 2],
-    shadow_ray: [f64; 2],
-    /// A photon from its lamp to its end, sorted into its map.
-    photon: [f64; 2],
+    /// A path from the camera and its share of the picture, without its rays.
+    path: f64,
+    /// A node of the hierarchy on the way of a path or a shadow ray.
+    node: f64,
+    /// A shadow ray's light at a surface with layers, of which it asks each.
+    layers: f64,
+    /// How many times as long a path takes that meets layers, and then through gaps of their coverage.
+    of_layers: f64,
+    of_passing: f64,
+    /// A lookup in a map, and a triangle that a disc is cut to.
+    lookup: f64,
+    triangle: f64,
+    /// A photon's flight from one surface to the next, and a node on its way.
+    flight: f64,
+    node_of_flight: f64,
     /// What a round and each of its maps take in any case.
     round: f64,
-    map: [f64; 2],
-    /// Of paths over mirrors and glass the longest ones, for which all others wait.
+    map: f64,
+    /// Of paths and photons over mirrors and glass the longest ones, for which all others wait.
     chains: f64,
-    /// How many times as long a path takes, and these do, where surfaces have layers.
-    of_layers: f64,
 }
 
-const FEW_TRIANGLES: f64 = 32.0;
-
-/// Measured in `cornell` and `cornell-spheres`: of GPUs on an NVIDIA H100, of CPUs on lavapipe with two cores (November 2026). GPUs that share
-/// the host's memory were not measured.
+/// Of GPUs on an NVIDIA H100 in ten scenes, of CPUs on lavapipe with two cores (November 2026). GPUs that share the host's memory were not
+/// measured.
 fn costs(kind: &str) -> Costs {
     match kind {
         "cpu" => Costs {
-            path: [1500.0, 200.0],
-            shadow_ray: [60.0, 35.0],
-            photon: [1100.0, 150.0],
-            round: 1e6,
-            map: [2e6, 0.0],
-            chains: 0.0,
+            path: 500.0,
+            node: 280.0,
+            layers: 300.0,
             of_layers: 1.5,
+            of_passing: 1.2,
+            lookup: 300.0,
+            triangle: 60.0,
+            flight: 400.0,
+            node_of_flight: 80.0,
+            round: 1e6,
+            map: 2e6,
+            chains: 0.0,
         },
         "discrete" => Costs {
-            path: [0.6, 0.22],
-            shadow_ray: [0.04, 0.01],
-            photon: [0.6, 0.5],
+            path: 0.25,
+            node: 0.14,
+            layers: 0.4,
+            of_layers: 2.2,
+            of_passing: 1.8,
+            lookup: 0.2,
+            triangle: 0.4,
+            flight: 0.05,
+            node_of_flight: 0.19,
             round: 1.5e5,
-            map: [1e5, 5e4],
-            chains: 1.1e6,
-            of_layers: 2.0,
+            map: 1.5e5,
+            chains: 1.6e6,
         },
         _ => Costs {
-            path: [15.0, 5.0],
-            shadow_ray: [1.0, 0.5],
-            photon: [15.0, 12.0],
+            path: 4.0,
+            node: 2.5,
+            layers: 6.0,
+            of_layers: 2.2,
+            of_passing: 1.8,
+            lookup: 3.0,
+            triangle: 4.0,
+            flight: 1.0,
+            node_of_flight: 3.0,
             round: 3e5,
-            map: [2e5, 1e5],
-            chains: 2e6,
-            of_layers: 2.0,
+            map: 3e5,
+            chains: 3e6,
         },
     }
 }
 
-/// More neighbours make a path's lookups longer: by this share for as many again as usual of both maps.
+/// More neighbours make a lookup longer: by this share for as many again as usual.
 const OF_NEIGHBOURS: f64 = 0.15;
-/// How many times as long a photon takes that is sent through mirrors and glass.
-const OF_CAUSTIC_PHOTON: f64 = 2.0;
+/// How many times as long a flight takes of a photon that is sent through mirrors and glass.
+const OF_CAUSTIC_PHOTON: f64 = 1.7;
+
+/// Photons of each map in a pilot's rounds: about as dear as all else in these.
+pub fn pilot_photons(kind: &str) -> u32 {
+    match kind {
+        "cpu" => 1 << 13,
+        "discrete" => 1 << 16,
+        _ => 1 << 14,
+    }
+}
 
 /// Of a plan's scene and pixels on a class of devices.
-pub fn cost(plan: &ScenePlan, triangles: usize, kind: &str) -> Cost {
-    let Costs { path, shadow_ray, photon, round, map, chains, of_layers } = costs(kind);
+pub fn cost(plan: &ScenePlan, counted: &Counted, kind: &str) -> Cost {
+    let Costs { path, node, layers, of_layers, of_passing, lookup, triangle, flight, node_of_flight, round, map, chains } = costs(kind);
     let has = |constant: &str| f64::from(plan.constant(constant));
-    let layers = 1.0 + (of_layers - 1.0) * has("HAS_LAYERS");
-    let doublings = (triangles as f64 / FEW_TRIANGLES).log2().max(0.0);
-    let of = |[few, more]: [f64; 2]| few + more * doublings;
+    let Counted { nodes, nodes_of_ray, triangles, flights } = *counted;
+    let times = |of: f64, constant: &str| 1.0 + (of - 1.0) * has(constant);
+    let layered = times(of_layers, "HAS_LAYERS");
+    let passing = times(of_passing, "HAS_PASSING");
     let pixels = f64::from(plan.sensor.pixels());
+    // Nodes on the way of a photon are not counted, but about those of a path and a shadow ray.
+    let of_flight = flight + node_of_flight * (nodes + nodes_of_ray);
+    let maps = plan.maps().count() as f64;
     Cost {
-        round: round + of(map) * plan.maps().count() as f64 + layers * chains * has("HAS_SPECULAR_CHAINS"),
-        paths: pixels * layers * of(path),
-        shadow_rays: if plan.shadow_rays() == 0 { 0.0 } else { pixels * of(shadow_ray) },
-        photon: of(photon),
+        round: round + map * maps + layered.min(2.0) * chains * has("HAS_SPECULAR_CHAINS"),
+        paths: pixels * (path + layered * passing * node * nodes),
+        shadow_rays: if plan.shadow_rays() == 0 { 0.0 } else { pixels * (node * nodes_of_ray + passing * layers * has("HAS_LAYERS")) },
+        lookups: pixels * lookup,
+        discs: pixels * triangle * triangles,
+        photons: [flights[0] * of_flight, OF_CAUSTIC_PHOTON * flights[1] * of_flight],
     }
 }
 
 /// Photons and radius at which [`BIAS`] is: with [`NEIGHBOURS`].
 const USUAL_PHOTONS: f64 = 131_072.0;
-/// The bias of light from a map at the usual first radius, relative to it, where it was not measured: 1 to 3 % in the built-in scenes.
-const BIAS: f64 = 0.027;
+/// The bias of light from the global and the caustic map at the usual first radius, relative to it, where it does not stand out: of ten
+/// scenes 0.3 to 3 % and 2 to 20 %.
+pub const USUAL_BIAS: [f64; 2] = [0.015, 0.06];
+/// How well its square is known, over the variance of the light: a Student's quantile of what some 1000 discs tell that have no photon in
+/// common, at two radii.
+pub const USUAL_UNCERTAINTY: f64 = 0.2;
 /// The power of the squared radius that it goes by: 1 where light is smooth, less along edges and in corners.
-const BIAS_POWER: f64 = 0.57;
-/// Where it was measured, at a wide radius.
-const BIAS_POWER_FOUND: f64 = 0.75;
-/// The bound of the bias over the bias, and over the root of how well a squared difference of two radii is known, which falls with the
-/// number of discs that have no photon in common: about so many at the usual radius.
+const BIAS_POWER: f64 = 0.45;
+/// The bound of the bias over the bias.
 const BOUND_OF_BIAS: f64 = 2.1;
-const TWO_RADII: f64 = 2.0;
-const QUANTILE: f64 = 1.645;
-const DISCS: f64 = 2000.0;
+/// By which the variance of even samples falls: 1 at random, and up to 3 where light is smooth (Owen 1997). Between 1 and 1.4 in ten scenes.
+const SAMPLE_POWER: f64 = 1.25;
 /// The bound of noise over noise, squared.
-const BOUND_OF_NOISE: f64 = 1.3;
-/// Samples of pixels that have fewest, over the mean of all: these may miss what is rare.
-const LEAST_SAMPLES: f64 = 0.4;
+const BOUND_OF_NOISE: f64 = 1.2;
 
 /// What is known of a picture's rounds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rounds {
     pub variance: Variance,
     pub cost: Cost,
-    pub pixels: f64,
     pub alpha: f64,
     /// Whether the bias is part of the error.
     pub counts_bias: bool,
-    /// What light may add that is so rare that one path of each pixel misses it ([`crate::engine::error_bound::FilmError::unseen`]).
+    /// What light may add that is so rare that one path of each pixel misses it ([`crate::engine::error_bound::FilmError::unseen`]), and
+    /// the samples of pixels that have fewest, over the mean of all.
     pub unseen: f64,
+    pub least_samples: f64,
 }
 
 impl Rounds {
     /// Nanoseconds of a round.
     pub fn cost(&self, division: Division) -> f64 {
-        let Cost { round, paths, shadow_rays, photon } = self.cost;
+        let Cost { round, paths, shadow_rays, lookups, discs, photons } = self.cost;
         let Variance { global, caustic, .. } = self.variance;
-        let maps = [(global, division.global(), 1.0), (caustic, division.caustic(), OF_CAUSTIC_PHOTON)];
-        let (mut of_photons, mut lookups) = (0.0, 1.0);
-        for (_, of, cost) in maps.into_iter().filter(|(map, ..)| map.has_photons()) {
-            of_photons += cost * photon * f64::from(of.photons);
-            lookups += 0.5 * OF_NEIGHBOURS * (of.neighbours - 1.0);
+        let maps = [(global, division.global(), photons[0]), (caustic, division.caustic(), photons[1])];
+        let (mut of_photons, mut of_path) = (0.0, paths + f64::from(division.shadow_rays) * shadow_rays);
+        for (map, of, photon) in maps.into_iter().filter(|(map, ..)| map.has_photons()) {
+            of_photons += photon * f64::from(of.photons);
+            of_path += lookups * (1.0 + OF_NEIGHBOURS * (of.neighbours - 1.0));
+            of_path += 0.5 * discs * map.squared_radius(of) / map.squared_radius(map.at);
         }
-        round + of_photons + f64::from(division.samples) * (paths * lookups + f64::from(division.shadow_rays) * shadow_rays)
+        round + of_photons + f64::from(division.samples) * of_path
     }
 
     /// The bound of the error after so many rounds.
     pub fn error(&self, division: Division, rounds: f64) -> f64 {
-        let Variance { path, shadow_ray, global, caustic } = self.variance;
-        let Division { samples, shadow_rays, .. } = division;
-        let of_paths = (path + shadow_ray / f64::from(shadow_rays)) / (f64::from(samples) * rounds);
+        let Variance { global, caustic, .. } = self.variance;
+        let of_paths = self.variance.of_paths_in_round(division) / rounds;
         let shrunk = mean_squared_radius(self.alpha, rounds.ceil() as u32);
         // The mean of 1 / r^2 over rounds is n^(1 - alpha) / (2 - alpha), and that of the first round 1.
         let inverse = 1.0 / (2.0 - self.alpha);
@@ -281,14 +354,12 @@ impl Rounds {
                 continue;
             }
             let noise = map.of_first_round(of) * of_radii;
-            let squared_radius = map.squared_radius(of) * shrunk;
-            let discs = (DISCS / squared_radius).min(3.0 * self.pixels);
             of_maps += noise;
-            unknown += noise * QUANTILE * (2.0 / discs).sqrt();
-            bias += map.bias(squared_radius);
+            unknown += noise * map.uncertainty;
+            bias += map.bias(map.squared_radius(of) * shrunk);
         }
-        let of_bias = if self.counts_bias { BOUND_OF_BIAS.powi(2) * (bias * bias + TWO_RADII.powi(2) * unknown) } else { 0.0 };
-        let unseen = self.unseen / (LEAST_SAMPLES * f64::from(samples) * rounds);
+        let of_bias = if self.counts_bias { BOUND_OF_BIAS.powi(2) * (bias * bias + unknown) } else { 0.0 };
+        let unseen = self.unseen / (self.least_samples * f64::from(division.samples) * rounds);
         (BOUND_OF_NOISE * (of_paths + of_maps) + of_bias + unseen * unseen).sqrt()
     }
 
@@ -345,8 +416,10 @@ const MOST_SHADOW_RAYS: u32 = 16;
 pub const MOST_SAMPLES: u32 = 256;
 const LEAST_PHOTONS: u32 = 1 << 12;
 pub const MOST_PHOTONS: u32 = 1 << 22;
-/// From an eighth of the usual ones to 16 times as many, and of the caustic map from a sixth.
+/// From an eighth of the usual ones to 16 times as many, and of the caustic map from a sixth to 32 times.
 const CHOICE_OF_NEIGHBOURS: [u32; 8] = [3, 6, 12, 24, 48, 96, 192, 384];
+/// Each third of what may be chosen begins a search.
+const BEGINS_APART: usize = 3;
 const CHOICE_OF_CAUSTIC_NEIGHBOURS: [u32; 9] = [1, 2, 3, 6, 12, 24, 48, 96, 192];
 
 /// The division whose loss is least: what is free in powers of two, up to so many samples and photons.
@@ -390,7 +463,9 @@ pub fn best(rounds: &Rounds, before: Division, free: Free, stop: &Stop, (most_sa
             }
         }
     };
-    let begins = pairs(&samples, &neighbours).into_iter().map(|(samples, neighbours)| Division { samples, neighbours, ..before });
+    let some = |choice: &[u32]| -> Vec<u32> { choice.iter().copied().step_by(BEGINS_APART).collect() };
+    let begins = pairs(&some(&samples), &some(&neighbours));
+    let begins = begins.into_iter().map(|(samples, neighbours)| Division { samples, neighbours, ..before });
     begins.map(from).fold((rounds.loss(before, stop), before), less).1
 }
 
@@ -415,7 +490,7 @@ mod tests {
     const OF_PATHS: Free = Free { photons: false, caustic_photons: false, neighbours: false, caustic_neighbours: false, ..Free::ALL };
 
     fn rounds(variance: Variance, cost: Cost) -> Rounds {
-        Rounds { variance, cost, pixels: 1e6, alpha: 2.0 / 3.0, counts_bias: true, unseen: 0.0 }
+        Rounds { variance, cost, alpha: 2.0 / 3.0, counts_bias: true, unseen: 0.0, least_samples: 1.0 }
     }
 
     fn goal(error: f64) -> Stop {
@@ -424,7 +499,7 @@ mod tests {
 
     #[test]
     fn variances_are_told_apart_by_the_shadow_rays() {
-        let found = Variance::of_paths(5.0, 2.0, 4);
+        let found = Variance::of_paths(5.0, 1.0 + 4.0 * of_samples(4), 4);
         assert_eq!((found.path, found.shadow_ray), (1.0, 4.0));
         // Chance may turn them round: then all of it is the paths'.
         let found = Variance::of_paths(2.0, 5.0, 4);
@@ -455,16 +530,18 @@ mod tests {
             at: BEFORE.global(),
             share,
             bias: None,
-            is_radius_set: false,
+            usual_bias: USUAL_BIAS[0],
+            uncertainty: USUAL_UNCERTAINTY,
+            widest: Some(100.0),
         };
         let variance = Variance { path: 0.1, global: of_map(0.05, 0.5), caustic: of_map(1e-4, 0.01), ..Variance::default() };
-        let found = rounds(variance, Cost { round: 1e6, paths: 1e6, shadow_rays: 1e5, photon: 5.0 });
+        let found = rounds(variance, Cost { round: 1e6, paths: 1e6, shadow_rays: 1e5, photons: [5.0; 2], ..Cost::default() });
         let of = |error: f64| best(&found, BEFORE, Free::ALL, &goal(error), (MOST_SAMPLES, MOST_PHOTONS));
         assert!(of(0.02).photons > of(0.02).caustic_photons, "{:?}", of(0.02));
         let [chosen, usual] = [of(0.01), BEFORE].map(|division| found.until(division, 0.01).1);
         assert!(chosen < 0.5 * usual, "{chosen} {usual}");
         // A radius that is given has its bias, and more photons in it less noise.
-        let set = MapVariance { is_radius_set: true, ..of_map(0.05, 0.5) };
+        let set = MapVariance { widest: None, ..of_map(0.05, 0.5) };
         let twice = PhotonsOfMap { photons: 1 << 18, ..BEFORE.global() };
         let few = PhotonsOfMap { neighbours: 0.1, ..twice };
         assert_eq!((set.of_first_round(few), of_map(0.05, 0.5).of_first_round(twice)), (0.025, 0.05));

@@ -5,6 +5,8 @@
 uvec2 walk_group;
 uvec2 walk_stack[BVH_STACK];
 uint walk_depth;
+// Triangles that were looked at.
+uint triangles_found = 0;
 
 void begin_walk()
 {
@@ -34,6 +36,7 @@ bool next_leaves(vec3 low, vec3 high, out uint first_triangle, out uint leaves)
         uint near = children_in_box(node, low, high);
         first_triangle = node.first_triangle;
         leaves = near & 0x00ffffffu;
+        triangles_found += bitCount(leaves);
         walk_group = uvec2(node.first_child, (near & 0xff000000u) | child_nodes_of(node));
         return true;
     }
@@ -41,5 +44,6 @@ bool next_leaves(vec3 low, vec3 high, out uint first_triangle, out uint leaves)
     uint count = min(triangles.length() - first_triangle, 24u);
     leaves = (1u << count) - 1u;
     walk_group.x += count;
+    triangles_found += count;
     return count != 0;
 }

@@ -163,6 +163,9 @@ uint children_in_box(BvhNode node, vec3 low, vec3 high)
     return found;
 }
 
+// What rays of this invocation have cost: nodes of the hierarchy, or without one groups of as many triangles as take as long.
+uint nodes_visited = 0;
+
 // The nearest hit before t_max, or any hit if `any`.
 Hit traverse(vec3 origin, vec3 direction, float t_max, bool any)
 {
@@ -181,6 +184,7 @@ Hit traverse(vec3 origin, vec3 direction, float t_max, bool any)
         uvec2 stack[BVH_STACK];
         uint depth = 0;
         for (;;) {
+            nodes_visited++;
             uint bit = findMSB(group.y);
             group.y &= ~(1u << bit);
             if (group.y > 0x00ffffffu) {
@@ -208,6 +212,7 @@ Hit traverse(vec3 origin, vec3 direction, float t_max, bool any)
             }
         }
     } else {
+        nodes_visited += (triangles.length() + 15) / 16;
         for (uint index = 0; index < triangles.length(); index++) {
             intersect_triangle(ray, index, hit);
         }

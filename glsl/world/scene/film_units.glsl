@@ -5,7 +5,8 @@
 // Counts: [0] values that are no number, [1] values clamped to the film's largest, [2] estimates on a mesh too dense
 // for its area to be found, [3] camera paths cut off after MAX_BOUNCES; sums of two words, low word first: [4] what clamped
 // values lost, in 1/1024 of the film's largest, [6] the weights of cut paths, in 2^-20,
-// [8] samples of pixels that meet a surface.
+// [8] samples of pixels that meet a surface, [10] nodes that rays of camera paths visited, [12] triangles that
+// discs of estimates were cut to.
 layout(set = 1, binding = 0, scalar) buffer Anomalies { uint anomalies[]; };
 
 void add_to_anomaly(uint word, uint amount)

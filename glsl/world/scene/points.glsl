@@ -57,3 +57,12 @@ void write_pass_sum(uint place, uint index, uint pixel_count, vec3 light[3], vec
     add_part_total(1, totals[1]);
     add_part_total(3, totals[2]);
 }
+
+// Counts what the rays of this invocation have cost.
+void note_nodes()
+{
+    uint count = subgroupAdd(nodes_visited);
+    if (subgroupElect()) {
+        add_to_anomaly(10, count);
+    }
+}

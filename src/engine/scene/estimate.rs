@@ -21,7 +21,7 @@ pub fn cut_discs(commands: &mut Commands, round: Round, map: &MapPlan) -> Result
     let Round { resources, plan, .. } = round;
     let SceneResources { scene, visible_points, radius_classes, disc_cuts, .. } = resources;
     let (width, height) = plan.sensor.size();
-    in_pieces(commands, plan, plan.visible_points(), plan.pixels_at_once(4), 256, |commands, first_point, end_point| {
+    in_pieces(commands, plan, plan.visible_points(), plan.items_at_once(4), 256, |commands, first_point, end_point| {
         let push = DiscCutsPush {
             work: plan.work(),
             first_point,
@@ -119,7 +119,7 @@ pub fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u32; 2])
     let flux =
         |map: &Option<MapPlan>| map.as_ref().map_or(0.0, |map| map.photon_flux_of(geometry, traced[usize::from(map.caustic_only)])) as f32;
     let (width, height) = plan.sensor.size();
-    in_pieces(commands, plan, plan.visible_points(), plan.pixels_at_once(4), 256, |commands, first_point, end_point| {
+    in_pieces(commands, plan, plan.visible_points(), plan.items_at_once(4), 256, |commands, first_point, end_point| {
         let push = FluxToRadiancePush {
             work: plan.work(),
             first_point,
@@ -166,7 +166,7 @@ pub fn resolve(commands: &mut Commands, round: Round, ends_block: bool) -> Resul
     let points_per_path = if resources.photons.is_some() { plan.points_per_path } else { 0 };
     let block = round.number / plan.film.rounds_per_block;
     let work = u64::from(plan.film.samples * (1 + points_per_path));
-    in_pieces(commands, plan, pixel_count, plan.pixels_at_once(1), work, |commands, first_pixel, end_pixel| {
+    in_pieces(commands, plan, pixel_count, plan.items_at_once(1), work, |commands, first_pixel, end_pixel| {
         let push = ResolvePush {
             work: plan.work(),
             first_pixel,

@@ -174,6 +174,11 @@ impl SceneFilm {
         wide_count(&self.anomalies, 8) as f64 / (f64::from(self.plan.samples) * f64::from(self.rounds.max(1)))
     }
 
+    /// Nodes of the hierarchy that rays of camera paths visited, and triangles that discs of estimates were cut to.
+    pub fn visited(&self) -> [u64; 2] {
+        [10, 12].map(|word| wide_count(&self.anomalies, word))
+    }
+
     /// How errors of its values add up.
     pub fn measure(&self) -> ErrorMeasure {
         let sum = self.surface_means().map(DVec3::element_sum).sum();

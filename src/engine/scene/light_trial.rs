@@ -74,7 +74,7 @@ fn what_clusters_add(gpu: &Gpu, commands: &mut Commands, round: Round, tree: &Li
     let found = gpu.buffer::<f32>("what lights add", u64::from(pair_count), Memory::Device)?;
     commands.upload(&receivers, points)?;
     let draws = Draws { seed: words(round.plan.settings.seed), round: 0, domain: DOMAIN_LIGHTS };
-    let (most, work) = (round.plan.pixels_at_once(ray_count), 64 * u64::from(ray_count));
+    let (most, work) = (round.plan.items_at_once(ray_count), 64 * u64::from(ray_count));
     in_pieces(commands, round.plan, pair_count, most, work, |commands, first_pair, end_pair| {
         let resources = round.resources;
         let kernel =

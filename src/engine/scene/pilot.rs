@@ -7,17 +7,19 @@
 
 use std::cell::Cell;
 
-use super::{View, pilot_rounds};
-use super::pilot_rounds::{PHOTONS, PilotRounds, SAMPLES};
+use super::View;
+use super::pilot_rounds::{FEW_SAMPLES, MANY_SAMPLES, OfTile, PIXELS_OF_MAP, Parts, PilotRounds, ROUNDS, SAMPLES};
 use crate::constants::PART_COUNT;
 use crate::engine;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::plan::film::BiasPlan;
-use crate::plan::radius::RadiusFrom;
-use crate::plan::scene::ScenePlan;
+use crate::plan::radius::{MAX_DEFAULT_RADIUS, RadiusFrom, TrialRadius};
+use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
-use crate::plan::work_division::{Division, Free, MOST_PHOTONS, MOST_SAMPLES, MapVariance, Rounds, Variance, best, cost};
+use crate::plan::work_division::{
+    Cost, Counted, Division, Free, MOST_PHOTONS, MOST_SAMPLES, MapVariance, Rounds, USUAL_BIAS, USUAL_UNCERTAINTY, Variance, best, cost, of_samples, pilot_photons,
+};
 use crate::scene::Scene;
 use crate::settings::scene::{SAMPLES_PER_BLOCK, SceneSettings};
 use crate::settings::stop::Stop;
@@ -63,42 +65,20 @@ pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Fre
     if free == Free::default() {
         return Ok(None);
     }
-    let casts_shadow_rays = free.shadow_rays && plan.shadow_rays() != 0;
     let many = if free.shadow_rays { MANY_SHADOW_RAYS } else { settings.shadow_rays };
-    let looks = PilotRounds { gpu, scene, view, run: plan, spent: Cell::new(0.0) };
+    let kind = gpu.facts().kind;
+    let looks = PilotRounds { gpu, scene, view, run: plan, photons: pilot_photons(kind), spent: Cell::new(0.0) };
     let of_many = looks.of_few(many)?;
-    let of_one = if casts_shadow_rays { looks.of_few(1)? } else { of_many };
-    // What is seen, straight or over mirrors and glass, is found anew by each path; light from maps varies with the photons.
-    let of_paths = |part: usize| match casts_shadow_rays {
-        true => Variance::of_paths(of_one.variance[part], of_many.variance[part], many),
-        false => Variance { path: of_many.variance[part], ..Variance::default() },
-    };
-    let at = Division::of(&pilot_rounds::settings(settings));
-    let of_map = |part: usize, caustic_only: bool| {
-        let Some(map) = plan.maps().find(|map| map.caustic_only == caustic_only) else { return MapVariance::default() };
-        let found = 0.5 * (of_one.variance[part] + of_many.variance[part]);
-        MapVariance {
-            of_round: found,
-            at: if caustic_only { at.caustic() } else { at.global() },
-            share: of_many.light[part],
-            bias: None,
-            is_radius_set: map.radius_from == RadiusFrom::User,
-        }
-    };
-    let (direct, specular, caustic, global) = (of_paths(0), of_paths(1), of_map(2, true), of_map(3, false));
-    let variance = Variance { path: direct.path + specular.path, shadow_ray: direct.shadow_ray + specular.shadow_ray, global, caustic };
+    let Some((parts, mut rounds)) = known(&looks, &of_many, None, kind) else { return Ok(None) };
+    // Of a run that takes little longer than another look, paths are not told apart from shadow rays.
     let before = Division::of(settings);
-    let varies = |of: Variance| of.path + of.shadow_ray / f64::from(before.shadow_rays);
-    let parts = [varies(direct), varies(specular), caustic.of_first_round(before.caustic()), global.of_first_round(before.global())];
-    let all: f64 = parts.iter().sum();
-    if all <= 0.0 || !all.is_finite() {
-        return Ok(None);
+    let usual_choice = best(&rounds, before, free, &settings.stop, (MOST_SAMPLES, MOST_PHOTONS));
+    let a_look = f64::from(ROUNDS) * (rounds.cost.round + rounds.cost.photons.iter().sum::<f64>() * f64::from(looks.photons));
+    if free.shadow_rays && plan.shadow_rays() != 0 && goal_nanoseconds(&rounds, usual_choice, &settings.stop) > LEAST_LOOKS * a_look {
+        let of_one = looks.of_few(1)?;
+        let Some(found) = known(&looks, &of_many, Some(&of_one), kind) else { return Ok(None) };
+        rounds = found.1;
     }
-    let cost = cost(plan, view.geometry.triangles.len(), gpu.facts().kind);
-    let counts_bias = plan.film.bias == BiasPlan::Blocks;
-    let pixels = f64::from(plan.sensor.pixels());
-    let unseen = of_many.unseen / pixels.sqrt();
-    let mut rounds = Rounds { variance, cost, pixels, alpha: settings.alpha, counts_bias, unseen };
     let limits = engine::limits(gpu.facts());
     let plan_of =
         |division: Division| ScenePlan::with_trial(scene, view.geometry, &division.set(settings), plan.sensor, &limits, plan.trial.clone());
@@ -117,30 +97,32 @@ pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Fre
         let mut least = PICTURE_ROUNDS;
         while least <= MOST_PICTURE_ROUNDS {
             let first = best(&rounds, before, free, &settings.stop, (MOST_SAMPLES, at_once));
-            let fits = picture_rounds(plan, first, &rounds);
+            let fits = picture_rounds(plan, first, &rounds, looks.photons);
             if fits * if found.is_none() { LEAST_PICTURE } else { 1.0 } < f64::from(least) {
                 break;
             }
             let count = (fits.min(f64::from(MOST_PICTURE_ROUNDS)) as u32).max(least);
             let Some(seen) = looks.of_all(first.shadow_rays, count)? else { break };
             let known = &mut rounds.variance;
-            known.shadow_ray = known.shadow_ray.min(seen.paths * f64::from(first.shadow_rays));
-            known.path = seen.paths - known.shadow_ray / f64::from(first.shadow_rays);
-            for (map, of_light) in [&mut known.global, &mut known.caustic].into_iter().zip(seen.maps) {
-                let [variance, share, bias] = of_light;
-                (map.of_round, map.share, map.bias) = (variance, share, (bias > 0.0).then_some(bias));
+            let of_rays = of_samples(first.shadow_rays);
+            known.shadow_ray = known.shadow_ray.min(seen.paths / of_rays);
+            known.path = seen.paths - known.shadow_ray * of_rays;
+            for (map, found) in [&mut known.global, &mut known.caustic].into_iter().zip(seen.maps).filter(|(map, _)| map.at.photons > 0) {
+                known.path += found.path * of_samples(SAMPLES) * f64::from(SAMPLES);
+                (map.of_round, map.share, map.bias) = (found.of_round, found.light, found.bias);
+                map.uncertainty = found.uncertainty.unwrap_or(map.uncertainty);
             }
             found = Some(seen.tiles);
             least = 4 * count;
         }
-        // Where samples go by the root of the variance, the mean variance is the square of the mean root (Neyman 1934).
-        let shares = found.map_or_else(Vec::new, |tiles| smooth(&tiles, width.div_ceil(TILE) as usize));
-        let roots: Vec<f64> = shares.iter().map(|share| share.sqrt()).collect();
-        let root = roots.iter().sum::<f64>() / roots.len() as f64;
-        if root * root < LEAST_TILES {
-            rounds.variance.path *= root * root;
-            rounds.variance.shadow_ray *= root * root;
-            tiles = Some(roots.into_iter().map(|own| own / root).collect::<Vec<f64>>());
+        tiles = found.and_then(|found| Tiles::of(&found, width.div_ceil(TILE) as usize));
+        if let Some(tiles) = &tiles {
+            rounds.variance.path *= tiles.variance;
+            rounds.variance.shadow_ray *= tiles.variance;
+            let chains = if plan.constant("HAS_SPECULAR_CHAINS") != 0 { OF_CHAINS } else { 1.0 };
+            rounds.cost.paths *= chains * tiles.cost;
+            rounds.cost.shadow_rays *= tiles.cost;
+            rounds.least_samples = tiles.samples.iter().copied().fold(1.0, f64::min);
         }
     }
     let mut most_samples = MOST_SAMPLES;
@@ -157,42 +139,143 @@ pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Fre
     // Of fewer samples a block takes more rounds, of which a short run has few.
     let is_short = rounds.expected(chosen, &settings.stop) < FEW_BLOCKS * SAMPLES_PER_BLOCK;
     let least_samples = if is_short { chosen.samples.min(SAMPLES_PER_BLOCK) } else { 1 };
-    let tiles = tiles.map(|tiles| tile_samples(chosen.samples, least_samples, &tiles, size)).filter(|(_, tiles)| tiles.most() > 0);
-    Ok(Some(Pilot { before, chosen, tiles, rounds, of_parts: parts.map(|part| part / all), spent: looks.spent.get() }))
+    let tiles = tiles.map(|tiles| tile_samples(chosen.samples, least_samples, &tiles.samples, size)).filter(|(_, tiles)| tiles.most() > 0);
+    Ok(Some(Pilot { before, chosen, tiles, rounds, of_parts: parts, spent: looks.spent.get() }))
 }
+
+/// What a few pixels tell with many shadow rays, and with one: the parts of the noise, as shares of its square, and rounds. `None` where
+/// nothing varies.
+fn known(looks: &PilotRounds, of_many: &Parts, of_one: Option<&Parts>, kind: &str) -> Option<([f64; PART_COUNT as usize], Rounds)> {
+    let plan = looks.run;
+    let before = Division::of(&plan.settings);
+    let (at, many) = (Division::of(&looks.settings()), of_many.shadow_rays);
+    // What is seen, straight or over mirrors and glass, is found anew by each path; light from maps varies with the photons.
+    let of_paths = |part: usize| match of_one {
+        Some(of_one) => Variance::of_paths(of_one.variance[part], of_many.variance[part], many),
+        // Of direct light about half.
+        None if part == 0 && plan.shadow_rays() != 0 => {
+            let half = 0.5 * of_many.variance[part];
+            Variance { path: half, shadow_ray: half / of_samples(many), ..Variance::default() }
+        }
+        None => Variance { path: of_many.variance[part], ..Variance::default() },
+    };
+    let of_map = |part: usize, caustic_only: bool| {
+        let Some(map) = plan.maps().find(|map| map.caustic_only == caustic_only) else { return MapVariance::default() };
+        MapVariance {
+            of_round: of_one.map_or(of_many.variance[part], |of_one| 0.5 * (of_one.variance[part] + of_many.variance[part])),
+            at: if caustic_only { at.caustic() } else { at.global() },
+            share: of_many.light[part],
+            bias: None,
+            usual_bias: USUAL_BIAS[usize::from(caustic_only)],
+            uncertainty: USUAL_UNCERTAINTY,
+            widest: (map.radius_from != RadiusFrom::User).then(|| widest(plan, map)),
+        }
+    };
+    let (direct, specular, caustic, global) = (of_paths(0), of_paths(1), of_map(2, true), of_map(3, false));
+    let variance = Variance { path: direct.path + specular.path, shadow_ray: direct.shadow_ray + specular.shadow_ray, global, caustic };
+    let varies = |of: Variance| of.path + of.shadow_ray * of_samples(before.shadow_rays);
+    let parts = [varies(direct), varies(specular), caustic.of_first_round(before.caustic()), global.of_first_round(before.global())];
+    let all: f64 = parts.iter().sum();
+    if all <= 0.0 || !all.is_finite() {
+        return None;
+    }
+    let nodes_of_ray = of_one.map_or(0.0, |of_one| (of_many.counted.nodes - of_one.counted.nodes) / f64::from(many.max(2) - 1));
+    let counted = Counted { nodes: of_many.counted.nodes - f64::from(many) * nodes_of_ray, nodes_of_ray, ..of_many.counted };
+    let rounds = Rounds {
+        variance,
+        cost: cost(plan, &counted, kind),
+        alpha: plan.settings.alpha,
+        counts_bias: plan.film.bias == BiasPlan::Blocks,
+        unseen: of_many.unseen / f64::from(plan.sensor.pixels()).sqrt(),
+        least_samples: 1.0,
+    };
+    Some((parts.map(|part| part / all), rounds))
+}
+
+/// Nanoseconds that a run is to take.
+fn goal_nanoseconds(rounds: &Rounds, division: Division, stop: &Stop) -> f64 {
+    let seconds = stop.seconds.map_or(f64::INFINITY, |most| 1e9 * most);
+    stop.error.map_or(f64::INFINITY, |error| rounds.until(division, error).1).min(seconds)
+}
+
+/// A look takes less than a run over this.
+const LEAST_LOOKS: f64 = 4.0;
 
 /// Blocks that a run may do with, which wants some more than its first look takes.
 const FEW_BLOCKS: u32 = 32;
-/// Less than this of the variance must be left for tiles to be worth their while.
+/// Less than this of the time must be left for tiles to be worth their while.
 const LEAST_TILES: f64 = 0.8;
+/// How many times as long paths are in tiles that vary more, over mirrors and glass.
+const OF_CHAINS: f64 = 1.25;
+/// Of the mean cost of a path, what one costs at least: it must be sent, whatever it meets.
+const LEAST_COST: f64 = 0.1;
 /// Rounds of all pixels with each kind of light: at first and at most, and the share of the run that these may take, at first several times
 /// as much, as few pixels may have told too little of the run.
 const PICTURE_ROUNDS: u32 = 4;
 const MOST_PICTURE_ROUNDS: u32 = 64;
 const PICTURE_SHARE: f64 = 0.05;
 const LEAST_PICTURE: f64 = 4.0;
-/// Of the mean variance, what a tile is taken to have that showed none.
-const HIDDEN_VARIANCE: f64 = 0.1;
+/// Of the mean, what a tile is taken to have that showed nothing.
+const HIDDEN: f64 = 0.1;
 
 /// Rounds of all pixels that are worth their while in a run so far as it is known.
-fn picture_rounds(run: &ScenePlan, first: Division, rounds: &Rounds) -> f64 {
-    let stop = &run.settings.stop;
-    let seconds = stop.seconds.map_or(f64::INFINITY, |most| 1e9 * most);
-    let goal = stop.error.map_or(f64::INFINITY, |error| rounds.until(first, error).1).min(seconds);
-    let maps = run.maps().count() as f64;
-    let paths = (f64::from(SAMPLES) + maps) * (rounds.cost.paths + f64::from(first.shadow_rays) * rounds.cost.shadow_rays);
-    PICTURE_SHARE * goal / (paths + maps * f64::from(PHOTONS) * rounds.cost.photon)
+fn picture_rounds(run: &ScenePlan, first: Division, rounds: &Rounds, pilot_photons: u32) -> f64 {
+    let goal = goal_nanoseconds(rounds, first, &run.settings.stop);
+    let Cost { round, paths, shadow_rays, photons, .. } = rounds.cost;
+    let a_path = paths + f64::from(first.shadow_rays) * shadow_rays;
+    let of_pixels = round + f64::from(SAMPLES) * a_path;
+    let of_maps = |map: &MapPlan| {
+        let share = (PIXELS_OF_MAP / f64::from(run.sensor.pixels())).min(1.0);
+        let photons = f64::from(pilot_photons) * photons[usize::from(map.caustic_only)];
+        2.0 * (round + photons) + f64::from(FEW_SAMPLES + MANY_SAMPLES) * share * a_path
+    };
+    PICTURE_SHARE * goal / (of_pixels + run.maps().map(of_maps).sum::<f64>())
 }
 
-/// A tile's variance is little known, and rare light beside it is rare in it too: the mean of it and its neighbours.
-fn smooth(shares: &[f64], columns: usize) -> Vec<f64> {
-    let rows = shares.len() / columns;
+/// Samples of each tile over the mean of all.
+struct Tiles {
+    samples: Vec<f64>,
+    /// The mean variance and the mean cost of a path over what these are where all have the same.
+    variance: f64,
+    cost: f64,
+}
+
+impl Tiles {
+    /// Samples go by the root of variance over cost (Neyman 1934). `None` where that gains little.
+    fn of(tiles: &[OfTile], columns: usize) -> Option<Tiles> {
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+        let variances = smooth(&tiles.iter().map(|tile| tile.variance).collect::<Vec<f64>>(), columns);
+        let met = smooth(&tiles.iter().map(|tile| tile.met).collect::<Vec<f64>>(), columns);
+        let all = mean(&met);
+        let costs: Vec<f64> = met.iter().map(|met| LEAST_COST + (1.0 - LEAST_COST) * met / all).collect();
+        let roots: Vec<f64> = variances.iter().zip(&costs).map(|(variance, cost)| (variance / cost).sqrt()).collect();
+        let root = mean(&roots);
+        let both = mean(&variances.iter().zip(&costs).map(|(variance, cost)| (variance * cost).sqrt()).collect::<Vec<f64>>());
+        let tiles = Tiles { samples: roots.iter().map(|own| own / root).collect(), variance: root * both, cost: both / root };
+        Some(tiles).filter(|tiles| tiles.variance * tiles.cost < LEAST_TILES)
+    }
+}
+
+/// What a tile shows is little known, and rare light beside it is rare in it too: the mean of it and its neighbours.
+fn smooth(values: &[f64], columns: usize) -> Vec<f64> {
+    let rows = values.len() / columns;
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
     let near = |place: usize, count: usize| place.saturating_sub(1)..(place + 2).min(count);
     let at = |x: usize, y: usize| {
-        let found: Vec<f64> = near(y, rows).flat_map(|y| near(x, columns).map(move |x| shares[y * columns + x])).collect();
-        HIDDEN_VARIANCE + (1.0 - HIDDEN_VARIANCE) * found.iter().sum::<f64>() / found.len() as f64
+        let found: Vec<f64> = near(y, rows).flat_map(|y| near(x, columns).map(move |x| values[y * columns + x])).collect();
+        HIDDEN * mean + (1.0 - HIDDEN) * found.iter().sum::<f64>() / found.len() as f64
     };
-    (0..shares.len()).map(|tile| at(tile % columns, tile / columns)).collect()
+    (0..values.len()).map(|tile| at(tile % columns, tile / columns)).collect()
+}
+
+/// The square of the widest first radius of a map over that of the usual photons and neighbours.
+fn widest(plan: &ScenePlan, map: &MapPlan) -> f64 {
+    let reach = plan.trial.as_ref().map_or(TrialRadius::default(), |trial| trial.reach[usize::from(map.caustic_only)]);
+    // Without a trial the scene's area tells.
+    let (wanted, widest) = if reach.wanted > 0.0 { (reach.wanted, reach.widest) } else { (map.radius, MAX_DEFAULT_RADIUS) };
+    let before = Division::of(&plan.settings);
+    let of = if map.caustic_only { before.caustic() } else { before.global() };
+    (widest.min(MAX_DEFAULT_RADIUS) / wanted).powi(2) * of.over_usual()
 }
 
 /// Samples of all pixels, and how often they double in each tile, for a mean of so many and what each tile is to have of that.

@@ -4,15 +4,18 @@ use std::cell::Cell;
 
 use glam::DVec3;
 
-use super::{RunResult, SceneFilm, View, light, trial};
+use super::{RunResult, SceneFilm, View, light};
 use crate::constants::PART_COUNT;
-use crate::engine::{Control, bias_batches};
+use crate::engine::{self, Control, bias_batches};
 use crate::error::Result;
 use crate::gpu::Gpu;
+use crate::ledger::Fates;
+use crate::plan::radius::over_usual;
 use crate::plan::scene::{LightOf, ScenePlan};
 use crate::plan::sensor::Sensor;
+use crate::plan::work_division::{Counted, Variance};
 use crate::scene::Scene;
-use crate::settings::scene::{SAMPLES_PER_BLOCK, SceneSettings};
+use crate::settings::scene::{CAUSTIC_NEIGHBOURS, NEIGHBOURS, SAMPLES_PER_BLOCK, SceneSettings};
 use crate::settings::stop::{Measure, Stop};
 use crate::settings::tile_samples::TILE;
 
@@ -20,14 +23,18 @@ use crate::settings::tile_samples::TILE;
 const PIXELS: f64 = 1024.0;
 /// Paths through each, as many as a block of a run has at least: they are even over it, and vary less than if each was alone.
 pub const SAMPLES: u32 = SAMPLES_PER_BLOCK;
-const ROUNDS: u32 = 16;
-/// Of each map, and those within the first radius, which is wider than in a run: the bias stands out.
-pub const PHOTONS: u32 = 1 << 12;
-const NEIGHBOURS: u32 = 4;
-const CAUSTIC_NEIGHBOURS: u32 = 1;
+pub const ROUNDS: u32 = 8;
 const SEED: u64 = 0x0070_696c_6f74;
-/// Pixels that tell enough of a map, whose light varies little from one to the next.
-const PIXELS_OF_MAP: f64 = 4096.0;
+/// Pixels that tell enough of a map, whose light varies little from one to the next; and paths through each, to tell what varies from path
+/// to path from what varies with the photons.
+pub const PIXELS_OF_MAP: f64 = 4096.0;
+pub const FEW_SAMPLES: u32 = 1;
+pub const MANY_SAMPLES: u32 = 8;
+
+/// Of the variance of many paths' light, what a round's photons have at least.
+const LEAST_OF_ROUND: f64 = 0.5;
+/// A longer run knows its bias better for its noise than these rounds.
+const STEADIER: f64 = 0.6;
 
 /// What a round's parts are like: the variance of a path's light, or of a map's, and the light itself, relative to all light.
 #[derive(Clone, Copy)]
@@ -36,15 +43,38 @@ pub struct Parts {
     pub light: [f64; PART_COUNT as usize],
     /// What one pixel may have of light that its only path has missed, relative to the light of a pixel.
     pub unseen: f64,
+    pub counted: Counted,
+    /// With so many a path.
+    pub shadow_rays: u32,
 }
 
 /// What all pixels tell, relative to all light.
 pub struct OfPicture {
     /// The variance of a path, and that of each tile over their mean.
     pub paths: f64,
-    pub tiles: Vec<f64>,
-    /// Of the global and of the caustic map: the variance of a round, the light, and the bias of this light, 0 where it is not known.
-    pub maps: [[f64; 3]; 2],
+    pub tiles: Vec<OfTile>,
+    /// The global and the caustic map.
+    pub maps: [OfMap; 2],
+}
+
+#[derive(Clone, Copy, Default)]
+pub struct OfTile {
+    /// Over the mean of all tiles.
+    pub variance: f64,
+    /// The share of its pixels that show surfaces: paths that meet none cost little.
+    pub met: f64,
+}
+
+#[derive(Clone, Copy, Default)]
+pub struct OfMap {
+    /// The variance of a path, which looks the map up elsewhere each time, and of a round whatever its paths.
+    pub path: f64,
+    pub of_round: f64,
+    pub light: f64,
+    /// Of this light; `None` where it does not stand out.
+    pub bias: Option<f64>,
+    /// How well the bias's square is known, over the variance.
+    pub uncertainty: Option<f64>,
 }
 
 /// Of a run that is planned.
@@ -53,6 +83,8 @@ pub struct PilotRounds<'a> {
     pub scene: &'a Scene,
     pub view: &'a View<'a>,
     pub run: &'a ScenePlan,
+    /// Of each map.
+    pub photons: u32,
     /// Milliseconds of the device that they took.
     pub spent: Cell<f64>,
 }
@@ -60,9 +92,9 @@ pub struct PilotRounds<'a> {
 impl PilotRounds<'_> {
     /// A few pixels, spread over the picture, with a path through each and so many shadow rays.
     pub fn of_few(&self, shadow_rays: u32) -> Result<Parts> {
-        let PilotRounds { gpu, scene, view, run, .. } = *self;
+        let PilotRounds { view, run, .. } = *self;
         let seed = bias_batches::seed(SEED, 0);
-        let settings = SceneSettings { samples: SAMPLES, shadow_rays, rounds: ROUNDS, seed, ..settings(&run.settings) };
+        let settings = SceneSettings { samples: SAMPLES, shadow_rays, rounds: ROUNDS, seed, ..self.settings() };
         let (sensor, phases, footprint) = match run.sensor {
             Sensor::Picture { width, height } => {
                 let (sensor, footprint) = fewer(width, height, PIXELS);
@@ -75,9 +107,9 @@ impl PilotRounds<'_> {
             }
         };
         let view = View { phases: &phases, ..*view };
-        let mut plan = trial::plan(gpu, scene, &view, &settings, sensor)?;
-        plan.footprint = footprint;
+        let plan = ScenePlan { footprint, ..self.plan(&view, &settings, sensor)? };
         let samples = plan.samples();
+        let paths = f64::from(plan.paths()) * f64::from(ROUNDS);
         let lit = self.light(&view, plan)?;
         let error = lit.film.error(settings.stop.confidence);
         let of_round = error.noise * error.noise * f64::from(lit.film.rounds);
@@ -88,26 +120,26 @@ impl PilotRounds<'_> {
         // Without lamps and sky that are seen straight.
         let surfaces = lit.film.of_surfaces.as_ref().unwrap_or(&lit.film.of_blocks);
         let all = surfaces.sums.iter().map(|sum| *sum as f64).sum::<f64>().max(1.0);
+        let [nodes, triangles] = lit.film.visited().map(|count| count as f64 / paths);
         Ok(Parts {
             variance: [direct * of_path, specular * of_path, caustic * of_round, indirect * of_round],
             light: std::array::from_fn(|part| light[part] / all),
             unseen: error.unseen * of_unseen,
+            shadow_rays,
+            counted: Counted { nodes, nodes_of_ray: 0.0, triangles, flights: [0, 1].map(|map| flights(&lit.fates[map])) },
         })
     }
 
     /// All pixels. `None` where nothing varies.
     pub fn of_all(&self, shadow_rays: u32, rounds: u32) -> Result<Option<OfPicture>> {
-        let PilotRounds { gpu, scene, view, run, .. } = *self;
-        let maps: Vec<LightOf> = run.maps().map(|map| if map.caustic_only { LightOf::CausticMap } else { LightOf::GlobalMap }).collect();
+        let PilotRounds { view, run, .. } = *self;
         let look = |light_of: LightOf, samples: u32| {
-            let settings =
-                SceneSettings { samples, shadow_rays, rounds, seed: bias_batches::seed(SEED, 1), ..settings(&run.settings) };
+            let settings = SceneSettings { samples, shadow_rays, rounds, seed: bias_batches::seed(SEED, 1), ..self.settings() };
             let (sensor, footprint) = match (light_of, run.sensor) {
                 (LightOf::GlobalMap | LightOf::CausticMap, Sensor::Picture { width, height }) => fewer(width, height, PIXELS_OF_MAP),
                 _ => (run.sensor, 1.0),
             };
-            let mut plan = trial::plan(gpu, scene, view, &settings, sensor)?;
-            (plan.light_of, plan.footprint) = (light_of, footprint);
+            let plan = ScenePlan { light_of, footprint, ..self.plan(view, &settings, sensor)? };
             Ok(self.light(view, plan)?.film)
         };
         let mean = |film: &SceneFilm| film.surface_means().map(DVec3::element_sum).sum::<f64>() / film.pixels() as f64;
@@ -117,36 +149,87 @@ impl PilotRounds<'_> {
             all / film.pixels() as f64 * f64::from(film.rounds)
         };
         let of_paths = look(LightOf::Paths, SAMPLES)?;
-        let mut of_maps = [[0.0; 3]; 2];
-        for map in maps {
-            let film = look(map, 1)?;
-            let bias = film.error(run.settings.stop.confidence).bias.filter(|bias| bias.lower > 0.0).map_or(0.0, |bias| bias.relative);
-            of_maps[usize::from(map == LightOf::CausticMap)] = [square(&film), mean(&film), bias];
+        let mut maps = [OfMap::default(); 2];
+        for map in run.maps() {
+            let light_of = if map.caustic_only { LightOf::CausticMap } else { LightOf::GlobalMap };
+            let [few, many] = [look(light_of, FEW_SAMPLES)?, look(light_of, MANY_SAMPLES)?];
+            let squares = [square(&few), square(&many)];
+            // Many paths lie more evenly than few, so that less may be left than so many at random would leave.
+            let of_round = Variance::of_paths(squares[0], squares[1], MANY_SAMPLES).path.max(LEAST_OF_ROUND * squares[1]);
+            let path = (squares[0] - of_round).max(0.0);
+            let error = many.error(run.settings.stop.confidence);
+            let noise = error.noise * error.noise * of_round / squares[1];
+            maps[usize::from(map.caustic_only)] = OfMap {
+                path,
+                of_round,
+                light: mean(&many),
+                bias: error.bias.filter(|bias| bias.lower > 0.0).map(|bias| bias.relative),
+                uncertainty: error.bias.map(|bias| STEADIER * bias.uncertainty() / noise).filter(|uncertainty| uncertainty.is_finite()),
+            };
         }
-        let all = mean(&of_paths) + of_maps[0][1] + of_maps[1][1];
+        let all = mean(&of_paths) + maps[0].light + maps[1].light;
         if all <= 0.0 {
             return Ok(None);
         }
         let (width, height) = run.sensor.size();
         let columns = width.div_ceil(TILE);
-        let mut tiles = vec![(0.0, 0u32); (columns * height.div_ceil(TILE)) as usize];
-        for pixel in 0..of_paths.pixels() {
+        let mut tiles = vec![(0.0, 0u32, 0u32); (columns * height.div_ceil(TILE)) as usize];
+        for (pixel, light) in of_paths.surface_means().enumerate() {
             let (x, y) = (pixel as u32 % width, pixel as u32 / width);
-            let (variance, count) = &mut tiles[(y / TILE * columns + x / TILE) as usize];
+            let (variance, met, count) = &mut tiles[(y / TILE * columns + x / TILE) as usize];
             *variance += of_paths.surface_error(pixel).length_squared();
+            *met += u32::from(light != DVec3::ZERO);
             *count += 1;
         }
-        let sum = tiles.iter().map(|(variance, _)| variance).sum::<f64>() / of_paths.pixels() as f64;
+        let sum = tiles.iter().map(|(variance, ..)| variance).sum::<f64>() / of_paths.pixels() as f64;
         if sum == 0.0 {
             return Ok(None);
         }
         // The mean of three channels.
         let relative = |square: f64| 3.0 * square / (all * all);
+        let of_tile = |(variance, met, count): (f64, u32, u32)| OfTile {
+            variance: variance / f64::from(count) / sum,
+            met: f64::from(met) / f64::from(count),
+        };
         Ok(Some(OfPicture {
             paths: f64::from(SAMPLES) * relative(square(&of_paths)),
-            tiles: tiles.into_iter().map(|(variance, count)| variance / f64::from(count) / sum).collect(),
-            maps: of_maps.map(|[variance, light, bias]| [relative(variance), light / all, bias]),
+            tiles: tiles.into_iter().map(of_tile).collect(),
+            maps: maps.map(|map| OfMap {
+                path: relative(map.path),
+                of_round: relative(map.of_round),
+                light: map.light / all,
+                ..map
+            }),
         }))
+    }
+
+    /// Settings that all rounds have: whatever the run's photons are, few, and the usual number of them within the first radius.
+    pub fn settings(&self) -> SceneSettings {
+        SceneSettings {
+            tiles: None,
+            photons: self.photons,
+            caustic_photons: self.photons,
+            neighbours: NEIGHBOURS,
+            caustic_neighbours: CAUSTIC_NEIGHBOURS,
+            block: Some(1),
+            // The radii stay those of the first round.
+            alpha: 1.0,
+            stop: Stop { measure: Measure::Rmse, ..Stop::default() },
+            ..self.run.settings.clone()
+        }
+    }
+
+    /// With what the run's own trial has found.
+    fn plan(&self, view: &View, settings: &SceneSettings, sensor: Sensor) -> Result<ScenePlan> {
+        let of_run = &self.run.settings;
+        let apart = |neighbours: u32, photons: u32, caustic_only: bool| over_usual(neighbours, caustic_only) / f64::from(photons);
+        let times = [
+            apart(settings.neighbours, settings.photons, false) / apart(of_run.neighbours, of_run.photons, false),
+            apart(settings.caustic_neighbours, settings.caustic_photons, true)
+                / apart(of_run.caustic_neighbours, of_run.caustic_photons, true),
+        ];
+        let trial = self.run.trial.as_ref().map(|trial| trial.scaled(times.map(f64::sqrt)));
+        ScenePlan::with_trial(self.scene, view.geometry, settings, sensor, &engine::limits(self.gpu.facts()), trial)
     }
 
     fn light(&self, view: &View, plan: ScenePlan) -> Result<RunResult> {
@@ -156,20 +239,10 @@ impl PilotRounds<'_> {
     }
 }
 
-/// Settings that all rounds of a pilot have.
-pub fn settings(run: &SceneSettings) -> SceneSettings {
-    SceneSettings {
-        tiles: None,
-        photons: PHOTONS,
-        caustic_photons: PHOTONS,
-        neighbours: NEIGHBOURS,
-        caustic_neighbours: CAUSTIC_NEIGHBOURS,
-        block: Some(1),
-        // The radii stay those of the first round.
-        alpha: 1.0,
-        stop: Stop { measure: Measure::Rmse, ..Stop::default() },
-        ..run.clone()
-    }
+/// From one surface to the next, of each photon.
+fn flights(fates: &Fates) -> f64 {
+    let count: u64 = fates.bounces.iter().map(|bounce| bounce.stored + bounce.absorbed + bounce.escaped + bounce.dropped).sum();
+    count as f64 / fates.emitted.max(1) as f64
 }
 
 /// About so many pixels at most, spread over a picture, and the side of each over that between two.

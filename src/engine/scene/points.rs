@@ -65,12 +65,10 @@ macro_rules! camera_kernel {
 pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Result<()> {
     let Round { resources, geometry, plan, number: round } = round;
     let SceneResources { camera_paths: [camera_paths, _], camera_path_counts, .. } = resources;
-    let rays = plan.rays_per_pixel();
     let goes_on = plan.chains_go_on();
     let emitter_count = geometry.emitters.len() as u32;
     let draws = |domain| Draws { seed: words(plan.settings.seed), round, domain };
-    let pixels = plan.sensor.pixels();
-    let mut record = |commands: &mut Commands, first: u32, end: u32| {
+    let record = |commands: &mut Commands, first: u32, end: u32| {
         if goes_on {
             commands.fill(camera_path_counts, 0, 1, 0);
         }
@@ -88,8 +86,8 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                     rounding: rounding(plan, round),
                     width,
                     height,
-                    first_pixel: first,
-                    end_pixel: end,
+                    first_path: first,
+                    end_path: end,
                     eye: geometry.to_local(camera.eye),
                     forward: camera.forward.as_vec3(),
                     right: (half_width * camera.right).as_vec3(),
@@ -103,8 +101,7 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                     film_limit: plan.film.limit as f32,
                 };
                 let kernel = camera_kernel!(View, resources, next_camera_paths: camera_paths, extra_samples: &resources.extra_samples);
-                let paths_of_each = if first < pixels { plan.samples() } else { 1 };
-                commands.dispatch(kernel, &push, Extent::Items(u64::from(end - first) * u64::from(paths_of_each)))?;
+                commands.dispatch(kernel, &push, Extent::Items(u64::from(end - first)))?;
             }
             Sensor::Receivers { .. } => {
                 let receivers = &resources.receivers[round as usize % resources.receivers.len()];
@@ -130,13 +127,8 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
         }
         Ok(())
     };
-    in_pieces(commands, plan, pixels, plan.pixels_at_once(rays), 64 * u64::from(rays), &mut record)?;
-    // Extra samples, behind all pixels.
-    let rays = rays / plan.samples();
-    let most = plan.pixels_at_once(rays).min(plan.camera_paths_at_once());
-    in_pieces(commands, plan, plan.extra_samples.count, most, 64 * u64::from(rays), |commands, first, end| {
-        record(commands, pixels + first, pixels + end)
-    })
+    let work = 64 * u64::from(plan.rays_per_path());
+    in_pieces(commands, plan, plan.paths(), plan.camera_paths_at_once(), work, record)
 }
 
 /// Follows camera paths that are still under way over mirrors and glass, until none is left.

@@ -51,7 +51,7 @@ pub fn find(commands: &mut Commands, round: Round, photons: &PhotonBuffers, view
     // All points of a map whose radius is given have class 0.
     let unknown = plan.maps().filter(|map| map.classes.is_some()).map(|map| NO_CLASS << map_class(map)).sum();
     commands.fill(radius_classes, 0, u64::from(point_count), unknown);
-    in_pieces(commands, plan, point_count, plan.pixels_at_once(CLEARANCE_RAYS), CLEARANCE_WORK, |commands, first_point, end_point| {
+    in_pieces(commands, plan, point_count, plan.items_at_once(CLEARANCE_RAYS), CLEARANCE_WORK, |commands, first_point, end_point| {
         let push = ClearancePush { first_point, end_point, rank: CLEARANCE_RANK };
         commands.dispatch(Clearance { scene, visible_points, clearances }, &push, Extent::Items(u64::from(end_point - first_point)))
     })?;

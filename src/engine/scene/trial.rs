@@ -24,7 +24,7 @@ use crate::gpu::{Commands, Extent, Gpu, Kernel, Memory};
 use crate::photon::MapPhoton;
 use crate::plan::Limits;
 use crate::plan::light_choice::LightChoice;
-use crate::plan::radius::{MAX_DEFAULT_RADIUS, RADIUS_RANGE, RadiusFrom, Trial, TrialPhotons, area_radius};
+use crate::plan::radius::{RadiusFrom, Trial, TrialPhotons, TrialRadius, area_radius};
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
 use crate::records::{ClearancePush, VisiblePoint};
@@ -167,8 +167,10 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, lights: Option<Li
         let clear: Vec<f64> = asked.iter().map(|point| f64::from(clearances[*point])).collect();
         let neighbours = if map.caustic_only { run.settings.caustic_neighbours } else { run.settings.neighbours };
         let by_area = area_radius(view.geometry, of_run.photons, neighbours, map.caustic_only);
-        let radius = radius(&own, &clear, by_area);
+        let reach = reach(&own, &clear, by_area);
+        let radius = reach.radius();
         *(if map.caustic_only { &mut trial.caustic_radius } else { &mut trial.global_radius }) = Some(radius);
+        trial.reach[usize::from(map.caustic_only)] = reach;
         trial.photons[usize::from(map.caustic_only)] = TrialPhotons::some_of(found);
         if radius > largest {
             largest = radius;
@@ -207,7 +209,7 @@ fn belongs(point: &VisiblePoint, plane: u32, planes: &[Vec4], radius: f32) -> bo
 }
 
 /// The radius for all points, from those that each would have for itself and from their clearances.
-fn radius(own: &[f64], clear: &[f64], by_area: f64) -> f64 {
+fn reach(own: &[f64], clear: &[f64], by_area: f64) -> TrialRadius {
     let median = |values: Vec<f64>| {
         let mut steps: Vec<i32> = values.into_iter().map(|value| (STEPS * value.log2()).round().clamp(-1e6, 1e6) as i32).collect();
         steps.sort_unstable();
@@ -218,7 +220,7 @@ fn radius(own: &[f64], clear: &[f64], by_area: f64) -> f64 {
     let steps = reached.unwrap_or((STEPS * by_area.log2()).round());
     let room = median(clear.iter().map(|clear| CLEARANCE_SHARE * clear).collect()).unwrap_or(f64::INFINITY);
     // The median point of a caustic lies at its faint rim: what is wider than by the area is wider than need be.
-    (steps.min(room) / STEPS).exp2().min(by_area).clamp(RADIUS_RANGE.0, MAX_DEFAULT_RADIUS)
+    TrialRadius { wanted: (steps / STEPS).exp2().min(by_area), widest: (room / STEPS).exp2() }
 }
 
 #[cfg(test)]
@@ -229,6 +231,7 @@ mod tests {
 
     #[test]
     fn radii_are_medians_in_steps_and_no_wider_than_the_room() {
+        let radius = |own: &[f64], clear: &[f64], by_area: f64| reach(own, clear, by_area).radius();
         let step = |k: i32| (f64::from(k) / STEPS).exp2();
         let (near, far) = (step(-20), step(-24));
         let own = [near, 1.01 * near, 0.99 * near, far, f64::INFINITY];

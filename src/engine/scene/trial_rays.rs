@@ -23,7 +23,7 @@ pub fn cast(gpu: &Gpu, commands: &mut Commands, round: Round, points: &[Receiver
     let receivers = gpu.buffer::<Receiver>("points of the trial", points.len() as u64, Memory::Device)?;
     let trial_rays = gpu.buffer::<TrialRay>("rays of the trial", 2 * u64::from(ray_count), Memory::Device)?;
     commands.upload(&receivers, points)?;
-    in_pieces(commands, plan, ray_count, plan.pixels_at_once(2), 128, |commands, first_ray, end_ray| {
+    in_pieces(commands, plan, ray_count, plan.items_at_once(2), 128, |commands, first_ray, end_ray| {
         let nonfinite_values = &resources.nonfinite_values;
         let kernel = TrialRays { scene: &resources.scene, receivers: &receivers, trial_rays: &trial_rays, nonfinite_values };
         let push = TrialRaysPush { seed: words(plan.settings.seed), first_ray, end_ray, rays_of_point };
