@@ -61,7 +61,8 @@ fn rounds_vary_as_the_pilot_expects() {
             let measured = subject.variance(&gpu, &division.set(&few()));
             let variance = &found.rounds.variance;
             let of_paths = variance.of_paths_in_round(division);
-            let of_maps = variance.global.of_first_round(division.global()) + variance.caustic.of_first_round(division.caustic());
+            let of_maps = variance.global.of_first_round(division.global(), division.samples)
+                + variance.caustic.of_first_round(division.caustic(), division.samples);
             let expected = of_paths + of_maps;
             println!("{name}: {division:?}: {of_paths:.4} + {of_maps:.4} expected, {measured:.4} found");
             assert!((0.3..4.0).contains(&(expected / measured)), "{name}, {division:?}: {expected} of {measured}");

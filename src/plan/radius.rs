@@ -199,7 +199,8 @@ pub fn usual_radius(geometry: &Geometry, photons: f64) -> f64 {
 
 /// Radius of a map's first round, normalised, where nothing but the scene's area is known.
 pub fn area_radius(geometry: &Geometry, photons: u32, neighbours: u32, caustic_only: bool) -> f64 {
-    (usual_radius(geometry, f64::from(photons) / over_usual(neighbours, caustic_only)) * share(caustic_only)).clamp(RADIUS_RANGE.0, MAX_DEFAULT_RADIUS)
+    (usual_radius(geometry, f64::from(photons) / over_usual(neighbours, caustic_only)) * share(caustic_only))
+        .clamp(RADIUS_RANGE.0, MAX_DEFAULT_RADIUS)
 }
 
 /// Rounds of which the radius is multiplied out.

@@ -3,14 +3,13 @@
 //! After n rounds of S paths a pixel with R shadow rays each, the squared error relative to the light is taken for
 //!
 //! ```text
-//! noise of paths   (path + shadow ray / R) / (S n)
-//! noise of maps    of a round / photons in the disc x the mean of 1 / r^2 of the rounds / n
+//! noise of paths   (path + shadow ray / R^p) / (S^p n)
+//! noise of maps    of a round / (photons in the disc x S^p of the map) x the mean of 1 / r^2 of the rounds / n
 //! bias             (of a map's light x its share x the mean of r^2 to a power)^2
 //! unseen           (of a path / (samples of those that have fewest x n))^2
 //! ```
 //!
-//! with what is not known of the bias, which falls with the noise of the maps. Where a path looks a map up is chance too, which is noise of
-//! paths. Radii shrink as Knaus and Zwicker (2011) have them. Variances
+//! with what is not known of the bias, which falls with the noise of the maps. Radii shrink as Knaus and Zwicker (2011) have them. Variances
 //! are a pilot's ([`crate::engine::scene::pilot`]). Costs are those of a class of devices and no run's own times, so that the same
 //! is chosen on each device of its class.
 
@@ -99,14 +98,15 @@ pub struct Variance {
 /// The same of a map at its first radius.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct MapVariance {
-    /// With these photons; none without a map.
+    /// With these photons and a path; none without a map.
     pub of_round: f64,
     pub at: PhotonsOfMap,
+    /// By which the variance falls with the paths of a pixel, which look the map up at several places.
+    pub sample_power: f64,
     /// The share of all light that the map gives.
     pub share: f64,
-    /// The bias of that light relative to it at the same radius, and what is taken for it at the usual radius where it is not known.
-    pub bias: Option<f64>,
-    pub usual_bias: f64,
+    /// The bias of that light at the usual radius, relative to it.
+    pub bias: f64,
     /// How well the bias's square is known, over the variance of the light.
     pub uncertainty: f64,
     /// The square of the widest first radius over that of the usual photons and neighbours; `None` where it is given, whatever the photons.
@@ -133,16 +133,27 @@ impl MapVariance {
 
     /// The bias of all light for a squared radius over the usual one.
     fn bias(&self, squared_radius: f64) -> f64 {
-        let (found, at) = self.bias.map_or((self.usual_bias, 1.0), |bias| (bias, self.squared_radius(self.at)));
-        found * self.share * (squared_radius / at).powf(BIAS_POWER)
+        self.bias * self.share * squared_radius.powf(BIAS_POWER)
+    }
+
+    /// Weighs the square of a bias that was found for this map's photons, and how well it is known, against the usual one's.
+    pub fn learn_bias(&mut self, found: f64, uncertainty: f64) {
+        let at_usual = self.squared_radius(self.at).powf(-2.0 * BIAS_POWER);
+        // The interval reaches two deviations to either side.
+        let [found, uncertainty] = [found * found, 0.5 * uncertainty].map(|square| FOUND_BIAS * at_usual * square);
+        let usual = self.bias * self.bias;
+        let [of_found, of_usual] = [uncertainty, USUAL_SPREAD * usual].map(|spread| spread.powi(-2));
+        if uncertainty > 0.0 {
+            self.bias = ((found * of_found + usual * of_usual) / (of_found + of_usual)).sqrt();
+        }
     }
 
     /// The variance of the first round's light.
-    pub fn of_first_round(&self, of: PhotonsOfMap) -> f64 {
+    pub fn of_first_round(&self, of: PhotonsOfMap, samples: u32) -> f64 {
         let hits = |of: PhotonsOfMap| f64::from(of.photons) * self.squared_radius(of);
         match self.of_round {
             0.0 => 0.0,
-            found => found * hits(self.at) / hits(of),
+            found => found * hits(self.at) / hits(of) * f64::from(samples).powf(-self.sample_power),
         }
     }
 
@@ -296,9 +307,12 @@ pub fn cost(plan: &ScenePlan, counted: &Counted, kind: &str) -> Cost {
 
 /// Photons and radius at which [`BIAS`] is: with [`NEIGHBOURS`].
 const USUAL_PHOTONS: f64 = 131_072.0;
-/// The bias of light from the global and the caustic map at the usual first radius, relative to it, where it does not stand out: of ten
-/// scenes 0.3 to 3 % and 2 to 20 %.
-pub const USUAL_BIAS: [f64; 2] = [0.015, 0.06];
+/// The bias of light from the global and the caustic map at the usual first radius, relative to it, where nothing is known: of ten scenes
+/// 0.3 to 3 % and 4 to 90 %; and the spread of its square.
+pub const USUAL_BIAS: [f64; 2] = [0.015, 0.12];
+const USUAL_SPREAD: f64 = 4.0;
+/// The square of a run's bias over that of a pilot's, whose radii fit the density of photons worse.
+const FOUND_BIAS: f64 = 0.5;
 /// How well its square is known, over the variance of the light: a Student's quantile of what some 1000 discs tell that have no photon in
 /// common, at two radii.
 pub const USUAL_UNCERTAINTY: f64 = 0.2;
@@ -353,7 +367,7 @@ impl Rounds {
             if !map.has_photons() {
                 continue;
             }
-            let noise = map.of_first_round(of) * of_radii;
+            let noise = map.of_first_round(of, division.samples) * of_radii;
             of_maps += noise;
             unknown += noise * map.uncertainty;
             bias += map.bias(map.squared_radius(of) * shrunk);
@@ -432,8 +446,7 @@ pub fn best(rounds: &Rounds, before: Division, free: Free, stop: &Stop, (most_sa
     let photons = powers(free.photons && global.has_photons(), LEAST_PHOTONS, most_photons, before.photons);
     let caustic_photons = powers(free.caustic_photons && caustic.has_photons(), LEAST_PHOTONS, most_photons, before.caustic_photons);
     let neighbours = if free.neighbours { CHOICE_OF_NEIGHBOURS.to_vec() } else { vec![before.neighbours] };
-    let caustic_neighbours =
-        if free.caustic_neighbours { CHOICE_OF_CAUSTIC_NEIGHBOURS.to_vec() } else { vec![before.caustic_neighbours] };
+    let caustic_neighbours = if free.caustic_neighbours { CHOICE_OF_CAUSTIC_NEIGHBOURS.to_vec() } else { vec![before.caustic_neighbours] };
     let samples = powers(free.samples, 1, most_samples, before.samples);
     let shadow_rays = powers(free.shadow_rays, 1, MOST_SHADOW_RAYS, before.shadow_rays);
     let pairs = |some: &[u32], others: &[u32]| -> Vec<(u32, u32)> {
@@ -528,9 +541,9 @@ mod tests {
         let of_map = |of_round: f64, share: f64| MapVariance {
             of_round,
             at: BEFORE.global(),
+            sample_power: 0.0,
             share,
-            bias: None,
-            usual_bias: USUAL_BIAS[0],
+            bias: USUAL_BIAS[0],
             uncertainty: USUAL_UNCERTAINTY,
             widest: Some(100.0),
         };
@@ -544,6 +557,7 @@ mod tests {
         let set = MapVariance { widest: None, ..of_map(0.05, 0.5) };
         let twice = PhotonsOfMap { photons: 1 << 18, ..BEFORE.global() };
         let few = PhotonsOfMap { neighbours: 0.1, ..twice };
-        assert_eq!((set.of_first_round(few), of_map(0.05, 0.5).of_first_round(twice)), (0.025, 0.05));
+        assert_eq!((set.of_first_round(few, 8), of_map(0.05, 0.5).of_first_round(twice, 8)), (0.025, 0.05));
+        assert_eq!(MapVariance { sample_power: 1.0, ..set }.of_first_round(few, 8), 0.025 / 8.0);
     }
 }

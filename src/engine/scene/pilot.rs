@@ -18,7 +18,8 @@ use crate::plan::radius::{MAX_DEFAULT_RADIUS, RadiusFrom, TrialRadius};
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
 use crate::plan::work_division::{
-    Cost, Counted, Division, Free, MOST_PHOTONS, MOST_SAMPLES, MapVariance, Rounds, USUAL_BIAS, USUAL_UNCERTAINTY, Variance, best, cost, of_samples, pilot_photons,
+    Cost, Counted, Division, Free, MOST_PHOTONS, MOST_SAMPLES, MapVariance, Rounds, USUAL_BIAS, USUAL_UNCERTAINTY, Variance, best, cost,
+    of_samples, pilot_photons,
 };
 use crate::scene::Scene;
 use crate::settings::scene::{SAMPLES_PER_BLOCK, SceneSettings};
@@ -107,10 +108,16 @@ pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Fre
             let of_rays = of_samples(first.shadow_rays);
             known.shadow_ray = known.shadow_ray.min(seen.paths / of_rays);
             known.path = seen.paths - known.shadow_ray * of_rays;
-            for (map, found) in [&mut known.global, &mut known.caustic].into_iter().zip(seen.maps).filter(|(map, _)| map.at.photons > 0) {
-                known.path += found.path * of_samples(SAMPLES) * f64::from(SAMPLES);
-                (map.of_round, map.share, map.bias) = (found.of_round, found.light, found.bias);
-                map.uncertainty = found.uncertainty.unwrap_or(map.uncertainty);
+            for (is_caustic, (map, found)) in
+                [false, true].into_iter().zip([&mut known.global, &mut known.caustic].into_iter().zip(seen.maps))
+            {
+                if map.at.photons == 0 {
+                    continue;
+                }
+                (map.of_round, map.sample_power, map.share) = (found.of_round, found.sample_power, found.light);
+                map.uncertainty = found.over_noise.unwrap_or(map.uncertainty);
+                map.bias = USUAL_BIAS[usize::from(is_caustic)];
+                map.learn_bias(found.bias, found.uncertainty);
             }
             found = Some(seen.tiles);
             least = 4 * count;
@@ -119,6 +126,9 @@ pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Fre
         if let Some(tiles) = &tiles {
             rounds.variance.path *= tiles.variance;
             rounds.variance.shadow_ray *= tiles.variance;
+            for map in [&mut rounds.variance.global, &mut rounds.variance.caustic] {
+                map.of_round *= tiles.variance.powf(map.sample_power.min(1.0));
+            }
             let chains = if plan.constant("HAS_SPECULAR_CHAINS") != 0 { OF_CHAINS } else { 1.0 };
             rounds.cost.paths *= chains * tiles.cost;
             rounds.cost.shadow_rays *= tiles.cost;
@@ -151,22 +161,24 @@ fn known(looks: &PilotRounds, of_many: &Parts, of_one: Option<&Parts>, kind: &st
     let (at, many) = (Division::of(&looks.settings()), of_many.shadow_rays);
     // What is seen, straight or over mirrors and glass, is found anew by each path; light from maps varies with the photons.
     let of_paths = |part: usize| match of_one {
-        Some(of_one) => Variance::of_paths(of_one.variance[part], of_many.variance[part], many),
+        Some(of_one) => Variance::of_paths(RARE * of_one.variance[part], RARE * of_many.variance[part], many),
         // Of direct light about half.
         None if part == 0 && plan.shadow_rays() != 0 => {
-            let half = 0.5 * of_many.variance[part];
+            let half = 0.5 * RARE * of_many.variance[part];
             Variance { path: half, shadow_ray: half / of_samples(many), ..Variance::default() }
         }
-        None => Variance { path: of_many.variance[part], ..Variance::default() },
+        None => Variance { path: RARE * of_many.variance[part], ..Variance::default() },
     };
     let of_map = |part: usize, caustic_only: bool| {
         let Some(map) = plan.maps().find(|map| map.caustic_only == caustic_only) else { return MapVariance::default() };
+        let sample_power = USUAL_POWERS[usize::from(caustic_only)];
         MapVariance {
-            of_round: of_one.map_or(of_many.variance[part], |of_one| 0.5 * (of_one.variance[part] + of_many.variance[part])),
+            of_round: of_one.map_or(of_many.variance[part], |of_one| 0.5 * (of_one.variance[part] + of_many.variance[part]))
+                * f64::from(SAMPLES).powf(sample_power),
+            sample_power,
             at: if caustic_only { at.caustic() } else { at.global() },
             share: of_many.light[part],
-            bias: None,
-            usual_bias: USUAL_BIAS[usize::from(caustic_only)],
+            bias: USUAL_BIAS[usize::from(caustic_only)],
             uncertainty: USUAL_UNCERTAINTY,
             widest: (map.radius_from != RadiusFrom::User).then(|| widest(plan, map)),
         }
@@ -174,7 +186,7 @@ fn known(looks: &PilotRounds, of_many: &Parts, of_one: Option<&Parts>, kind: &st
     let (direct, specular, caustic, global) = (of_paths(0), of_paths(1), of_map(2, true), of_map(3, false));
     let variance = Variance { path: direct.path + specular.path, shadow_ray: direct.shadow_ray + specular.shadow_ray, global, caustic };
     let varies = |of: Variance| of.path + of.shadow_ray * of_samples(before.shadow_rays);
-    let parts = [varies(direct), varies(specular), caustic.of_first_round(before.caustic()), global.of_first_round(before.global())];
+    let parts = [varies(direct), varies(specular), caustic.of_first_round(before.caustic(), 1), global.of_first_round(before.global(), 1)];
     let all: f64 = parts.iter().sum();
     if all <= 0.0 || !all.is_finite() {
         return None;
@@ -198,6 +210,10 @@ fn goal_nanoseconds(rounds: &Rounds, division: Division, stop: &Stop) -> f64 {
     stop.error.map_or(f64::INFINITY, |error| rounds.until(division, error).1).min(seconds)
 }
 
+/// By which powers of a pixel's paths the variance of the global and the caustic map falls, where it was not measured.
+const USUAL_POWERS: [f64; 2] = [0.0, 1.0];
+/// Few pixels seldom show rare light: the variance over what most of them find.
+const RARE: f64 = 1.4;
 /// A look takes less than a run over this.
 const LEAST_LOOKS: f64 = 4.0;
 

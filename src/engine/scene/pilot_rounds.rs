@@ -13,7 +13,7 @@ use crate::ledger::Fates;
 use crate::plan::radius::over_usual;
 use crate::plan::scene::{LightOf, ScenePlan};
 use crate::plan::sensor::Sensor;
-use crate::plan::work_division::{Counted, Variance};
+use crate::plan::work_division::Counted;
 use crate::scene::Scene;
 use crate::settings::scene::{CAUSTIC_NEIGHBOURS, NEIGHBOURS, SAMPLES_PER_BLOCK, SceneSettings};
 use crate::settings::stop::{Measure, Stop};
@@ -31,8 +31,8 @@ pub const PIXELS_OF_MAP: f64 = 4096.0;
 pub const FEW_SAMPLES: u32 = 1;
 pub const MANY_SAMPLES: u32 = 8;
 
-/// Of the variance of many paths' light, what a round's photons have at least.
-const LEAST_OF_ROUND: f64 = 0.5;
+/// Paths of a pixel that look a map up at places of their own tell as much as so many photons, and lie evenly.
+const MOST_POWER: f64 = 1.5;
 /// A longer run knows its bias better for its noise than these rounds.
 const STEADIER: f64 = 0.6;
 
@@ -67,14 +67,14 @@ pub struct OfTile {
 
 #[derive(Clone, Copy, Default)]
 pub struct OfMap {
-    /// The variance of a path, which looks the map up elsewhere each time, and of a round whatever its paths.
-    pub path: f64,
+    /// The variance of a round with one path a pixel, and by which power of the paths it falls.
     pub of_round: f64,
+    pub sample_power: f64,
     pub light: f64,
-    /// Of this light; `None` where it does not stand out.
-    pub bias: Option<f64>,
-    /// How well the bias's square is known, over the variance.
-    pub uncertainty: Option<f64>,
+    /// The bias of this light; and how well its square is known, and this over the variance.
+    pub bias: f64,
+    pub uncertainty: f64,
+    pub over_noise: Option<f64>,
 }
 
 /// Of a run that is planned.
@@ -154,17 +154,16 @@ impl PilotRounds<'_> {
             let light_of = if map.caustic_only { LightOf::CausticMap } else { LightOf::GlobalMap };
             let [few, many] = [look(light_of, FEW_SAMPLES)?, look(light_of, MANY_SAMPLES)?];
             let squares = [square(&few), square(&many)];
-            // Many paths lie more evenly than few, so that less may be left than so many at random would leave.
-            let of_round = Variance::of_paths(squares[0], squares[1], MANY_SAMPLES).path.max(LEAST_OF_ROUND * squares[1]);
-            let path = (squares[0] - of_round).max(0.0);
+            let power = (squares[0] / squares[1]).log2() / f64::from(MANY_SAMPLES).log2();
             let error = many.error(run.settings.stop.confidence);
-            let noise = error.noise * error.noise * of_round / squares[1];
+            let uncertainty = error.bias.map_or(f64::INFINITY, |bias| bias.uncertainty());
             maps[usize::from(map.caustic_only)] = OfMap {
-                path,
-                of_round,
+                of_round: squares[0],
+                sample_power: if power.is_finite() { power.clamp(0.0, MOST_POWER) } else { 0.0 },
                 light: mean(&many),
-                bias: error.bias.filter(|bias| bias.lower > 0.0).map(|bias| bias.relative),
-                uncertainty: error.bias.map(|bias| STEADIER * bias.uncertainty() / noise).filter(|uncertainty| uncertainty.is_finite()),
+                bias: error.bias.map_or(0.0, |bias| bias.relative),
+                uncertainty,
+                over_noise: Some(STEADIER * uncertainty / (error.noise * error.noise)).filter(|over| over.is_finite()),
             };
         }
         let all = mean(&of_paths) + maps[0].light + maps[1].light;
@@ -194,23 +193,19 @@ impl PilotRounds<'_> {
         Ok(Some(OfPicture {
             paths: f64::from(SAMPLES) * relative(square(&of_paths)),
             tiles: tiles.into_iter().map(of_tile).collect(),
-            maps: maps.map(|map| OfMap {
-                path: relative(map.path),
-                of_round: relative(map.of_round),
-                light: map.light / all,
-                ..map
-            }),
+            maps: maps.map(|map| OfMap { of_round: relative(map.of_round), light: map.light / all, ..map }),
         }))
     }
 
-    /// Settings that all rounds have: whatever the run's photons are, few, and the usual number of them within the first radius.
+    /// Settings that all rounds have: whatever the run's photons are, few, and more than usual within the first radius, so that the bias
+    /// stands out.
     pub fn settings(&self) -> SceneSettings {
         SceneSettings {
             tiles: None,
             photons: self.photons,
             caustic_photons: self.photons,
-            neighbours: NEIGHBOURS,
-            caustic_neighbours: CAUSTIC_NEIGHBOURS,
+            neighbours: 2 * NEIGHBOURS,
+            caustic_neighbours: 2 * CAUSTIC_NEIGHBOURS,
             block: Some(1),
             // The radii stay those of the first round.
             alpha: 1.0,

@@ -1,10 +1,10 @@
 //! A bench as text: the device's rates, every pass with its limit, and the targets.
 
-use super::{Bench, tuning};
 use super::pass::Pass;
 use super::rates::Rates;
 use super::scale::{Growth, PassTime, Series};
 use super::targets::{Finding, Wanted};
+use super::{Bench, tuning};
 use crate::output::command::lower_case;
 use crate::timings::Spread;
 

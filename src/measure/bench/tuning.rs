@@ -153,7 +153,8 @@ fn evenly(number: u32) -> Division {
 }
 
 fn division(exponents: &[u32]) -> Division {
-    let [samples, shadow_rays, photons, caustic_photons, neighbours, caustic_neighbours] = std::array::from_fn(|place| 1 << exponents[place]);
+    let [samples, shadow_rays, photons, caustic_photons, neighbours, caustic_neighbours] =
+        std::array::from_fn(|place| 1 << exponents[place]);
     Division { samples, shadow_rays, photons, caustic_photons, neighbours, caustic_neighbours }
 }
 
