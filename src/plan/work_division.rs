@@ -136,15 +136,18 @@ impl MapVariance {
         self.bias * self.share * squared_radius.powf(BIAS_POWER)
     }
 
-    /// Weighs the square of a bias that was found for this map's photons, and how well it is known, against the usual one's.
-    pub fn learn_bias(&mut self, found: f64, uncertainty: f64) {
-        let at_usual = self.squared_radius(self.at).powf(-2.0 * BIAS_POWER);
+    /// Weighs the square of a bias that was found for this map's photons, and how well it is known, against that of the usual one, of which
+    /// `share` is left in a run. One that is too small makes a run much longer, and one that is too large a little: so it is taken for half
+    /// a deviation more.
+    pub fn learn_bias(&mut self, found: f64, uncertainty: f64, share: f64) {
+        let at_usual = share * self.squared_radius(self.at).powf(-2.0 * BIAS_POWER);
         // The interval reaches two deviations to either side.
-        let [found, uncertainty] = [found * found, 0.5 * uncertainty].map(|square| FOUND_BIAS * at_usual * square);
+        let [found, deviation] = [found * found, 0.5 * uncertainty].map(|square| at_usual * square);
         let usual = self.bias * self.bias;
-        let [of_found, of_usual] = [uncertainty, USUAL_SPREAD * usual].map(|spread| spread.powi(-2));
-        if uncertainty > 0.0 {
-            self.bias = ((found * of_found + usual * of_usual) / (of_found + of_usual)).sqrt();
+        let [of_found, of_usual] = [deviation, USUAL_SPREAD * usual].map(|deviation| deviation.powi(-2));
+        if deviation > 0.0 {
+            let both = of_found + of_usual;
+            self.bias = ((found * of_found + usual * of_usual) / both + 0.5 * both.powf(-0.5)).sqrt();
         }
     }
 
@@ -310,9 +313,9 @@ const USUAL_PHOTONS: f64 = 131_072.0;
 /// The bias of light from the global and the caustic map at the usual first radius, relative to it, where nothing is known: of ten scenes
 /// 0.3 to 3 % and 4 to 90 %; and the spread of its square.
 pub const USUAL_BIAS: [f64; 2] = [0.015, 0.12];
-const USUAL_SPREAD: f64 = 4.0;
-/// The square of a run's bias over that of a pilot's, whose radii fit the density of photons worse.
-const FOUND_BIAS: f64 = 0.5;
+const USUAL_SPREAD: f64 = 2.0;
+/// The square of a run's bias over that of a pilot's, whose radii fit the density of a caustic's photons worse.
+pub const FOUND_BIAS: [f64; 2] = [1.0, 0.5];
 /// How well its square is known, over the variance of the light: a Student's quantile of what some 1000 discs tell that have no photon in
 /// common, at two radii.
 pub const USUAL_UNCERTAINTY: f64 = 0.2;

@@ -18,8 +18,8 @@ use crate::plan::radius::{MAX_DEFAULT_RADIUS, RadiusFrom, TrialRadius};
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
 use crate::plan::work_division::{
-    Cost, Counted, Division, Free, MOST_PHOTONS, MOST_SAMPLES, MapVariance, Rounds, USUAL_BIAS, USUAL_UNCERTAINTY, Variance, best, cost,
-    of_samples, pilot_photons,
+    Cost, Counted, Division, FOUND_BIAS, Free, MOST_PHOTONS, MOST_SAMPLES, MapVariance, Rounds, USUAL_BIAS, USUAL_UNCERTAINTY, Variance,
+    best, cost, of_samples, pilot_photons,
 };
 use crate::scene::Scene;
 use crate::settings::scene::{SAMPLES_PER_BLOCK, SceneSettings};
@@ -117,7 +117,7 @@ pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Fre
                 (map.of_round, map.sample_power, map.share) = (found.of_round, found.sample_power, found.light);
                 map.uncertainty = found.over_noise.unwrap_or(map.uncertainty);
                 map.bias = USUAL_BIAS[usize::from(is_caustic)];
-                map.learn_bias(found.bias, found.uncertainty);
+                map.learn_bias(found.bias, found.uncertainty, FOUND_BIAS[usize::from(is_caustic)]);
             }
             found = Some(seen.tiles);
             least = 4 * count;
@@ -174,6 +174,7 @@ fn known(looks: &PilotRounds, of_many: &Parts, of_one: Option<&Parts>, kind: &st
         let sample_power = USUAL_POWERS[usize::from(caustic_only)];
         MapVariance {
             of_round: of_one.map_or(of_many.variance[part], |of_one| 0.5 * (of_one.variance[part] + of_many.variance[part]))
+                * RARE
                 * f64::from(SAMPLES).powf(sample_power),
             sample_power,
             at: if caustic_only { at.caustic() } else { at.global() },
@@ -230,7 +231,7 @@ const LEAST_COST: f64 = 0.1;
 const PICTURE_ROUNDS: u32 = 4;
 const MOST_PICTURE_ROUNDS: u32 = 64;
 const PICTURE_SHARE: f64 = 0.05;
-const LEAST_PICTURE: f64 = 4.0;
+const LEAST_PICTURE: f64 = 6.0;
 /// Of the mean, what a tile is taken to have that showed nothing.
 const HIDDEN: f64 = 0.1;
 
