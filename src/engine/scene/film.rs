@@ -167,7 +167,7 @@ impl SceneFilm {
     }
 
     /// Samples that met a surface, over those of a pixel: as many pixels as show surfaces, by their shares.
-    fn pixels_of_surfaces(&self) -> f64 {
+    pub fn pixels_of_surfaces(&self) -> f64 {
         if self.of_surfaces.is_none() {
             return self.pixels() as f64;
         }

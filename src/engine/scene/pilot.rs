@@ -115,7 +115,8 @@ pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Fre
                     continue;
                 }
                 (map.of_round, map.sample_power, map.share) = (found.of_round, found.sample_power, found.light);
-                map.uncertainty = found.over_noise.unwrap_or(map.uncertainty);
+                // Little is found of it in few rounds.
+                map.uncertainty = found.over_noise.map_or(USUAL_UNCERTAINTY, |found| (found * USUAL_UNCERTAINTY).sqrt());
                 map.bias = USUAL_BIAS[usize::from(is_caustic)];
                 map.learn_bias(found.bias, found.uncertainty, FOUND_BIAS[usize::from(is_caustic)]);
             }

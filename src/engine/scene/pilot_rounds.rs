@@ -32,7 +32,7 @@ pub const FEW_SAMPLES: u32 = 1;
 pub const MANY_SAMPLES: u32 = 8;
 
 /// Paths of a pixel that look a map up at places of their own tell as much as so many photons, and lie evenly.
-const MOST_POWER: f64 = 1.5;
+const MOST_POWER: f64 = 1.35;
 /// A longer run knows its bias better for its noise than these rounds.
 const STEADIER: f64 = 0.6;
 
@@ -184,8 +184,9 @@ impl PilotRounds<'_> {
         if sum == 0.0 {
             return Ok(None);
         }
-        // The mean of three channels.
-        let relative = |square: f64| 3.0 * square / (all * all);
+        // The mean of three channels, and of pixels that show surfaces.
+        let of_surfaces = of_paths.pixels_of_surfaces() / of_paths.pixels() as f64;
+        let relative = |square: f64| 3.0 * of_surfaces * square / (all * all);
         let of_tile = |(variance, met, count): (f64, u32, u32)| OfTile {
             variance: variance / f64::from(count) / sum,
             met: f64::from(met) / f64::from(count),
