@@ -87,6 +87,22 @@ fn a_small_bench_reports_every_pass_and_target() {
     }
 }
 
+/// A few settings are tried, and what a pilot chooses stands beside the best of them.
+#[test]
+fn tuning_compares_what_a_pilot_chooses_with_a_search() {
+    let Some((_, found)) = bench(&[Experiment::Tuning], |_| {}, false) else { return };
+    let [tuned] = &found.tuning[..] else { panic!("{:?}", found.tuning) };
+    assert!(tuned.scene == "cornell-spheres" && (2..=4).contains(&tuned.tried.len()) && tuned.goals.len() == 1, "{tuned:?}");
+    let settings: Vec<_> = tuned.tried.iter().map(|tried| tried.settings).collect();
+    assert!(settings.iter().all(|one| settings.iter().filter(|other| *other == one).count() == 1), "{settings:?}");
+    let [goal] = &tuned.goals[..] else { unreachable!() };
+    assert!(goal.chosen.pilot_ms > 0.0 && goal.chosen.ms.is_some_and(|ms| ms > 0.0), "{goal:?}");
+    let best = tuned.tried.iter().filter_map(|tried| tried.ms[0]).reduce(f64::min);
+    assert_eq!(goal.best.map(|(ms, _)| ms), best);
+    let line = table::text(&found).lines().find(|line| line.starts_with("cornell-spheres")).unwrap().to_owned();
+    assert!(line.contains(&format!("{:.1}", goal.chosen.pilot_ms)), "{line}");
+}
+
 /// Launches that the roofline counts are those of the run, of every outermost pass.
 #[test]
 fn the_roofline_counts_every_dispatch() {

@@ -75,7 +75,7 @@ fn rounds_vary_as_the_pilot_expects() {
 fn what_is_set_stays_and_the_rest_is_chosen_alike_each_time() {
     let Some(gpu) = device() else { return };
     let subject = Subject::new("cornell-spheres");
-    let goal = |error, seconds| SceneSettings { stop: Stop { error, seconds, ..Stop::default() }, ..few() };
+    let goal = |error, seconds| SceneSettings { stop: Stop { error, seconds, ..Stop::default() }, ..SceneSettings::default() };
     let fine = goal(Some(0.01), None);
     let found = subject.chosen(&gpu, &fine, Free::ALL).unwrap();
     assert!(found.tiles.is_some() && found.gain(&fine.stop) > 2.0, "{}: {found:?}", found.gain(&fine.stop));
@@ -91,6 +91,56 @@ fn what_is_set_stays_and_the_rest_is_chosen_alike_each_time() {
     let coarse = subject.chosen(&gpu, &goal(Some(0.3), None), Free::ALL).unwrap();
     let [rough, good] = [(&coarse, 0.3), (&found, 0.01)].map(|(pilot, error)| pilot.rounds.until(pilot.chosen, error));
     assert!(rough.0 >= 16.0 && rough.1 < 0.1 * good.1, "{rough:?} {good:?}");
+}
+
+/// The time of the device until an error, that of the pilot included, and rounds.
+#[test]
+fn what_a_pilot_chooses_is_faster_and_takes_about_the_rounds_that_it_expects() {
+    let Some(gpu) = device() else { return };
+    for name in ["open-box", "cornell", "cornell-spheres"] {
+        let subject = Subject::new(name);
+        let usual = SceneSettings {
+            rounds: 1 << 12,
+            stop: Stop { error: Some(0.2), seconds: Some(60.0), ..Stop::default() },
+            ..SceneSettings::default()
+        };
+        let pilot = subject.chosen(&gpu, &usual, Free::ALL).unwrap();
+        let camera = subject.scene.first_camera();
+        let view = subject.view(&camera);
+        let [(chosen, rounds), (before, _)] = [pilot.set(&usual), usual.clone()].map(|settings| {
+            let plan = trial::plan(&gpu, &subject.scene, &view, &settings, square_picture(SIZE)).unwrap();
+            let lit = light(&gpu, &view, plan, &mut Control::default()).unwrap();
+            (lit.timings.row("round").unwrap().gpu_ms.unwrap(), f64::from(lit.film.rounds))
+        });
+        let (expected, _) = pilot.rounds.until(pilot.chosen, 0.2);
+        println!("{name}: {chosen:.0} + {:.0} of {before:.0} ms, {rounds} of {expected:.0} rounds", pilot.spent);
+        assert!(chosen + pilot.spent < before, "{name}: {chosen} ms and {} for the pilot, {before} as usual", pilot.spent);
+        assert!((0.3..3.0).contains(&(rounds / expected)), "{name}: {rounds} rounds, {expected} expected");
+    }
+}
+
+/// Nodes that rays visit: more shadow rays more of them, each path about as many, and whatever is dispatched at once.
+#[test]
+fn what_paths_meet_is_counted() {
+    let Some(gpu) = device() else { return };
+    let subject = Subject::new("cornell-spheres");
+    let camera = subject.scene.first_camera();
+    let view = subject.view(&camera);
+    let counted = |samples: u32, shadow_rays: u32, is_split: bool| {
+        let settings = SceneSettings { samples, shadow_rays, rounds: 4, block: Some(1), stop: Stop::default(), ..few() };
+        let mut plan = trial::plan(&gpu, &subject.scene, &view, &settings, square_picture(SIZE)).unwrap();
+        if is_split {
+            plan.work_per_submission = 1;
+        }
+        let [nodes, triangles] = light(&gpu, &view, plan, &mut Control::default()).unwrap().film.visited();
+        let paths = f64::from(4 * samples * SIZE * SIZE);
+        (nodes as f64 / paths, triangles)
+    };
+    let (one, triangles) = counted(1, 1, false);
+    assert!(one > 2.0 && triangles > 0, "{one} nodes a path, {triangles} triangles");
+    assert_eq!(counted(1, 1, true), (one, triangles));
+    let (more_paths, more_rays) = (counted(4, 1, false).0, counted(1, 4, false).0);
+    assert!((more_paths / one - 1.0).abs() < 0.1 && more_rays > 1.2 * one, "{one}, {more_paths}, {more_rays}");
 }
 
 /// The program takes what a pilot finds where an error ends the run and nothing is set, and goes on with it.
@@ -163,7 +213,7 @@ fn tiles_with_more_samples_change_no_mean() {
 fn settings_are_kept_in_a_file() {
     let Some(_) = device() else { return };
     let place = Place::new();
-    let line = "render cornell-spheres --size 24x24 --error 20%";
+    let line = "render cornell-spheres --size 24x24 --error 12%";
     place.succeed(&format!("{line} -o a.exr --save-settings s.json --checkpoint a.pms"));
     let chosen = place.json("s.json");
     assert!(chosen["rounds"].as_u64().unwrap() >= 16 && chosen["tiles"].is_array(), "{chosen}");
@@ -181,7 +231,7 @@ fn settings_are_kept_in_a_file() {
     place.succeed("render cornell-spheres --size 24x24 --settings s.json -o whole.exr -q");
     assert!(bytes("merged.exr") == bytes("whole.exr"));
     // A checkpoint carries all of it.
-    place.succeed("render cornell-spheres --size 24x24 --error 19% -o c.exr --json c.json --resume a.pms -q");
+    place.succeed("render cornell-spheres --size 24x24 --error 11% -o c.exr --json c.json --resume a.pms -q");
     assert_eq!(place.json("c.json")["settings"]["tiles"], chosen["tiles"]);
     let (_, stderr) = place.succeed("render cornell --size 24x24 --settings s.json --rounds 1 -o d.exr");
     assert!(stderr.contains("warning: --settings: chosen for cornell-spheres, which was another scene"), "{stderr}");

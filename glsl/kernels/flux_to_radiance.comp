@@ -127,6 +127,9 @@ void main()
         first_arrival = 0;
     }
     float global_area = 0.0; // 0: not known yet
+    // Triangles that discs of lit points were cut to: which points that are not lit are looked at too depends on rounds before.
+    uint triangle_count = 0;
+    uint of_global_area = 0;
     // The area of what nothing is found in costs as much as any: rounds 0, 1, 2, 4, 8 and so on are enough to know it.
     bool looks_at_misses = (push.round & (push.round - 1)) == 0;
     for (uint arrival = first_arrival; arrival < 3; arrival++) {
@@ -150,25 +153,31 @@ void main()
         }
         float for_all = !is_caustic && (point.arrivals & SEEN_FOR_ALL) != 0 ? float(samples_of(pixel)) : 1.0;
         float area = is_caustic ? 0.0 : global_area;
+        uint of_area = is_caustic ? 0 : of_global_area;
         float widest = is_caustic ? push.caustic_radius : push.global_radius;
         if (area == 0.0) {
             vec3 near_flux = vec3(0.0);
             if (HAS_DIFFERENCES) {
                 near_flux = near_flux_of(place, is_caustic);
             }
+            triangles_found = 0;
             vec2 areas = areas_around(point, place, is_caustic, near_flux != vec3(0.0));
+            of_area = triangles_found;
             area = areas.x;
             if (near_flux != vec3(0.0)) {
                 change += for_all * point.weight * (near_flux * density_in(areas.y, is_caustic));
             }
         }
         global_area = is_caustic ? global_area : area;
+        of_global_area = is_caustic ? of_global_area : of_area;
         float density = density_in(area, is_caustic);
         vec3 one_photon = for_all * point.weight * (density * widest * widest);
         if (flux == vec3(0.0)) {
             note_miss(pixel, kind, one_photon);
             continue;
         }
+        triangle_count += of_area;
+        of_global_area = is_caustic ? of_global_area : 0;
         if (!is_caustic && !is_reached(pixel, HIT_BRIGHT_PHOTON)) {
             note_brightness(pixel, flux, one_photon);
         }
@@ -191,7 +200,7 @@ void main()
     for (uint part = 0; part < PART_COUNT; part++) {
         add_part_total(part, totals[part]);
     }
-    uint triangle_count = subgroupAdd(triangles_found);
+    triangle_count = subgroupAdd(triangle_count);
     if (subgroupElect() && triangle_count != 0) {
         add_to_anomaly(12, triangle_count);
     }

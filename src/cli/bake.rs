@@ -114,6 +114,7 @@ pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
         free: Free { samples: false, ..args.transport.free() },
         chosen: None,
         save_settings: None,
+        explain: args.messages.explain,
         point: "texel",
     };
     let mut gpus = args.device.open(&reporter)?;

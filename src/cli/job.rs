@@ -37,7 +37,7 @@ use crate::text::counted;
 /// What a run prints.
 #[derive(Args)]
 pub(super) struct MessageArgs {
-    /// Also print which effects were kept or dropped and why, with the time and the light of each
+    /// Also print which effects were kept or dropped and why, with the time and the light of each, and what a pilot chose
     #[arg(long, help_heading = "Messages")]
     pub(super) explain: bool,
     #[command(flatten)]
@@ -59,6 +59,8 @@ pub(super) struct Job<'a> {
     /// What one has chosen before, and where to write what this one does.
     pub(super) chosen: Option<&'a Chosen>,
     pub(super) save_settings: Option<&'a Destination>,
+    /// Whether what it chooses is explained.
+    pub(super) explain: bool,
     /// What results are of: pixel, texel or point.
     pub(super) point: &'static str,
 }
@@ -195,6 +197,9 @@ impl Job<'_> {
             })?;
             if let Some(pilot) = pilot {
                 reporter.note(&scene_report::pilot(&pilot, &settings.stop, self.point));
+                if self.explain {
+                    scene_report::pilot_table(&pilot, &settings.stop, self.point).lines().for_each(|line| reporter.note(line));
+                }
                 found = pilot.set(settings);
                 rounds = pilot.rounds.expected(pilot.chosen, &settings.stop);
             }

@@ -88,6 +88,7 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
         free: Free { samples: false, ..args.transport.free() },
         chosen: None,
         save_settings: None,
+        explain: args.messages.explain,
         point: "point",
     };
     let mut gpus = args.device.open(&reporter)?;

@@ -168,6 +168,7 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
         free: args.free(),
         chosen: chosen.as_ref(),
         save_settings: save_settings.as_ref(),
+        explain: args.messages.explain,
         point: "pixel",
     };
     let size = (*width, *height);

@@ -80,6 +80,46 @@ pub fn pilot(pilot: &Pilot, stop: &Stop, point: &str) -> String {
     format!("pilot: {paths}{maps} a round{against}, as the noise sits in {why}; {}{spent}", expected(pilot, stop))
 }
 
+/// What each kind of work is expected to take and to leave in the picture, as a table.
+pub fn pilot_table(pilot: &Pilot, stop: &Stop, point: &str) -> String {
+    let Pilot { chosen, rounds, tiles, .. } = pilot;
+    let expected = rounds.expected(*chosen, stop);
+    let parts = rounds.parts(*chosen, f64::from(expected));
+    let (costs, cost) = (rounds.costs(*chosen), rounds.cost(*chosen));
+    let noise: f64 = parts.noise.iter().sum();
+    let share = |of: f64, all: f64| if all > 0.0 { format!("{:.0} %", 100.0 * of / all) } else { "-".to_owned() };
+    let paths = format!("{} and {} each", counted(chosen.samples, "path"), counted(chosen.shadow_rays, "shadow ray"));
+    let rows = [
+        (format!("per {point}: {paths}"), true),
+        (
+            format!("global photons: {}, {} within the first radius", chosen.photons, chosen.neighbours),
+            rounds.variance.global.at.photons > 0,
+        ),
+        (
+            format!("caustic photons: {}, {} within the first radius", chosen.caustic_photons, chosen.caustic_neighbours),
+            rounds.variance.caustic.at.photons > 0,
+        ),
+    ];
+    let mut text = format!("what the pilot has chosen, of about {}:\n", counted(expected, "round"));
+    writeln!(text, "{:<64} {:>8} {:>8}", "", "time", "noise").unwrap();
+    for (number, (row, _)) in rows.into_iter().enumerate().filter(|(_, (_, exists))| *exists) {
+        writeln!(text, "{row:<64} {:>8} {:>8}", share(costs[number], cost), share(parts.noise[number], noise)).unwrap();
+    }
+    writeln!(text, "{:<64} {:>8}", "what each round takes in any case", share(rounds.cost.round, cost)).unwrap();
+    if let Some((_, tiles)) = tiles {
+        let counts = tiles.counts();
+        let more: u32 = counts[1..].iter().sum();
+        let tile = counted(more, "tile");
+        writeln!(text, "{tile} of 4 x 4 pixels have more paths than the others, up to {} times as many", 1 << tiles.most()).unwrap();
+    }
+    let bias = if rounds.counts_bias { format!(", and a bias of the radius of {} %", percent(parts.bias)) } else { String::new() };
+    text + &format!(
+        "expected: noise of {} %{bias}, with their bounds {} %",
+        percent(noise.sqrt()),
+        percent(rounds.error(*chosen, expected.into()))
+    )
+}
+
 /// Seconds until the error that is wanted, and until half of it; or the error after the time that there is.
 fn expected(pilot: &Pilot, stop: &Stop) -> String {
     let Pilot { chosen, rounds, .. } = pilot;

@@ -328,6 +328,17 @@ const SAMPLE_POWER: f64 = 1.25;
 /// The bound of noise over noise, squared.
 const BOUND_OF_NOISE: f64 = 1.2;
 
+/// What an error is made of.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ErrorParts {
+    /// The square of the noise of paths, of the global and of the caustic map.
+    pub noise: [f64; 3],
+    pub bias: f64,
+    /// What is not known of its square.
+    pub unknown: f64,
+    pub unseen: f64,
+}
+
 /// What is known of a picture's rounds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rounds {
@@ -345,39 +356,52 @@ pub struct Rounds {
 impl Rounds {
     /// Nanoseconds of a round.
     pub fn cost(&self, division: Division) -> f64 {
-        let Cost { round, paths, shadow_rays, lookups, discs, photons } = self.cost;
-        let Variance { global, caustic, .. } = self.variance;
-        let maps = [(global, division.global(), photons[0]), (caustic, division.caustic(), photons[1])];
-        let (mut of_photons, mut of_path) = (0.0, paths + f64::from(division.shadow_rays) * shadow_rays);
-        for (map, of, photon) in maps.into_iter().filter(|(map, ..)| map.has_photons()) {
-            of_photons += photon * f64::from(of.photons);
+        self.cost.round + self.costs(division).iter().sum::<f64>()
+    }
+
+    /// Those of paths, of global and of caustic photons.
+    pub fn costs(&self, division: Division) -> [f64; 3] {
+        let Cost { paths, shadow_rays, lookups, discs, photons, .. } = self.cost;
+        let mut of_path = paths + f64::from(division.shadow_rays) * shadow_rays;
+        let mut of_photons = [0.0; 2];
+        for (place, (map, of)) in self.maps(division) {
+            of_photons[place] = photons[place] * f64::from(of.photons);
             of_path += lookups * (1.0 + OF_NEIGHBOURS * (of.neighbours - 1.0));
             of_path += 0.5 * discs * map.squared_radius(of) / map.squared_radius(map.at);
         }
-        round + of_photons + f64::from(division.samples) * of_path
+        [f64::from(division.samples) * of_path, of_photons[0], of_photons[1]]
+    }
+
+    /// The maps that there are, the global one in place 0 and the caustic one in place 1, with their photons.
+    fn maps(&self, division: Division) -> impl Iterator<Item = (usize, (MapVariance, PhotonsOfMap))> {
+        let both = [(self.variance.global, division.global()), (self.variance.caustic, division.caustic())];
+        both.into_iter().enumerate().filter(|(_, (map, _))| map.has_photons())
     }
 
     /// The bound of the error after so many rounds.
     pub fn error(&self, division: Division, rounds: f64) -> f64 {
-        let Variance { global, caustic, .. } = self.variance;
-        let of_paths = self.variance.of_paths_in_round(division) / rounds;
+        let ErrorParts { noise, bias, unknown, unseen } = self.parts(division, rounds);
+        let of_bias = if self.counts_bias { BOUND_OF_BIAS.powi(2) * (bias * bias + unknown) } else { 0.0 };
+        (BOUND_OF_NOISE * noise.iter().sum::<f64>() + of_bias + unseen * unseen).sqrt()
+    }
+
+    pub fn parts(&self, division: Division, rounds: f64) -> ErrorParts {
         let shrunk = mean_squared_radius(self.alpha, rounds.ceil() as u32);
         // The mean of 1 / r^2 over rounds is n^(1 - alpha) / (2 - alpha), and that of the first round 1.
         let inverse = 1.0 / (2.0 - self.alpha);
         let of_radii = rounds.powf(-self.alpha) * (inverse + (1.0 - inverse) / rounds);
-        let (mut of_maps, mut unknown, mut bias) = (0.0, 0.0, 0.0);
-        for (map, of) in [(global, division.global()), (caustic, division.caustic())] {
-            if !map.has_photons() {
-                continue;
-            }
+        let mut parts = ErrorParts {
+            noise: [self.variance.of_paths_in_round(division) / rounds, 0.0, 0.0],
+            unseen: self.unseen / (self.least_samples * f64::from(division.samples) * rounds),
+            ..ErrorParts::default()
+        };
+        for (place, (map, of)) in self.maps(division) {
             let noise = map.of_first_round(of, division.samples) * of_radii;
-            of_maps += noise;
-            unknown += noise * map.uncertainty;
-            bias += map.bias(map.squared_radius(of) * shrunk);
+            parts.noise[1 + place] = noise;
+            parts.unknown += noise * map.uncertainty;
+            parts.bias += map.bias(map.squared_radius(of) * shrunk);
         }
-        let of_bias = if self.counts_bias { BOUND_OF_BIAS.powi(2) * (bias * bias + unknown) } else { 0.0 };
-        let unseen = self.unseen / (self.least_samples * f64::from(division.samples) * rounds);
-        (BOUND_OF_NOISE * (of_paths + of_maps) + of_bias + unseen * unseen).sqrt()
+        parts
     }
 
     /// Rounds after which the error is so small, if ever, and their nanoseconds.
@@ -562,5 +586,22 @@ mod tests {
         let few = PhotonsOfMap { neighbours: 0.1, ..twice };
         assert_eq!((set.of_first_round(few, 8), of_map(0.05, 0.5).of_first_round(twice, 8)), (0.025, 0.05));
         assert_eq!(MapVariance { sample_power: 1.0, ..set }.of_first_round(few, 8), 0.025 / 8.0);
+    }
+
+    /// What is well known counts, and of what is not the usual; never less than is likely.
+    #[test]
+    fn a_bias_is_between_what_was_found_and_what_is_usual() {
+        let at = PhotonsOfMap { photons: USUAL_PHOTONS as u32, neighbours: 1.0 };
+        let learned = |found: f64, uncertainty: f64, share: f64| {
+            let mut map = MapVariance { at, bias: 0.1, widest: Some(100.0), ..MapVariance::default() };
+            map.learn_bias(found, uncertainty, share);
+            map.bias
+        };
+        assert!((learned(0.3, 1e-6, 1.0) - 0.3).abs() < 1e-3 && (learned(0.01, 1e-9, 1.0) - 0.01).abs() < 1e-4);
+        assert!((learned(0.3, 1e-6, 0.25) - 0.15).abs() < 1e-3);
+        let hardly = learned(0.5, 100.0, 1.0);
+        assert!((0.1..0.16).contains(&hardly), "{hardly}");
+        assert!((learned(0.0, 0.0, 1.0) - 0.1).abs() < 1e-12);
+        assert!(learned(0.2, 0.02, 1.0) > learned(0.2, 0.002, 1.0));
     }
 }

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from peers.failure import Failure
 
-PACKAGES = ["numpy==2.4.6", "matplotlib==3.11.2", "pyradiance==1.3.1", "mitsuba==3.9.1"]
+PACKAGES = ["numpy==2.4.6", "matplotlib==3.11.2", "pyradiance==1.3.1", "mitsuba==3.9.1", "trimesh==5.2.0"]
 LLVM_PACKAGE = "libllvm19"
 LLVM_LIBRARIES = ["LLVM-19", "LLVM"]
 
