@@ -201,7 +201,7 @@ fn commands_that_are_wrong_are_noticed() {
 }
 
 /// Options of the project's other tools, of cargo and of Slurm.
-const OTHER_OPTIONS: [&str; 23] = [
+const OTHER_OPTIONS: [&str; 24] = [
     "--again",
     "--array",
     "--dependency",
@@ -214,6 +214,7 @@ const OTHER_OPTIONS: [&str; 23] = [
     "--open-mode",
     "--out",
     "--parsable",
+    "--pictures",
     "--partition",
     "--plot",
     "--quick",

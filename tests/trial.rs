@@ -91,7 +91,8 @@ fn built_in_scenes_keep_about_the_radius_of_their_area() {
         let trial = plan.trial.as_ref().unwrap();
         for map in plan.maps() {
             assert_eq!(map.radius_from, RadiusFrom::Trial);
-            let ratio = map.radius / area_radius(&geometry, map.photons, 24, map.caustic_only);
+            let neighbours = if map.caustic_only { settings.caustic_neighbours } else { settings.neighbours };
+            let ratio = map.radius / area_radius(&geometry, map.photons, neighbours, map.caustic_only);
             println!("{name}, {}: {ratio:.3} of the radius by area, {trial:?}", map.name);
             if !(0.7..1.45).contains(&ratio) || trial.too_wide > 0.1 {
                 off.push(format!("{name}, {}: {ratio}, {trial:?}", map.name));

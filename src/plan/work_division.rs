@@ -427,7 +427,7 @@ impl Rounds {
     }
 
     fn least_rounds(&self, division: Division) -> f64 {
-        f64::from(FIRST_LOOK * (SAMPLES_PER_BLOCK / division.samples).max(1))
+        f64::from(FIRST_LOOK) * rounds_of_block(division)
     }
 
     /// Rounds that a goal takes.
@@ -442,6 +442,8 @@ impl Rounds {
     pub fn loss(&self, division: Division, stop: &Stop) -> f64 {
         let wanted = stop.error.unwrap_or(1.0);
         let (rounds, nanoseconds) = self.until(division, wanted);
+        // A run of few blocks cannot end when its error is smaller than expected.
+        let nanoseconds = nanoseconds.max(ENOUGH_BLOCKS * rounds_of_block(division) * self.cost(division));
         let reached = self.error(division, rounds).max(wanted) / wanted;
         match stop.seconds {
             Some(most) if stop.error.is_none() || 1e-9 * nanoseconds > most => most * (self.after(division, most) / wanted).powi(2),
@@ -450,6 +452,12 @@ impl Rounds {
     }
 }
 
+fn rounds_of_block(division: Division) -> f64 {
+    f64::from((SAMPLES_PER_BLOCK / division.samples).max(1))
+}
+
+/// Blocks that a division should leave a run, whose error is looked at after 16, 20, 25 and 31.
+const ENOUGH_BLOCKS: f64 = 24.0;
 /// Rounds of a run that its error ends, at most.
 const MOST_ROUNDS: f64 = 65_536.0;
 /// More shadow rays of one path tell little that other paths do not.

@@ -245,7 +245,7 @@ class Reference:
         if not np.isfinite(pixels).all():
             raise Failure("a pixel is no number")
         apart = root_mean_square((pixels - self.pixels)[self.counts]) / self.mean()
-        # What is far below the reference's own error cannot be told.
+        # The reference's own error is known to some 10 %: below twice it others are told roughly, and far below not at all.
         return float(np.sqrt(max(apart**2 - self.error**2, (self.error / 10) ** 2)))
 
     def level_of(self, pixels):
@@ -363,15 +363,16 @@ def rows_of(scene):
     """Each run of photonmill, and Mitsuba at the same error."""
     name, last = scene["name"], scene["mitsuba-path"][-1]
     for point in scene["photonmill"]:
-        told = [f"{100 * point['asked']:g}", f"{100 * point['claimed']:.1f}", f"{100 * point['error']:.2f}", f"{point['level']:.4f}"]
+        error = ("about " if point["error"] < 2 * scene["reference"]["error"] else "") + f"{100 * point['error']:.2f}"
+        claimed = "-" if point["claimed"] is None else f"{100 * point['claimed']:.1f}"
+        told = [f"{100 * point['asked']:g}", claimed, error, f"{point['level']:.4f}"]
         yield [name, "photonmill", *told, f"{point['computing_s']:.2f}", f"{point['whole_s']:.2f}", "1"]
-        computing, whole = point["mitsuba"]["computing_s"], point["mitsuba"]["whole_s"]
-        sign = "below " if computing and computing["is_bound"] else "" if computing else "above "
+        computing = point["mitsuba"]["computing_s"]
+        sign = "above " if not computing else "below " if computing["is_bound"] else ""
         seconds = {clock: times["seconds"] if times else last[clock] for clock, times in point["mitsuba"].items()}
         times = {clock: seconds[clock] / point[clock] for clock in seconds}
-        told = ["-", "-", f"{100 * point['error']:.2f}", "-"]
         clocks = [sign + f"{seconds['computing_s']:.2f}", sign + f"{seconds['whole_s']:.2f}"]
-        yield [name, "mitsuba-path", *told, *clocks, sign + f"{times['computing_s']:.3g} ({times['whole_s']:.3g})"]
+        yield [name, "mitsuba-path", "-", "-", error, "-", *clocks, sign + f"{times['computing_s']:.3g} ({times['whole_s']:.3g})"]
 
 
 class Painter:

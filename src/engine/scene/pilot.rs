@@ -123,18 +123,16 @@ pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Fre
             found = Some(seen.tiles);
             least = 4 * count;
         }
-        tiles = found.and_then(|found| Tiles::of(&found, width.div_ceil(TILE) as usize));
-        if let Some(tiles) = &tiles {
-            rounds.variance.path *= tiles.variance;
-            rounds.variance.shadow_ray *= tiles.variance;
-            for map in [&mut rounds.variance.global, &mut rounds.variance.caustic] {
-                map.of_round *= tiles.variance.powf(map.sample_power.min(1.0));
-            }
-            let chains = if plan.constant("HAS_SPECULAR_CHAINS") != 0 { OF_CHAINS } else { 1.0 };
-            rounds.cost.paths *= chains * tiles.cost;
-            rounds.cost.shadow_rays *= tiles.cost;
-            rounds.least_samples = tiles.samples.iter().copied().fold(1.0, f64::min);
-        }
+        // Few samples anywhere may miss rare light, so that the best of several least shares is taken.
+        let even = (rounds.loss(best(&rounds, before, free, &settings.stop, (MOST_SAMPLES, at_once)), &settings.stop), rounds, None);
+        let with_tiles = |found: &[OfTile], least: f64| {
+            let tiles = Tiles::of(found, width.div_ceil(TILE) as usize, least);
+            let rounds = tiles.rounds(&rounds, plan.constant("HAS_SPECULAR_CHAINS") != 0);
+            (rounds.loss(best(&rounds, before, free, &settings.stop, (MOST_SAMPLES, at_once)), &settings.stop), rounds, Some(tiles))
+        };
+        let tried = found.iter().flat_map(|found| LEAST_SHARES.map(|least| with_tiles(found, least)));
+        let best = tried.filter(|tried| tried.0 < LEAST_TILES * even.0).min_by(|one, other| one.0.total_cmp(&other.0)).unwrap_or(even);
+        (rounds, tiles) = (best.1, best.2);
     }
     let mut most_samples = MOST_SAMPLES;
     let mut chosen = best(&rounds, before, free, &settings.stop, (most_samples, at_once));
@@ -223,6 +221,8 @@ const LEAST_LOOKS: f64 = 4.0;
 const FEW_BLOCKS: u32 = 32;
 /// Less than this of the time must be left for tiles to be worth their while.
 const LEAST_TILES: f64 = 0.8;
+/// Of the mean samples, what each tile may have at least.
+const LEAST_SHARES: [f64; 4] = [0.0, 0.25, 0.5, 0.75];
 /// How many times as long paths are in tiles that vary more, over mirrors and glass.
 const OF_CHAINS: f64 = 1.25;
 /// Of the mean cost of a path, what one costs at least: it must be sent, whatever it meets.
@@ -259,8 +259,8 @@ struct Tiles {
 }
 
 impl Tiles {
-    /// Samples go by the root of variance over cost (Neyman 1934). `None` where that gains little.
-    fn of(tiles: &[OfTile], columns: usize) -> Option<Tiles> {
+    /// Samples go by the root of variance over cost (Neyman 1934), and each tile has this share of their mean at least.
+    fn of(tiles: &[OfTile], columns: usize, least: f64) -> Tiles {
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
         let variances = smooth(&tiles.iter().map(|tile| tile.variance).collect::<Vec<f64>>(), columns);
         let met = smooth(&tiles.iter().map(|tile| tile.met).collect::<Vec<f64>>(), columns);
@@ -268,9 +268,26 @@ impl Tiles {
         let costs: Vec<f64> = met.iter().map(|met| LEAST_COST + (1.0 - LEAST_COST) * met / all).collect();
         let roots: Vec<f64> = variances.iter().zip(&costs).map(|(variance, cost)| (variance / cost).sqrt()).collect();
         let root = mean(&roots);
-        let both = mean(&variances.iter().zip(&costs).map(|(variance, cost)| (variance * cost).sqrt()).collect::<Vec<f64>>());
-        let tiles = Tiles { samples: roots.iter().map(|own| own / root).collect(), variance: root * both, cost: both / root };
-        Some(tiles).filter(|tiles| tiles.variance * tiles.cost < LEAST_TILES)
+        let samples: Vec<f64> = roots.iter().map(|own| (own / root).max(least)).collect();
+        let of_all = mean(&samples);
+        let samples: Vec<f64> = samples.iter().map(|own| own / of_all).collect();
+        let variance = mean(&variances.iter().zip(&samples).map(|(variance, samples)| variance / samples).collect::<Vec<f64>>());
+        let cost = mean(&costs.iter().zip(&samples).map(|(cost, samples)| cost * samples).collect::<Vec<f64>>());
+        Tiles { samples, variance, cost }
+    }
+
+    /// What rounds are with these, of what they are without.
+    fn rounds(&self, even: &Rounds, has_chains: bool) -> Rounds {
+        let mut rounds = *even;
+        rounds.variance.path *= self.variance;
+        rounds.variance.shadow_ray *= self.variance;
+        for map in [&mut rounds.variance.global, &mut rounds.variance.caustic] {
+            map.of_round *= self.variance.powf(map.sample_power.min(1.0));
+        }
+        rounds.cost.paths *= self.cost * if has_chains { OF_CHAINS } else { 1.0 };
+        rounds.cost.shadow_rays *= self.cost;
+        rounds.least_samples = self.samples.iter().copied().fold(1.0, f64::min);
+        rounds
     }
 }
 
