@@ -220,7 +220,7 @@ const LEAST_LOOKS: f64 = 4.0;
 /// Blocks that a run may do with, which wants some more than its first look takes.
 const FEW_BLOCKS: u32 = 32;
 /// Less than this of the time must be left for tiles to be worth their while.
-const LEAST_TILES: f64 = 0.8;
+const LEAST_TILES: f64 = 0.93;
 /// Of the mean samples, what each tile may have at least.
 const LEAST_SHARES: [f64; 4] = [0.0, 0.25, 0.5, 0.75];
 /// How many times as long paths are in tiles that vary more, over mirrors and glass.
