@@ -17,9 +17,9 @@ use crate::plan::film::BiasPlan;
 use crate::plan::radius::{MAX_DEFAULT_RADIUS, RadiusFrom, TrialRadius};
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
+use crate::plan::work_cost::{Cost, Counted, cost, pilot_photons};
 use crate::plan::work_division::{
-    Cost, Counted, Division, FOUND_BIAS, Free, MOST_PHOTONS, MOST_SAMPLES, MapVariance, Rounds, USUAL_BIAS, USUAL_UNCERTAINTY, Variance,
-    best, cost, of_samples, pilot_photons,
+    Division, FOUND_BIAS, Free, MOST_PHOTONS, MOST_SAMPLES, MapVariance, Rounds, USUAL_BIAS, USUAL_UNCERTAINTY, Variance, best, of_samples,
 };
 use crate::scene::Scene;
 use crate::settings::scene::{SAMPLES_PER_BLOCK, SceneSettings};

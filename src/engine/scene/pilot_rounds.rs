@@ -13,7 +13,7 @@ use crate::ledger::Fates;
 use crate::plan::radius::over_usual;
 use crate::plan::scene::{LightOf, ScenePlan};
 use crate::plan::sensor::Sensor;
-use crate::plan::work_division::Counted;
+use crate::plan::work_cost::Counted;
 use crate::scene::Scene;
 use crate::settings::scene::{CAUSTIC_NEIGHBOURS, NEIGHBOURS, SAMPLES_PER_BLOCK, SceneSettings};
 use crate::settings::stop::{Measure, Stop};
