@@ -69,7 +69,12 @@ pub(super) fn run(args: &BenchArgs, cancelled: &AtomicBool) -> Result<End> {
     check_distinct(&json.iter().cloned().chain(in_folder).collect::<Vec<_>>())?;
     let reporter = ProgressReporter::new(&args.progress);
     let scenes = match (args.scene.is_empty(), args.only.contains(&Experiment::Tuning)) {
-        (true, true) => built_in::names(),
+        (true, true) => {
+            // That of `compaction` first.
+            let mut names = built_in::names();
+            names.sort_by_key(|name| *name != "cornell-spheres");
+            names
+        }
         (true, false) => vec!["cornell-spheres"],
         _ => args.scene.iter().map(String::as_str).collect(),
     };
