@@ -106,7 +106,7 @@ fn costs(kind: &str) -> Costs {
 /// How many times as long a flight takes of a photon that is sent through mirrors and glass.
 const OF_CAUSTIC_PHOTON: f64 = 1.7;
 
-/// Photons of each map in a pilot's rounds: about as dear as all else in these.
+/// Photons of each map in a pilot's rounds: about so many that they take as long as all else there.
 pub fn pilot_photons(kind: &str) -> u32 {
     match kind {
         "cpu" => 1 << 13,

@@ -214,7 +214,7 @@ fn goal_nanoseconds(rounds: &Rounds, division: Division, stop: &Stop) -> f64 {
 const USUAL_POWERS: [f64; 2] = [0.0, 1.0];
 /// Few pixels seldom show rare light: the variance over what most of them find.
 const RARE: f64 = 1.4;
-/// A look takes less than a run over this.
+/// A run takes at least so many times as long as another look at a few pixels, or there is none.
 const LEAST_LOOKS: f64 = 4.0;
 
 /// Blocks that a run may do with, which wants some more than its first look takes.
