@@ -214,7 +214,7 @@ fn settings_are_kept_in_a_file() {
     let Some(gpu) = device() else { return };
     let place = Place::new();
     // So small that the pilot looks at all pixels, and finds tiles.
-    let [error, smaller] = if gpu.facts().kind == "cpu" { [12, 11] } else { [3, 2] };
+    let [error, smaller] = if gpu.facts().kind == "cpu" { [8, 7] } else { [3, 2] };
     let line = format!("render cornell-spheres --size 24x24 --error {error}%");
     place.succeed(&format!("{line} -o a.exr --save-settings s.json --checkpoint a.pms"));
     let chosen = place.json("s.json");

@@ -12,6 +12,7 @@
 //! with what is not known of the bias, which falls with the noise of the maps. Radii shrink as Knaus and Zwicker (2011) have them. Variances
 //! are a pilot's ([`crate::engine::scene::pilot`]), costs those of a class of devices ([`super::work_cost`]).
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::radius::{mean_squared_radius, over_usual};
@@ -204,6 +205,22 @@ pub struct ErrorParts {
     pub unseen: f64,
 }
 
+impl ErrorParts {
+    /// Of so many rounds, of what the first one has, while radii shrink.
+    fn after(&self, rounds: f64, alpha: f64) -> ErrorParts {
+        // The mean of 1 / r^2 over rounds is n^(1 - alpha) / (2 - alpha), and that of the first round 1.
+        let inverse = 1.0 / (2.0 - alpha);
+        let of_radii = rounds.powf(-alpha) * (inverse + (1.0 - inverse) / rounds);
+        let [paths, global, caustic] = self.noise;
+        ErrorParts {
+            noise: [paths / rounds, global * of_radii, caustic * of_radii],
+            bias: self.bias * mean_squared_radius(alpha, rounds.ceil() as u32).powf(BIAS_POWER),
+            unknown: self.unknown * of_radii,
+            unseen: self.unseen / rounds,
+        }
+    }
+}
+
 /// What is known of a picture's rounds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rounds {
@@ -245,26 +262,30 @@ impl Rounds {
 
     /// The bound of the error after so many rounds.
     pub fn error(&self, division: Division, rounds: f64) -> f64 {
-        let ErrorParts { noise, bias, unknown, unseen } = self.parts(division, rounds);
+        self.bound(&self.parts(division, rounds))
+    }
+
+    fn bound(&self, parts: &ErrorParts) -> f64 {
+        let ErrorParts { noise, bias, unknown, unseen } = *parts;
         let of_bias = if self.counts_bias { BOUND_OF_BIAS.powi(2) * (bias * bias + unknown) } else { 0.0 };
         (BOUND_OF_NOISE * noise.iter().sum::<f64>() + of_bias + unseen * unseen).sqrt()
     }
 
     pub fn parts(&self, division: Division, rounds: f64) -> ErrorParts {
-        let shrunk = mean_squared_radius(self.alpha, rounds.ceil() as u32);
-        // The mean of 1 / r^2 over rounds is n^(1 - alpha) / (2 - alpha), and that of the first round 1.
-        let inverse = 1.0 / (2.0 - self.alpha);
-        let of_radii = rounds.powf(-self.alpha) * (inverse + (1.0 - inverse) / rounds);
+        self.first_round(division).after(rounds, self.alpha)
+    }
+
+    fn first_round(&self, division: Division) -> ErrorParts {
         let mut parts = ErrorParts {
-            noise: [self.variance.of_paths_in_round(division) / rounds, 0.0, 0.0],
-            unseen: self.unseen / (self.least_samples * f64::from(division.samples) * rounds),
+            noise: [self.variance.of_paths_in_round(division), 0.0, 0.0],
+            unseen: self.unseen / (self.least_samples * f64::from(division.samples)),
             ..ErrorParts::default()
         };
         for (place, (map, of)) in self.maps(division) {
-            let noise = map.of_first_round(of, division.samples) * of_radii;
+            let noise = map.of_first_round(of, division.samples);
             parts.noise[1 + place] = noise;
             parts.unknown += noise * map.uncertainty;
-            parts.bias += map.bias(map.squared_radius(of) * shrunk);
+            parts.bias += map.bias(map.squared_radius(of));
         }
         parts
     }
@@ -272,11 +293,13 @@ impl Rounds {
     /// Rounds after which the error is so small, if ever, and their nanoseconds.
     pub fn until(&self, division: Division, error: f64) -> (f64, f64) {
         let (mut less, mut more) = (self.least_rounds(division), MOST_ROUNDS);
-        if self.error(division, less) > error {
+        let first = self.first_round(division);
+        let is_small = |rounds: f64| self.bound(&first.after(rounds, self.alpha)) <= error;
+        if !is_small(less) {
             // Halves the range of the logarithm.
-            for _ in 0..24 {
+            for _ in 0..16 {
                 let middle = (less * more).sqrt();
-                if self.error(division, middle) <= error { more = middle } else { less = middle }
+                if is_small(middle) { more = middle } else { less = middle }
             }
             less = more;
         }
@@ -378,8 +401,8 @@ pub fn best(rounds: &Rounds, before: Division, free: Free, stop: &Stop, (most_sa
     };
     let some = |choice: &[u32]| -> Vec<u32> { choice.iter().copied().step_by(BEGINS_APART).collect() };
     let begins = pairs(&some(&samples), &some(&neighbours));
-    let begins = begins.into_iter().map(|(samples, neighbours)| Division { samples, neighbours, ..before });
-    begins.map(from).fold((rounds.loss(before, stop), before), less).1
+    let found: Vec<_> = begins.into_par_iter().map(|(samples, neighbours)| from(Division { samples, neighbours, ..before })).collect();
+    found.into_iter().fold((rounds.loss(before, stop), before), less).1
 }
 
 /// The first of two whose loss is no more.

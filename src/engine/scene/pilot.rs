@@ -8,7 +8,7 @@
 use std::cell::Cell;
 
 use super::View;
-use super::pilot_rounds::{FEW_SAMPLES, MANY_SAMPLES, OfTile, PIXELS_OF_MAP, Parts, PilotRounds, ROUNDS, SAMPLES};
+use super::pilot_rounds::{FEW_SAMPLES, MANY_SAMPLES, OfTile, PIXELS_OF_MAP, Parts, PilotRounds, SAMPLES};
 use crate::constants::PART_COUNT;
 use crate::engine;
 use crate::error::Result;
@@ -17,7 +17,7 @@ use crate::plan::film::BiasPlan;
 use crate::plan::radius::{MAX_DEFAULT_RADIUS, RadiusFrom, TrialRadius};
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
-use crate::plan::work_cost::{Cost, Counted, cost, pilot_photons};
+use crate::plan::work_cost::{Cost, Counted, cost, pilot_size};
 use crate::plan::work_division::{
     Division, FOUND_BIAS, Free, MOST_PHOTONS, MOST_SAMPLES, MapVariance, Rounds, USUAL_BIAS, USUAL_UNCERTAINTY, Variance, best, of_samples,
 };
@@ -68,14 +68,14 @@ pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Fre
     }
     let many = if free.shadow_rays { MANY_SHADOW_RAYS } else { settings.shadow_rays };
     let kind = gpu.facts().kind;
-    let looks = PilotRounds { gpu, scene, view, run: plan, photons: pilot_photons(kind), spent: Cell::new(0.0) };
+    let looks = PilotRounds { gpu, scene, view, run: plan, size: pilot_size(kind), spent: Cell::new(0.0) };
     let of_many = looks.of_few(many)?;
     let Some((parts, mut rounds)) = known(&looks, &of_many, None, kind) else { return Ok(None) };
     // Of a run that takes little longer than another look, paths are not told apart from shadow rays.
     let before = Division::of(settings);
     let usual_choice = best(&rounds, before, free, &settings.stop, (MOST_SAMPLES, MOST_PHOTONS));
-    let a_look = f64::from(ROUNDS) * (rounds.cost.round + rounds.cost.photons.iter().sum::<f64>() * f64::from(looks.photons));
-    if free.shadow_rays && plan.shadow_rays() != 0 && goal_nanoseconds(&rounds, usual_choice, &settings.stop) > LEAST_LOOKS * a_look {
+    let goal = goal_nanoseconds(&rounds, usual_choice, &settings.stop);
+    if free.shadow_rays && plan.shadow_rays() != 0 && goal > LEAST_LOOKS * looks.cost_of_few(&rounds, many) {
         let of_one = looks.of_few(1)?;
         let Some(found) = known(&looks, &of_many, Some(&of_one), kind) else { return Ok(None) };
         rounds = found.1;
@@ -98,11 +98,13 @@ pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Fre
         let mut least = PICTURE_ROUNDS;
         while least <= MOST_PICTURE_ROUNDS {
             let first = best(&rounds, before, free, &settings.stop, (MOST_SAMPLES, at_once));
-            let fits = picture_rounds(plan, first, &rounds, looks.photons);
+            let fits = picture_rounds(plan, first, &rounds, looks.size.photons);
             if fits * if found.is_none() { LEAST_PICTURE } else { 1.0 } < f64::from(least) {
                 break;
             }
-            let count = (fits.min(f64::from(MOST_PICTURE_ROUNDS)) as u32).max(least);
+            // What few pixels have told may be far off.
+            let most = if found.is_none() { FIRST_PICTURE_ROUNDS } else { MOST_PICTURE_ROUNDS };
+            let count = (fits.min(f64::from(most)) as u32).max(least);
             let Some(seen) = looks.of_all(first.shadow_rays, count)? else { break };
             let known = &mut rounds.variance;
             let of_rays = of_samples(first.shadow_rays);
@@ -227,9 +229,10 @@ const LEAST_SHARES: [f64; 4] = [0.0, 0.25, 0.5, 0.75];
 const OF_CHAINS: f64 = 1.25;
 /// Of the mean cost of a path, what one costs at least: it must be sent, whatever it meets.
 const LEAST_COST: f64 = 0.1;
-/// Rounds of all pixels with each kind of light: at first and at most, and the share of the run that these may take, at first several times
+/// Rounds of all pixels with each kind of light: at least, of the first look at most, and of any, and the share of the run that these may take, at first several times
 /// as much, as few pixels may have told too little of the run.
 const PICTURE_ROUNDS: u32 = 4;
+const FIRST_PICTURE_ROUNDS: u32 = 8;
 const MOST_PICTURE_ROUNDS: u32 = 64;
 const PICTURE_SHARE: f64 = 0.05;
 const LEAST_PICTURE: f64 = 6.0;

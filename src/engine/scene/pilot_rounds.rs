@@ -13,17 +13,15 @@ use crate::ledger::Fates;
 use crate::plan::radius::over_usual;
 use crate::plan::scene::{LightOf, ScenePlan};
 use crate::plan::sensor::Sensor;
-use crate::plan::work_cost::Counted;
+use crate::plan::work_cost::{Counted, PilotSize};
+use crate::plan::work_division::{Division, Rounds};
 use crate::scene::Scene;
 use crate::settings::scene::{CAUSTIC_NEIGHBOURS, NEIGHBOURS, SAMPLES_PER_BLOCK, SceneSettings};
 use crate::settings::stop::{Measure, Stop};
 use crate::settings::tile_samples::TILE;
 
-/// Pixels at most: of so many all that is known is kept.
-const PIXELS: f64 = 1024.0;
 /// Paths through each, as many as a block of a run has at least: they are even over it, and vary less than if each was alone.
 pub const SAMPLES: u32 = SAMPLES_PER_BLOCK;
-pub const ROUNDS: u32 = 8;
 const SEED: u64 = 0x0070_696c_6f74;
 /// Pixels that tell enough of a map, whose light varies little from one to the next; and paths through each, to tell what varies from path
 /// to path from what varies with the photons.
@@ -83,8 +81,7 @@ pub struct PilotRounds<'a> {
     pub scene: &'a Scene,
     pub view: &'a View<'a>,
     pub run: &'a ScenePlan,
-    /// Of each map.
-    pub photons: u32,
+    pub size: PilotSize,
     /// Milliseconds of the device that they took.
     pub spent: Cell<f64>,
 }
@@ -94,22 +91,22 @@ impl PilotRounds<'_> {
     pub fn of_few(&self, shadow_rays: u32) -> Result<Parts> {
         let PilotRounds { view, run, .. } = *self;
         let seed = bias_batches::seed(SEED, 0);
-        let settings = SceneSettings { samples: SAMPLES, shadow_rays, rounds: ROUNDS, seed, ..self.settings() };
+        let settings = SceneSettings { samples: SAMPLES, shadow_rays, rounds: self.size.rounds, seed, ..self.settings() };
         let (sensor, phases, footprint) = match run.sensor {
             Sensor::Picture { width, height } => {
-                let (sensor, footprint) = fewer(width, height, PIXELS);
+                let (sensor, footprint) = fewer(width, height, f64::from(self.size.pixels));
                 (sensor, Vec::new(), footprint)
             }
             Sensor::Receivers { .. } => {
                 let all = &view.phases[0];
-                let some: Vec<_> = all.iter().step_by(all.len().div_ceil(PIXELS as usize)).copied().collect();
+                let some: Vec<_> = all.iter().step_by(all.len().div_ceil(self.size.pixels as usize)).copied().collect();
                 (Sensor::Receivers { count: some.len() as u32 }, vec![some], 1.0)
             }
         };
         let view = View { phases: &phases, ..*view };
         let plan = ScenePlan { footprint, ..self.plan(&view, &settings, sensor)? };
         let samples = plan.samples();
-        let paths = f64::from(plan.paths()) * f64::from(ROUNDS);
+        let paths = f64::from(plan.paths()) * f64::from(self.size.rounds);
         let lit = self.light(&view, plan)?;
         let error = lit.film.error(settings.stop.confidence);
         let of_round = error.noise * error.noise * f64::from(lit.film.rounds);
@@ -128,6 +125,14 @@ impl PilotRounds<'_> {
             shadow_rays,
             counted: Counted { nodes, nodes_of_ray: 0.0, triangles, flights: [0, 1].map(|map| flights(&lit.fates[map])) },
         })
+    }
+
+    /// Nanoseconds of a look at few pixels.
+    pub fn cost_of_few(&self, rounds: &Rounds, shadow_rays: u32) -> f64 {
+        let share = (f64::from(self.size.pixels) / f64::from(self.run.sensor.pixels())).min(1.0);
+        let at = Division { shadow_rays, samples: SAMPLES, ..Division::of(&self.settings()) };
+        let [paths, global, caustic] = rounds.costs(at);
+        f64::from(self.size.rounds) * (rounds.cost.round + share * paths + global + caustic)
     }
 
     /// All pixels. `None` where nothing varies.
@@ -198,15 +203,15 @@ impl PilotRounds<'_> {
         }))
     }
 
-    /// Settings that all rounds have: whatever the run's photons are, few, and more than usual within the first radius, so that the bias
-    /// stands out.
+    /// Settings that all rounds have, whatever the run's photons are.
     pub fn settings(&self) -> SceneSettings {
+        let neighbours = |usual: u32| (f64::from(usual) * self.size.neighbours) as u32;
         SceneSettings {
             tiles: None,
-            photons: self.photons,
-            caustic_photons: self.photons,
-            neighbours: 2 * NEIGHBOURS,
-            caustic_neighbours: 2 * CAUSTIC_NEIGHBOURS,
+            photons: self.size.photons,
+            caustic_photons: self.size.photons,
+            neighbours: neighbours(NEIGHBOURS),
+            caustic_neighbours: neighbours(CAUSTIC_NEIGHBOURS),
             block: Some(1),
             // The radii stay those of the first round.
             alpha: 1.0,
