@@ -201,98 +201,43 @@ uint triangle_within(Cover cover, Triangle triangle, vec3 front, float height, f
     return uint(roundEven(max(whole, 0.0) * share * share * 16777216.0));
 }
 
-// The same where it is seen without cutting: all of a triangle, of none of whose corners the disc is short, or nothing of one that lies
-// beyond a plane that touches the sphere. `NONE`: it must be cut.
-uint uncut_within(Cover cover, Triangle triangle, float radius)
+// Adds the part of a triangle that belongs.
+void cover_triangle(inout Cover cover, uint index)
 {
-    vec3 a = triangle.a - cover.position, b = triangle.b - cover.position, c = triangle.c - cover.position;
-    vec3 middle = a + b + c;
-    if (min(dot(a, middle), min(dot(b, middle), dot(c, middle))) >= radius * norm(middle)) {
-        return 0;
-    }
-    bool is_inside = KERNEL == KERNEL_BOX && max(dot(a, a), max(dot(b, b), dot(c, c))) <= radius * radius;
-    if (!is_inside || is_cut_off(cover.cuts, a) || is_cut_off(cover.cuts, b) || is_cut_off(cover.cuts, c)) {
-        return NONE;
-    }
-    float share = divide(1.0, radius);
-    float twice = norm(cross((triangle.b - triangle.a) * share, (triangle.c - triangle.a) * share));
-    return uint(roundEven(0.5 * twice * 16777216.0));
-}
-
-// A triangle's side that an estimate is on, and the height of its middle over the front.
-struct Facing {
-    uint plane;
-    vec3 front;
-    vec3 side;
-    float height;
-};
-
-// Whether a triangle may carry photons that count.
-bool is_facing(Cover cover, Triangle triangle, out Facing facing)
-{
+    Triangle triangle = triangles[index];
     // No photon is ever stored on a mirror or on glass.
     uint kind = materials[triangle.material].surface;
     if (triangle.plane >= HIDDEN || kind == SURFACE_MIRROR || kind == SURFACE_DIELECTRIC) {
-        return false;
+        return;
     }
+    float radius = cover.radius;
     uint plane = 2 * triangle.plane;
     vec3 front = plane_normal(plane);
     if (HAS_TWO_SIDED) {
         plane += dot(front, cover.normal) < 0.0 && materials[triangle.material].two_sided != 0 ? 1 : 0;
     }
-    facing = Facing(plane, front, plane_normal(plane), plane_height(plane, cover.position));
-    return may_cover(cover, plane, facing.side, facing.height, cover.radius);
-}
-
-// Adds what belongs of a triangle that need not be cut. False: it must be.
-bool cover_uncut(inout Cover cover, uint index)
-{
-    Triangle triangle = triangles[index];
-    Facing facing;
-    if (!is_facing(cover, triangle, facing)) {
-        return true;
-    }
-    // Which triangle a receiver lies on, its edges tell.
-    uint sum = cover.plane == NONE ? NONE : uncut_within(cover, triangle, cover.radius);
-    uint near_sum = 0;
-    if (cover.near_radius > 0.0 && sum != 0 && sum != NONE && may_cover(cover, facing.plane, facing.side, facing.height, cover.near_radius)) {
-        near_sum = uncut_within(cover, triangle, cover.near_radius);
-    }
-    if (sum == NONE || near_sum == NONE) {
-        return false;
-    }
-    cover.sum = saturated_sum(cover.sum, sum);
-    cover.near_sum = saturated_sum(cover.near_sum, near_sum);
-    return true;
-}
-
-// Adds the part of a triangle that belongs.
-void cover_cut(inout Cover cover, uint index)
-{
-    Triangle triangle = triangles[index];
-    Facing facing;
-    if (!is_facing(cover, triangle, facing)) {
+    vec3 side = plane_normal(plane);
+    float height = plane_height(plane, cover.position);
+    if (!may_cover(cover, plane, side, height, radius)) {
         return;
     }
-    float radius = cover.radius;
     float left;
-    uint sum = triangle_within(cover, triangle, facing.front, facing.height, radius, left);
+    uint sum = triangle_within(cover, triangle, front, height, radius, left);
     cover.sum = saturated_sum(cover.sum, sum);
-    if (cover.near_radius > 0.0 && sum != 0 && may_cover(cover, facing.plane, facing.side, facing.height, cover.near_radius)) {
+    if (cover.near_radius > 0.0 && sum != 0 && may_cover(cover, plane, side, height, cover.near_radius)) {
         float near_left;
-        cover.near_sum =
-            saturated_sum(cover.near_sum, triangle_within(cover, triangle, facing.front, facing.height, cover.near_radius, near_left));
+        cover.near_sum = saturated_sum(cover.near_sum, triangle_within(cover, triangle, front, height, cover.near_radius, near_left));
     }
     // A triangle that the place lies on, or within rounding of its edge, is nearer than any that it lies beside, and below it however
     // little of the disc it is.
     bool is_below = left > -1.0 / 1024.0;
     if (cover.plane == NONE && (is_below || sum != 0)) {
-        float distance = abs(facing.height) + (is_below ? 0.0 : radius);
-        if (distance < cover.distance || (distance == cover.distance && facing.plane < cover.nearest)) {
+        float distance = abs(height) + (is_below ? 0.0 : radius);
+        if (distance < cover.distance || (distance == cover.distance && plane < cover.nearest)) {
             cover.distance = distance;
-            cover.nearest = facing.plane;
+            cover.nearest = plane;
         }
-        cover.reach = is_below ? min(cover.reach, abs(facing.height) + radius * (1.0 / 256.0)) : cover.reach;
+        cover.reach = is_below ? min(cover.reach, abs(height) + radius * (1.0 / 256.0)) : cover.reach;
     }
 }
 
@@ -300,28 +245,22 @@ void cover_cut(inout Cover cover, uint index)
 // that goes on beyond it.
 const uint MAX_COVERED = 8192;
 
-// Looks at all triangles in reach, and says whether they were too many. Each thread passes those that need no cutting until it has one
-// that does, so that a subgroup cuts together: that takes many times as long.
+// Looks at all triangles in reach, and says whether they were too many.
 bool cover_triangles(inout Cover cover)
 {
-    uint seen = 0, first_triangle = 0, leaves = 0;
+    uint seen = 0;
+    uint first_triangle, leaves;
     begin_walk();
-    for (;;) {
-        uint to_cut = NONE;
-        while (to_cut == NONE) {
-            if (leaves != 0) {
-                uint index = first_triangle + findLSB(leaves);
-                leaves &= leaves - 1;
-                seen++;
-                to_cut = cover_uncut(cover, index) ? NONE : index;
-            } else if (seen > MAX_COVERED && (cover.plane != NONE || cover.nearest != NONE)) {
-                return true;
-            } else if (!next_leaves(cover.position - cover.reach, cover.position + cover.reach, first_triangle, leaves)) {
-                return false;
-            }
+    while (next_leaves(cover.position - cover.reach, cover.position + cover.reach, first_triangle, leaves)) {
+        for (; leaves != 0; leaves &= leaves - 1) {
+            cover_triangle(cover, first_triangle + findLSB(leaves));
+            seen++;
         }
-        cover_cut(cover, to_cut);
+        if (seen > MAX_COVERED && (cover.plane != NONE || cover.nearest != NONE)) {
+            return true;
+        }
     }
+    return false;
 }
 
 Cover around(vec3 position, vec3 normal, uint plane, float radius, float near_radius, Cuts cuts)

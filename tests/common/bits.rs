@@ -29,7 +29,7 @@ pub const BITS: [(&str, u64); 17] = [
     ("cornell-spheres", 0x7a35_4643_ea3d_40fb),
     ("caustic-sphere", 0x5f38_28be_7b9b_9036),
     ("furnace", 0x3796_cfaf_728d_03dc),
-    ("integrating-sphere", 0x4f88_377f_a61c_337b),
+    ("integrating-sphere", 0x9adc_a644_6265_0f0a),
     ("point-over-plane", 0x7015_d1a9_f9d9_ba36),
     ("disc-over-plane", 0xfb6a_33ca_c08c_0841),
     ("sun-over-plane", 0x91be_4ea8_6619_dd96),
@@ -38,7 +38,7 @@ pub const BITS: [(&str, u64); 17] = [
     ("glass-slab", 0x172e_6c61_93c0_95d1),
     ("cornell-spheres from photons", 0x5926_5be3_8040_acd6),
     ("cornell-spheres gathered", 0x9315_3323_ff87_693b),
-    ("blender.glb", 0xede6_afaf_6d0c_fa42),
+    ("blender.glb", 0x1d43_36ae_f2e0_09e6),
     ("the paper's box", 0x012e_4cd3_65fd_a4f8),
 ];
 

@@ -217,7 +217,7 @@ const USUAL_POWERS: [f64; 2] = [0.0, 1.0];
 /// Few pixels seldom show rare light: the variance over what most of them find.
 const RARE: f64 = 1.4;
 /// A run takes at least so many times as long as another look at a few pixels, or there is none.
-const LEAST_LOOKS: f64 = 4.0;
+const LEAST_LOOKS: f64 = 10.0;
 
 /// Blocks that a run may do with, which wants some more than its first look takes.
 const FEW_BLOCKS: u32 = 32;
