@@ -38,11 +38,9 @@ struct Costs {
     node: f64,
     /// A shadow ray's light at a surface with layers, of which it asks each.
     layers: f64,
-    /// How many times as long a path takes that meets layers, and then through gaps of their coverage.
+    /// How many times as long a path takes that meets layers, and then, as a shadow ray, through gaps of their coverage.
     of_layers: f64,
     of_passing: f64,
-    /// And how many times, with its shadow rays, where layers have textures.
-    of_textured_layers: f64,
     /// A lookup in a map, and a triangle that a disc is cut to.
     lookup: f64,
     triangle: f64,
@@ -66,7 +64,6 @@ fn costs(kind: &str) -> Costs {
             layers: 300.0,
             of_layers: 1.5,
             of_passing: 1.2,
-            of_textured_layers: 1.0,
             lookup: 550.0,
             triangle: 180.0,
             flight: 400.0,
@@ -80,8 +77,7 @@ fn costs(kind: &str) -> Costs {
             node: 0.14,
             layers: 0.4,
             of_layers: 2.2,
-            of_passing: 1.8,
-            of_textured_layers: 2.2,
+            of_passing: 4.0,
             lookup: 0.2,
             triangle: 0.4,
             flight: 0.05,
@@ -95,8 +91,7 @@ fn costs(kind: &str) -> Costs {
             node: 2.5,
             layers: 6.0,
             of_layers: 2.2,
-            of_passing: 1.8,
-            of_textured_layers: 2.2,
+            of_passing: 4.0,
             lookup: 3.0,
             triangle: 4.0,
             flight: 1.0,
@@ -133,21 +128,20 @@ pub fn pilot_size(kind: &str) -> PilotSize {
 
 /// Of a plan's scene and pixels on a class of devices.
 pub fn cost(plan: &ScenePlan, counted: &Counted, kind: &str) -> Cost {
-    let Costs { path, node, layers, of_layers, of_passing, of_textured_layers, lookup, triangle, flight, node_of_flight, round, map, chains } = costs(kind);
+    let Costs { path, node, layers, of_layers, of_passing, lookup, triangle, flight, node_of_flight, round, map, chains } = costs(kind);
     let has = |constant: &str| f64::from(plan.constant(constant));
     let Counted { nodes, nodes_of_ray, triangles, flights } = *counted;
     let times = |of: f64, constant: &str| 1.0 + (of - 1.0) * has(constant);
     let layered = times(of_layers, "HAS_LAYERS");
     let passing = times(of_passing, "HAS_PASSING");
-    let textured = 1.0 + (of_textured_layers - 1.0) * has("HAS_LAYERS") * has("HAS_TEXTURES");
     let pixels = f64::from(plan.sensor.pixels());
     // Nodes on the way of a photon are not counted, but about those of a path and a shadow ray.
     let of_flight = flight + node_of_flight * (nodes + nodes_of_ray);
     let maps = plan.maps().count() as f64;
     Cost {
         round: round + map * maps + layered.min(2.0) * chains * has("HAS_SPECULAR_CHAINS"),
-        paths: pixels * (path + layered * passing * textured * node * nodes),
-        shadow_rays: if plan.shadow_rays() == 0 { 0.0 } else { pixels * textured * (node * nodes_of_ray + passing * layers * has("HAS_LAYERS")) },
+        paths: pixels * (path + layered * passing * node * nodes),
+        shadow_rays: if plan.shadow_rays() == 0 { 0.0 } else { pixels * passing * (node * nodes_of_ray + layers * has("HAS_LAYERS")) },
         lookups: pixels * lookup,
         discs: pixels * triangle * triangles,
         photons: [flights[0] * of_flight, OF_CAUSTIC_PHOTON * flights[1] * of_flight],
