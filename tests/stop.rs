@@ -7,11 +7,12 @@ use crate::common::prelude::*;
 use photonmill::engine::error_bound::error_bound;
 use photonmill::engine::room::film::{estimate_walls, irradiance_weights};
 use photonmill::engine::room::{self, RunResult};
-use photonmill::engine::scene::{self, SceneFilm, Target, View, trial};
+use photonmill::engine::scene::{self, SceneFilm, Target, View, pilot, trial};
 use photonmill::engine::{End, Progress};
 use photonmill::plan::film::{BiasPlan, FilmPlan};
 use photonmill::plan::scene::{MapPlan, ScenePlan};
 use photonmill::plan::sensor::Sensor;
+use photonmill::plan::work_division::Free;
 use photonmill::settings::stop::Stop;
 use statrs::distribution::{Binomial, DiscreteCDF};
 
@@ -182,6 +183,28 @@ fn without_bias(gpu: &Gpu, scene: &Scene, like: &scene::RunResult, rounds: u32) 
     seen(gpu, scene, &settings, &scene.first_camera(), [width, height])
 }
 
+/// Judges the claims of noise and bias together of runs of a scene, against one without bias.
+fn judge_all(name: &str, runs: &[scene::RunResult], truth: &scene::RunResult, coverages: &mut Vec<f64>, widths: &mut Vec<f64>) {
+    let unit = truth.film.measure().relative_to_mean(1.0);
+    let own_error = truth.film.relative_error();
+    let off = |lit: &scene::RunResult| {
+        let (found, truth): (Vec<DVec3>, Vec<DVec3>) = (lit.film.surface_means().collect(), truth.film.surface_means().collect());
+        let off = root_mean_square(pairs(&found, &truth).map(|(found, truth)| *found - *truth)) * unit;
+        (off * off - own_error * own_error).max(0.0).sqrt()
+    };
+    let true_errors: Vec<f64> = runs.iter().map(off).collect();
+    let claims: Vec<Claim> = runs.iter().map(|lit| (Vec::new(), watched_error(lit), unit)).collect();
+    let mean = |of: &dyn Fn(&scene::RunResult) -> f64| runs.iter().map(of).sum::<f64>() / runs.len() as f64;
+    println!(
+        "{name}: noise {:.4}, bias {:.4}, at most {:.4}; true error {:.4}, of which the truth's own is {own_error:.4}",
+        mean(&|lit| lit.error().noise),
+        mean(&|lit| lit.error().bias.unwrap().relative),
+        mean(&|lit| lit.error().bias.unwrap().upper),
+        true_errors.iter().sum::<f64>() / true_errors.len() as f64
+    );
+    judge_scene(name, &claims, &true_errors, coverages, widths);
+}
+
 /// The claims of noise and bias together of so many runs a scene, which shrink their radii as runs do by default.
 #[test]
 #[ignore = "a thousand runs and long references: for a real GPU"]
@@ -190,34 +213,39 @@ fn noise_and_bias_of_a_hundred_runs_lie_within_the_claim_as_often_as_claimed() {
     let (mut coverages, mut widths) = (Vec::new(), Vec::new());
     for name in SCENES {
         let scene = scene(name);
-        let run = |rounds, seed| {
+        let run = |seed| {
             let stop = Stop { confidence: CONFIDENCE, ..Stop::default() };
-            let settings = SceneSettings { rounds, seed, stop, ..SceneSettings::default() };
+            let settings = SceneSettings { rounds: 64, seed, stop, ..SceneSettings::default() };
             seen(&gpu, &scene, &settings, &scene.first_camera(), [48; 2])
         };
-        let runs: Vec<scene::RunResult> = (1..=100).map(|seed| run(64, seed)).collect();
-        let truth = without_bias(&gpu, &scene, &runs[0], 2000);
-        let unit = truth.film.measure().relative_to_mean(1.0);
-        let own_error = truth.film.relative_error();
-        let off = |lit: &scene::RunResult| {
-            let (found, truth): (Vec<DVec3>, Vec<DVec3>) = (lit.film.surface_means().collect(), truth.film.surface_means().collect());
-            let off = root_mean_square(pairs(&found, &truth).map(|(found, truth)| *found - *truth)) * unit;
-            (off * off - own_error * own_error).max(0.0).sqrt()
-        };
-        let true_errors: Vec<f64> = runs.iter().map(off).collect();
-        let claims: Vec<Claim> =
-            runs.iter().map(|lit| (Vec::new(), lit.error().bound_of_all(CONFIDENCE, lit.losses.relative), unit)).collect();
-        let mean = |of: &dyn Fn(&scene::RunResult) -> f64| runs.iter().map(of).sum::<f64>() / runs.len() as f64;
-        println!(
-            "{name}: noise {:.4}, bias {:.4}, at most {:.4}; true error {:.4}, of which the truth's own is {own_error:.4}",
-            mean(&|lit| lit.error().noise),
-            mean(&|lit| lit.error().bias.unwrap().relative),
-            mean(&|lit| lit.error().bias.unwrap().upper),
-            true_errors.iter().sum::<f64>() / true_errors.len() as f64
-        );
-        judge_scene(name, &claims, &true_errors, &mut coverages, &mut widths);
+        let runs: Vec<scene::RunResult> = (1..=100).map(run).collect();
+        judge_all(name, &runs, &without_bias(&gpu, &scene, &runs[0], 2000), &mut coverages, &mut widths);
     }
     judge_scenes(&coverages, &widths);
+}
+
+/// The same of runs that end at an error, with what a pilot chooses for it, tiles included.
+#[test]
+#[ignore = "hundreds of runs and long references: minutes on a software device"]
+fn errors_of_what_a_pilot_chooses_lie_within_the_claim_as_often_as_claimed() {
+    let Some(gpu) = device() else { return };
+    let (size, error) = if gpu.facts().kind == "cpu" { (16, 0.15) } else { (48, 0.04) };
+    let (mut coverages, mut widths) = (Vec::new(), Vec::new());
+    for name in ["open-box", "cornell", "cornell-spheres", "caustic-sphere"] {
+        let scene = scene(name);
+        let geometry = Geometry::new(&scene).unwrap();
+        let camera = scene.first_camera();
+        let view = View { geometry: &geometry, camera: Some(&camera), phases: &[] };
+        let stop = Stop { error: Some(error), confidence: CONFIDENCE, ..Stop::default() };
+        let usual = SceneSettings { rounds: 20_000, stop, ..SceneSettings::default() };
+        let plan = trial::plan(&gpu, &scene, &view, &usual, square_picture(size)).unwrap();
+        let chosen = pilot::choose(&gpu, &scene, &view, &plan, Free::ALL).unwrap().unwrap().set(&usual);
+        let run = |seed| seen(&gpu, &scene, &SceneSettings { seed, ..chosen.clone() }, &camera, [size; 2]);
+        let runs: Vec<scene::RunResult> = (1..=100).map(run).collect();
+        assert!(runs.iter().all(|lit| lit.end == End::Error), "{name}: runs end at their error");
+        judge_all(name, &runs, &without_bias(&gpu, &scene, &runs[0], 500), &mut coverages, &mut widths);
+    }
+    println!("coverage of all scenes: {:.3}", coverages.iter().sum::<f64>() / coverages.len() as f64);
 }
 
 #[test]
