@@ -125,9 +125,9 @@ fn the_open_box_is_studied_against_radiosity_and_goes_on_where_it_ended() {
 
     // The fastest builders, of photons that all of them agree on.
     let map = first.compaction.as_ref().unwrap();
-    assert!(
-        map.cells.len() == 5 && page.contains("Fastest builder by photon count") && folder.text("compaction.svg").contains("persistent")
-    );
+    assert!(map.cells.len() == 5 && page.contains("Fastest builder by photon count"));
+    // Which is fastest differs from run to run where several nearly are.
+    assert!(folder.text("compaction.svg").contains(map.cells[0].builders[0].builder.name()));
     for cell in &map.cells {
         assert!(cell.agreed == Agreed::Photons && cell.builders.len() == 6, "{cell:?}");
         // Of photons that all go on with the same chance: s + s^2 + ... of them are stored.
