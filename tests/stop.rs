@@ -193,7 +193,7 @@ fn judge_all(name: &str, runs: &[scene::RunResult], truth: &scene::RunResult, co
         (off * off - own_error * own_error).max(0.0).sqrt()
     };
     let true_errors: Vec<f64> = runs.iter().map(off).collect();
-    let claims: Vec<Claim> = runs.iter().map(|lit| (Vec::new(), watched_error(lit), unit)).collect();
+    let claims: Vec<Claim> = runs.iter().map(|lit| (Vec::new(), lit.error().bound_of_all(CONFIDENCE, lit.losses.relative), unit)).collect();
     let mean = |of: &dyn Fn(&scene::RunResult) -> f64| runs.iter().map(of).sum::<f64>() / runs.len() as f64;
     println!(
         "{name}: noise {:.4}, bias {:.4}, at most {:.4}; true error {:.4}, of which the truth's own is {own_error:.4}",

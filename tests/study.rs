@@ -126,10 +126,11 @@ fn the_open_box_is_studied_against_radiosity_and_goes_on_where_it_ended() {
     // The fastest builders, of photons that all of them agree on.
     let map = first.compaction.as_ref().unwrap();
     assert!(map.cells.len() == 5 && page.contains("Fastest builder by photon count"));
-    // Which is fastest differs from run to run where several nearly are.
-    assert!(folder.text("compaction.svg").contains(map.cells[0].builders[0].builder.name()));
+    let chart = folder.text("compaction.svg");
     for cell in &map.cells {
         assert!(cell.agreed == Agreed::Photons && cell.builders.len() == 6, "{cell:?}");
+        // Which is the fastest differs from run to run where several nearly are.
+        assert!(chart.contains(cell.builders[0].builder.name()), "{cell:?}");
         // Of photons that all go on with the same chance: s + s^2 + ... of them are stored.
         let s = f64::from(cell.survival);
         let expected = f64::from(cell.photons) * s * (1.0 - s.powi(15)) / (1.0 - s);

@@ -106,15 +106,16 @@ fn costs(kind: &str) -> Costs {
 /// How many times as long a flight takes of a photon that is sent through mirrors and glass.
 const OF_CAUSTIC_PHOTON: f64 = 1.7;
 
-/// What a pilot's rounds have.
+/// How much a pilot looks at.
 #[derive(Clone, Copy)]
 pub struct PilotSize {
-    /// Rounds of few pixels, spread over the picture: as many as take hardly longer than fewer.
+    /// Rounds of the first look, and its pixels at most, spread over the picture. On a GPU many take hardly longer than few.
     pub rounds: u32,
     pub pixels: u32,
-    /// Photons of each map: about so many that they take as long as all else. Those within the first radius over the usual ones are so many
-    /// that the radius is two to three times the usual one: so the bias stands out, and discs over fine meshes are not too many triangles.
+    /// Photons of each map in all looks: about so many that they take as long as all else.
     pub photons: u32,
+    /// Photons within the first radius, over the usual number. The radius is then two to three times the usual one: so large that the bias
+    /// stands out, and so small that discs over fine meshes do not cover too many triangles.
     pub neighbours: f64,
 }
 

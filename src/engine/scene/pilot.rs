@@ -217,7 +217,7 @@ const USUAL_POWERS: [f64; 2] = [0.0, 1.0];
 /// Few pixels seldom show rare light: the variance over what most of them find.
 const RARE: f64 = 1.4;
 /// A run takes at least so many times as long as another look at a few pixels, or there is none.
-const LEAST_LOOKS: f64 = 10.0;
+const LEAST_LOOKS: f64 = 4.0;
 
 /// Blocks that a run may do with, which wants some more than its first look takes.
 const FEW_BLOCKS: u32 = 32;
@@ -229,11 +229,11 @@ const LEAST_SHARES: [f64; 4] = [0.0, 0.25, 0.5, 0.75];
 const OF_CHAINS: f64 = 1.25;
 /// Of the mean cost of a path, what one costs at least: it must be sent, whatever it meets.
 const LEAST_COST: f64 = 0.1;
-/// Rounds of all pixels with each kind of light: at least, of the first look at most, and of any, and the share of the run that these may take, at first several times
-/// as much, as few pixels may have told too little of the run.
+/// Rounds of a look at all pixels with each kind of light: the fewest, the most of the first look, and the most of any.
 const PICTURE_ROUNDS: u32 = 4;
 const FIRST_PICTURE_ROUNDS: u32 = 8;
 const MOST_PICTURE_ROUNDS: u32 = 64;
+/// The share of the run that they may take. The first look may take several times as much, as few pixels may have told too little of the run.
 const PICTURE_SHARE: f64 = 0.05;
 const LEAST_PICTURE: f64 = 6.0;
 /// Of the mean, what a tile is taken to have that showed nothing.
