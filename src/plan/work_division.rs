@@ -6,7 +6,7 @@
 //! noise of paths   (path + shadow ray / R^p) / (S^p n)
 //! noise of maps    of a round / (photons in the disc x S^p of the map) x the mean of 1 / r^2 of the rounds / n
 //! bias             (of a map's light x its share x the mean of r^2 to a power)^2
-//! unseen           (of a path / (samples of those that have fewest x n))^2
+//! unseen           (of a path / (samples of those that have fewest x n))^2, and (of a photon / (photons x r^2 x n))^2 where none has arrived
 //! ```
 //!
 //! with what is not known of the bias, which falls with the noise of the maps. Radii shrink as Knaus and Zwicker (2011) have them. Variances
@@ -115,7 +115,7 @@ pub struct MapVariance {
 
 impl MapVariance {
     /// The first radius's square over that of the usual photons and neighbours; one that is given is taken for that.
-    fn squared_radius(&self, of: PhotonsOfMap) -> f64 {
+    pub fn squared_radius(&self, of: PhotonsOfMap) -> f64 {
         self.widest.map_or(1.0, |widest| widest.min(of.over_usual()))
     }
 
@@ -233,6 +233,9 @@ pub struct Rounds {
     /// the samples of pixels that have fewest, over the mean of all.
     pub unseen: f64,
     pub least_samples: f64,
+    /// Where no photon of the global map has reached any pixel, what they may add all the same, times photons and the square of the radius
+    /// over the usual one.
+    pub unreached: f64,
 }
 
 impl Rounds {
@@ -286,6 +289,9 @@ impl Rounds {
             parts.noise[1 + place] = noise;
             parts.unknown += noise * map.uncertainty;
             parts.bias += map.bias(map.squared_radius(of));
+            if place == 0 {
+                parts.unseen = parts.unseen.hypot(self.unreached / (f64::from(of.photons) * map.squared_radius(of)));
+            }
         }
         parts
     }
@@ -426,7 +432,7 @@ mod tests {
     const OF_PATHS: Free = Free { photons: false, caustic_photons: false, neighbours: false, caustic_neighbours: false, ..Free::ALL };
 
     fn rounds(variance: Variance, cost: Cost) -> Rounds {
-        Rounds { variance, cost, alpha: 2.0 / 3.0, counts_bias: true, unseen: 0.0, least_samples: 1.0 }
+        Rounds { variance, cost, alpha: 2.0 / 3.0, counts_bias: true, unseen: 0.0, least_samples: 1.0, unreached: 0.0 }
     }
 
     fn goal(error: f64) -> Stop {
@@ -482,6 +488,19 @@ mod tests {
         let few = PhotonsOfMap { neighbours: 0.1, ..twice };
         assert_eq!((set.of_first_round(few, 8), of_map(0.05, 0.5).of_first_round(twice, 8)), (0.025, 0.05));
         assert_eq!(MapVariance { sample_power: 1.0, ..set }.of_first_round(few, 8), 0.025 / 8.0);
+    }
+
+    /// Of photons that have reached nothing more are traced, or more looked at, until they prove that nothing is missing.
+    #[test]
+    fn photons_that_reach_nothing_are_as_many_as_prove_it() {
+        let at = PhotonsOfMap { photons: USUAL_PHOTONS as u32, neighbours: 1.0 };
+        let global = MapVariance { at, widest: Some(100.0), ..MapVariance::default() };
+        let variance = Variance { path: 1e-3, global, ..Variance::default() };
+        let known = rounds(variance, Cost { round: 1e6, paths: 1e6, photons: [5.0; 2], ..Cost::default() });
+        let dark = Rounds { unreached: 0.5 * USUAL_PHOTONS, ..known };
+        let [few, many] = [known, dark].map(|rounds| best(&rounds, BEFORE, Free::ALL, &goal(0.002), (MOST_SAMPLES, MOST_PHOTONS)));
+        assert!(many.global().over_usual() * f64::from(many.photons) > 4.0 * few.global().over_usual() * f64::from(few.photons));
+        assert!(dark.until(many, 0.002).1 < 0.5 * dark.until(few, 0.002).1, "{many:?} {few:?}");
     }
 
     /// What is well known counts, and of what is not the usual; never less than is likely.

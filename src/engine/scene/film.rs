@@ -20,7 +20,8 @@ use crate::plan::radius::mean_squared_radius;
 use crate::plan::scene::MapPlan;
 
 /// Names of the kinds of `HIT_...`, but for those of light that no error counts.
-const KINDS: [&str; 3] = ["shadow ray", "photon of the caustic map", "photon of the global map"];
+const KINDS: [&str; 3] = ["shadow ray", "photon of the caustic map", GLOBAL_PHOTON];
+pub(super) const GLOBAL_PHOTON: &str = "photon of the global map";
 /// In place of a bound: something has hit (`glsl/world/scene/one_hit.glsl`).
 const REACHED: u32 = u32::MAX;
 /// Of a pixel's light, what bright photons may add that is worth counting.

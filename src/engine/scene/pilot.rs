@@ -201,6 +201,7 @@ fn known(looks: &PilotRounds, of_many: &Parts, of_one: Option<&Parts>, kind: &st
         alpha: plan.settings.alpha,
         counts_bias: plan.film.bias == BiasPlan::Blocks,
         unseen: of_many.unseen / f64::from(plan.sensor.pixels()).sqrt(),
+        unreached: of_many.unreached * global.squared_radius(at.global()),
         least_samples: 1.0,
     };
     Some((parts.map(|part| part / all), rounds))

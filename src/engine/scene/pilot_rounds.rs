@@ -4,6 +4,7 @@ use std::cell::Cell;
 
 use glam::DVec3;
 
+use super::film::GLOBAL_PHOTON;
 use super::{RunResult, SceneFilm, View, light};
 use crate::constants::PART_COUNT;
 use crate::engine::{self, Control, bias_batches};
@@ -41,6 +42,8 @@ pub struct Parts {
     pub light: [f64; PART_COUNT as usize],
     /// What one pixel may have of light that its only path has missed, relative to the light of a pixel.
     pub unseen: f64,
+    /// Where no photon of the global map has reached any pixel: the bound of the light that it may give all the same, times photons.
+    pub unreached: f64,
     pub counted: Counted,
     /// With so many a path.
     pub shadow_rays: u32,
@@ -113,6 +116,9 @@ impl PilotRounds<'_> {
         let [direct, specular, caustic, indirect] = error.places.map_or([0.0; PART_COUNT as usize], |places| places.of_parts);
         let of_path = f64::from(samples) * of_round;
         let of_unseen = f64::from(samples) * f64::from(lit.film.rounds) * (lit.film.pixels() as f64).sqrt();
+        let is_dark = error.unknown.absent.contains(&GLOBAL_PHOTON) && error.unknown.relative.is_finite();
+        let photons = f64::from(lit.film.rounds) * f64::from(settings.photons);
+        let unreached = if is_dark { error.unknown.relative * photons } else { 0.0 };
         let light: Vec<f64> = lit.film.part_totals.iter().map(|total| *total as f64).collect();
         // Without lamps and sky that are seen straight.
         let surfaces = lit.film.of_surfaces.as_ref().unwrap_or(&lit.film.of_blocks);
@@ -122,6 +128,7 @@ impl PilotRounds<'_> {
             variance: [direct * of_path, specular * of_path, caustic * of_round, indirect * of_round],
             light: std::array::from_fn(|part| light[part] / all),
             unseen: error.unseen * of_unseen,
+            unreached,
             shadow_rays,
             counted: Counted { nodes, nodes_of_ray: 0.0, triangles, flights: [0, 1].map(|map| flights(&lit.fates[map])) },
         })
