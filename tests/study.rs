@@ -14,7 +14,7 @@ use photonmill::output::destination::Folder;
 /// Bounded by rounds alone, so that a slow machine finds the same.
 fn request(scene: &str, most_rounds: u32) -> Request {
     let (scene, budget) = (scene.to_owned(), Duration::from_secs(3600));
-    Request { scene, size: 6, photons: 2048, repeats: 3, seed: 1, reference_samples: 512, budget, most_rounds }
+    Request { scene, size: 6, photons: 2048, repeats: 3, seed: 1, reference_samples: 512, budget, peers: Vec::new(), most_rounds }
 }
 
 fn run(gpu: &Gpu, folder: &Path, request: Request) -> photonmill::error::Result<Study> {

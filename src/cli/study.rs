@@ -11,7 +11,7 @@ use super::values::{parse_integer, parse_seconds, parse_within};
 use super::{DeviceArgs, End, complain, help, say};
 use crate::error::{Result, require, within};
 use crate::gpu::Gpu;
-use crate::measure::study::{self, Request};
+use crate::measure::study::{self, Request, peers};
 use crate::output::destination::Folder;
 use crate::scene::Scene;
 
@@ -28,7 +28,7 @@ pub(super) struct StudyArgs {
     /// Runs of every setting and number of rounds; their spread gives the confidence intervals
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, default_value = "5", help_heading = "Measurements")]
     repeats: u32,
-    /// Pixels along each side of the picture, or texels along each side of a wall of the open box [default: 48; 12 on a CPU]
+    /// Pixels along the longer side of the picture, or texels along each side of a wall of the open box [default: 128 and 64; 64 and 24 on a CPU]
     #[arg(long, alias = "size", value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Measurements")]
     side: Option<u32>,
     /// Samples per pixel of the path-traced reference, which is kept in the user's cache
@@ -43,6 +43,9 @@ pub(super) struct StudyArgs {
     /// Seed of the first run of every setting; the next runs take the next seeds
     #[arg(long, value_name = "N", value_parser = parse_within(0..=MAX_SEED), allow_hyphen_values = true, default_value = "1", help_heading = "Photons")]
     seed: u64,
+    /// Draw other programs' curves too, from a file that tools/bench_peers --json wrote for this scene
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    peers: Option<PathBuf>,
     #[command(flatten)]
     progress: ProgressArgs,
     #[command(flatten)]
@@ -68,16 +71,21 @@ pub(super) fn run(args: &StudyArgs, cancelled: &AtomicBool) -> Result<End> {
     let is_cpu = gpu.facts().kind == "cpu";
     let request = Request {
         scene: args.scene.clone(),
-        size: args.side.unwrap_or(if is_cpu { 12 } else { 48 }),
+        size: args.side.unwrap_or(match (args.scene == "open-box", is_cpu) {
+            (true, true) => 24,
+            (false, false) => 128,
+            _ => 64,
+        }),
         photons: args.photons.unwrap_or(if is_cpu { 8192 } else { 1 << 18 }),
         repeats: args.repeats,
         seed: args.seed,
         reference_samples: args.reference_samples,
         budget: Duration::from_secs_f64(args.budget),
         most_rounds: args.rounds,
+        peers: args.peers.as_ref().map_or(Ok(Vec::new()), |path| peers::read(path, &args.scene))?,
     };
     reporter.note(&format!(
-        "plan: {}, {side} x {side}; {} photons per round, {} runs of each point; stops measuring after {} s",
+        "plan: {}, {side} along a side; {} photons per round, {} runs of each point; stops measuring after {} s",
         scene.name,
         request.photons,
         request.repeats,
@@ -108,12 +116,12 @@ const MAX_HELD: u64 = 1 << 27;
 
 impl StudyArgs {
     fn validate(&self) -> Result<()> {
-        within("--side", u64::from(self.side.unwrap_or(48)), 2..=1024, "pixels or texels along a side")?;
+        within("--side", u64::from(self.side.unwrap_or(128)), 2..=1024, "pixels or texels along a side")?;
         within("--photons", u64::from(self.photons.unwrap_or(8192)), 64..=1 << 28, "photons per round")?;
         within("--rounds", u64::from(self.rounds), 1..=u64::from(study::MOST_ROUNDS), "rounds of the longest point")?;
         within("--repeats", u64::from(self.repeats), 2..=1000, "runs of a point, whose spread is its error")?;
         within("--reference-samples", u64::from(self.reference_samples), 16..=1 << 24, "samples per pixel")?;
-        let held = 3 * u64::from(self.side.unwrap_or(48)).pow(2) * u64::from(self.repeats);
+        let held = 3 * u64::from(self.side.unwrap_or(128)).pow(2) * u64::from(self.repeats);
         let most = format!(
             "3 * side^2 * repeats is {held} numbers in memory for each setting, and {MAX_HELD} is the limit; use fewer, or a smaller --side"
         );

@@ -25,14 +25,11 @@ struct Texture<'a> {
 }
 
 impl<'a> Texture<'a> {
-    fn of_walls(scene: &RoomScene, walls: &'a [WallEstimate]) -> Vec<(usize, Texture<'a>)> {
-        walls
-            .iter()
-            .map(|wall| {
-                let mesh = wall.illumination.len().isqrt();
-                (wall.face, Texture { rectangle: scene.rectangle(wall.face), values: &wall.illumination, mesh })
-            })
-            .collect()
+    fn of_walls(scene: &RoomScene, walls: &[(usize, &'a [f64])]) -> Vec<(usize, Texture<'a>)> {
+        let texture = |(face, values): &(usize, &'a [f64])| {
+            (*face, Texture { rectangle: scene.rectangle(*face), values, mesh: values.len().isqrt() })
+        };
+        walls.iter().map(texture).collect()
     }
 
     /// (s, t) of a point of the wall's plane; each in [0, 1] on the wall.
@@ -75,7 +72,7 @@ pub fn overview(scene: &RoomScene, walls: &[WallEstimate]) -> Picture {
     let mut picture = Picture::black(3 * WALL_PIXELS + 2 * VIEW_PIXELS, 3 * WALL_PIXELS);
     picture.paste(&unfolded(scene, walls), 0, 0);
     for (place, eye) in VIEWS.iter().enumerate() {
-        let view = perspective(scene, walls, *eye, VIEW_PIXELS);
+        let view = perspective(scene, &illumination(walls), *eye, VIEW_PIXELS);
         picture.paste(&view, 3 * WALL_PIXELS + place % 2 * VIEW_PIXELS, place / 2 * VIEW_PIXELS);
     }
     picture
@@ -83,7 +80,16 @@ pub fn overview(scene: &RoomScene, walls: &[WallEstimate]) -> Picture {
 
 /// The box seen from one point, as one picture.
 pub fn view(scene: &RoomScene, walls: &[WallEstimate], pixels: usize) -> Picture {
+    view_of_values(scene, &illumination(walls), pixels)
+}
+
+/// The same with values of any kind, of the texels of each face.
+pub fn view_of_values(scene: &RoomScene, walls: &[(usize, &[f64])], pixels: usize) -> Picture {
     perspective(scene, walls, VIEWS[1], pixels)
+}
+
+fn illumination(walls: &[WallEstimate]) -> Vec<(usize, &[f64])> {
+    walls.iter().map(|wall| (wall.face, &wall.illumination[..])).collect()
 }
 
 /// The walls folded out around the back wall, as one looks in through the opening.
@@ -91,7 +97,7 @@ pub fn unfolded(scene: &RoomScene, walls: &[WallEstimate]) -> Picture {
     let (min, max) = (scene.min_corner, scene.max_corner);
     let side = WALL_PIXELS;
     let mut picture = Picture::black(3 * side, 3 * side);
-    for (face, texture) in Texture::of_walls(scene, walls) {
+    for (face, texture) in Texture::of_walls(scene, &illumination(walls)) {
         // Column and row of the wall's square, and its point at (x, y), both from 0 to 1 with y up.
         type Unfold = fn(DVec3, DVec3, f64, f64) -> DVec3;
         let (column, row, point): (usize, usize, Unfold) = match face {
@@ -122,7 +128,7 @@ fn mix(a: f64, b: f64, t: f64) -> f64 {
 const VIEWS: [[f64; 3]; 4] = [[0.0, 0.0, 4.2], [1.7, 1.2, 4.2], [-1.7, 1.2, 4.2], [1.2, -1.8, 4.2]];
 
 /// Only the insides of walls are drawn, so that a wall between eye and box does not hide it.
-fn perspective(scene: &RoomScene, walls: &[WallEstimate], eye: [f64; 3], pixels: usize) -> Picture {
+fn perspective(scene: &RoomScene, walls: &[(usize, &[f64])], eye: [f64; 3], pixels: usize) -> Picture {
     let centre = 0.5 * (scene.min_corner + scene.max_corner);
     let half = 0.5 * (scene.max_corner - scene.min_corner).max_element();
     let eye = centre + half * DVec3::from(eye);
@@ -224,7 +230,7 @@ mod tests {
         assert_eq!([at(0, 1), at(2, 1), at(1, 2), at(1, 0), at(1, 1), at(0, 0)], [1, 2, 3, 4, 5, 0]);
 
         // Straight in front, the back wall is in the middle, the floor below, the left wall left.
-        let front = perspective(&scene, &walls, VIEWS[0], 64);
+        let front = perspective(&scene, &illumination(&walls), VIEWS[0], 64);
         let at = |i: usize, j: usize| (front.values[j * 64 + i] * 10.0).round() as usize;
         assert_eq!([at(32, 32), at(8, 32), at(55, 32), at(32, 55), at(32, 8)], [5, 1, 2, 3, 4]);
     }

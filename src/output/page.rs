@@ -2,6 +2,8 @@
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
+use super::svg::Chart;
+
 /// A whole page.
 pub fn page(title: &str, content: &Markup) -> String {
     let page = html! {
@@ -21,11 +23,14 @@ pub fn page(title: &str, content: &Markup) -> String {
 }
 
 /// A chart with what it shows; nothing where nothing was drawn.
-pub fn chart(drawn: Option<String>, caption: &str) -> Markup {
+pub fn chart(drawn: Option<Chart>, caption: &str) -> Markup {
     html! {
         @if let Some(drawn) = drawn {
             figure {
-                div.scroll { (PreEscaped(drawn)) }
+                @match drawn.narrow {
+                    Some(narrow) => { div.wide { (PreEscaped(drawn.wide)) } div.narrow { (PreEscaped(narrow)) } },
+                    None => div.scroll { div.wide.alone { (PreEscaped(drawn.wide)) } },
+                }
                 @if !caption.is_empty() { figcaption { p { (caption) } } }
             }
         }

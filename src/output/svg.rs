@@ -1,33 +1,50 @@
-//! Charts as SVG that takes its text colour from the page around it.
+//! Charts as SVG that takes its text colour from the page around it, drawn for a wide page and for a narrow one.
 
 use std::ops::Range;
 
 use plotters::coord::Shift;
+use plotters::coord::combinators::{BindKeyPoints, IntoLogRange};
 use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 /// Lines of the scale; the page gives them its own colour.
 pub const SCALE: RGBColor = RGBColor(0x99, 0x99, 0x98);
 
-/// Colours that stand out on white and on black alike; the first is for what the others are compared with.
+/// Colours that the colour-blind tell apart (Okabe and Ito 2008); the first, grey, is for what the others are compared with. The style sheet
+/// has brighter ones for dark pages.
 pub const COLOURS: [RGBColor; 7] = [
-    RGBColor(0x8a, 0x8a, 0x8a),
-    RGBColor(0xd9, 0x5f, 0x02),
-    RGBColor(0x1b, 0x8f, 0xd6),
-    RGBColor(0x2c, 0xa0, 0x5a),
-    RGBColor(0xb3, 0x5c, 0xc9),
-    RGBColor(0xc9, 0xa2, 0x27),
-    RGBColor(0xe0, 0x4f, 0x6d),
+    RGBColor(0x80, 0x80, 0x80),
+    RGBColor(0xd5, 0x5e, 0x00),
+    RGBColor(0x00, 0x72, 0xb2),
+    RGBColor(0x00, 0x9e, 0x73),
+    RGBColor(0xcc, 0x79, 0xa7),
+    RGBColor(0xb0, 0x8c, 0x00),
+    RGBColor(0x3a, 0x9b, 0xd6),
 ];
 
 /// Size of letters.
-pub const TEXT: u32 = 17;
-
-const WIDTH: u32 = 760;
-/// Heights of the plane of two axes, and of a line of the legend below it.
-const PLANE: u32 = 410;
-const LEGEND: u32 = 22;
+pub const TEXT: u32 = 16;
 
 pub type Drawn<T> = Result<T, DrawingAreaErrorKind<std::io::Error>>;
+
+/// A chart for wide pages, and one for narrow ones where it is not the same.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Chart {
+    pub wide: String,
+    pub narrow: Option<String>,
+}
+
+impl Chart {
+    /// Of a chart that scrolls where the page is narrow.
+    pub fn of_one_size(wide: String) -> Chart {
+        Chart { wide, narrow: None }
+    }
+
+    /// As a file of its own.
+    pub fn as_file(&self) -> Vec<u8> {
+        self.wide.replacen("<svg ", "<svg xmlns=\"http://www.w3.org/2000/svg\" style=\"background:#fff\" ", 1).into_bytes()
+    }
+}
 
 /// A logarithmic axis.
 pub struct Axis {
@@ -37,12 +54,14 @@ pub struct Axis {
 }
 
 /// Points of one colour.
+#[derive(Clone)]
 pub struct Series {
     pub label: String,
     pub colour: RGBColor,
     pub points: Vec<(f64, f64)>,
     pub dot: u32,
-    pub has_line: bool,
+    /// What a line joins; points that noise moves have none.
+    pub line: Vec<(f64, f64)>,
     /// Corners of the area of uncertainty; empty: it is not drawn.
     pub band: Vec<(f64, f64)>,
 }
@@ -50,55 +69,153 @@ pub struct Series {
 impl Series {
     /// A line through dots, in one of [`COLOURS`].
     pub fn line(label: impl Into<String>, colour: usize, points: Vec<(f64, f64)>) -> Series {
+        Series { line: points.clone(), ..Series::dots(label, colour, points) }
+    }
+
+    pub fn dots(label: impl Into<String>, colour: usize, points: Vec<(f64, f64)>) -> Series {
         let colour = COLOURS[colour % COLOURS.len()];
-        Series { label: label.into(), colour, points, dot: 4, has_line: true, band: Vec::new() }
+        Series { label: label.into(), colour, points, dot: 4, line: Vec::new(), band: Vec::new() }
     }
 }
 
-/// All series over two logarithmic axes, and a legend. What lies above or below the axes is drawn at their ends.
-pub fn log_log(x: Axis, y: Axis, series: &[Series]) -> String {
+/// How large a chart is, and where it has its labels.
+struct Layout {
+    width: u32,
+    height: u32,
+    /// Beside the ends of lines, in a margin so wide; 0: in a legend below.
+    labels: u32,
+    /// Along each axis, at most.
+    ticks: usize,
+}
+
+const WIDE: Layout = Layout { width: 900, height: 460, labels: 230, ticks: 10 };
+const NARROW: Layout = Layout { width: 400, height: 340, labels: 0, ticks: 5 };
+
+/// All series over two logarithmic axes. What lies above or below the axes is drawn at their ends.
+pub fn log_log(x: &Axis, y: &Axis, series: &[Series]) -> Chart {
+    Chart { wide: draw(x, y, series, &WIDE), narrow: Some(draw(x, y, series, &NARROW)) }
+}
+
+fn draw(x: &Axis, y: &Axis, series: &[Series], layout: &Layout) -> String {
     let (bottom, top) = (y.range.start, y.range.end);
     let within = |points: &[(f64, f64)]| points.iter().map(|point| (point.0, point.1.clamp(bottom, top))).collect::<Vec<_>>();
     let series: Vec<&Series> = series.iter().filter(|series| !series.points.is_empty()).collect();
-    svg((WIDTH, PLANE + LEGEND * series.len() as u32), |area| {
-        // The legend has room of its own, as curves fill the plane.
-        let (plane, legend) = area.split_vertically(PLANE);
+    let legend = if layout.labels == 0 { LEGEND_LINE * series.len() as u32 } else { 0 };
+    svg((layout.width, layout.height + legend), |area| {
+        let (plane, legend) = area.split_vertically(layout.height);
         let mut chart = ChartBuilder::on(&plane)
-            .margin(14)
-            .margin_right(64)
-            .x_label_area_size(52)
-            .y_label_area_size(84)
-            .build_cartesian_2d(x.range.log_scale(), y.range.log_scale())?;
+            .margin(8)
+            .margin_top(16)
+            .margin_right(layout.labels.max(24))
+            .x_label_area_size(50)
+            .y_label_area_size(if layout.labels == 0 { 66 } else { 80 })
+            .build_cartesian_2d(
+                x.range.clone().log_scale().with_key_points(ticks(&x.range, layout.ticks)),
+                y.range.clone().log_scale().with_key_points(ticks(&y.range, 9)),
+            )?;
         chart
             .configure_mesh()
-            .bold_line_style(SCALE.mix(0.45))
+            .bold_line_style(SCALE.mix(0.4))
             .light_line_style(SCALE.mix(0.0))
             .axis_style(SCALE)
-            .label_style(("sans-serif", TEXT))
-            .axis_desc_style(("sans-serif", TEXT))
+            .label_style(("sans-serif", TEXT - 1))
+            .axis_desc_style(("sans-serif", TEXT - 1))
             .x_desc(x.name)
             .y_desc(y.name)
-            .x_label_formatter(&|value| labelled(*value, x.label))
-            .y_label_formatter(&|value| labelled(*value, y.label))
+            .x_label_formatter(&|value| (x.label)(*value))
+            .y_label_formatter(&|value| (y.label)(*value))
             .draw()?;
-        for (number, Series { label, colour, points, dot, has_line, band }) in series.into_iter().enumerate() {
-            let points = within(points);
-            chart.draw_series([Polygon::new(within(band), colour.mix(0.18).filled())])?;
-            let line = if *has_line { points.clone() } else { Vec::new() };
-            chart.draw_series(LineSeries::new(line, colour.stroke_width(2)))?;
-            chart.draw_series(points.into_iter().map(|point| Circle::new(point, *dot, colour.filled())))?;
-            let at = (100, 8 + (LEGEND * number as u32) as i32);
-            legend.draw(&PathElement::new([at, (at.0 + 24, at.1)], colour.stroke_width(3)))?;
-            legend.draw(&Text::new(label.clone(), (at.0 + 34, at.1 - 8), ("sans-serif", TEXT)))?;
+        for Series { colour, points, dot, line, band, .. } in &series {
+            chart.draw_series([Polygon::new(within(band), colour.mix(0.2).filled())])?;
+            chart.draw_series(LineSeries::new(within(line), colour.stroke_width(3)))?;
+            chart.draw_series(within(points).into_iter().map(|point| Circle::new(point, *dot, colour.filled())))?;
+        }
+        if layout.labels == 0 {
+            for (number, Series { label, colour, .. }) in series.iter().enumerate() {
+                let at = (12, 12 + (LEGEND_LINE * number as u32) as i32);
+                legend.draw(&PathElement::new([at, (at.0 + 22, at.1)], colour.stroke_width(4)))?;
+                legend.draw(&text(label.clone(), (at.0 + 30, at.1)))?;
+            }
+            return Ok(());
+        }
+        let edge = (layout.width - layout.labels) as i32;
+        let ends: Vec<(i32, i32)> = series.iter().map(|series| chart.backend_coord(within(&series.points).last().expect("not empty"))).collect();
+        let labels: Vec<Vec<String>> = series.iter().map(|series| lines_of(&series.label, LETTERS)).collect();
+        let heights: Vec<i32> = labels.iter().map(|lines| LABEL_LINE * lines.len() as i32 + 4).collect();
+        let places = apart(&ends.iter().map(|end| end.1).collect::<Vec<_>>(), &heights, layout.height as i32);
+        for (number, lines) in labels.into_iter().enumerate() {
+            let (end, middle, colour) = (ends[number], places[number], series[number].colour);
+            area.draw(&PathElement::new([(end.0 + 6, end.1), (edge + 4, middle), (edge + 10, middle)], colour.mix(0.7).stroke_width(1)))?;
+            let first = middle - LABEL_LINE * (lines.len() as i32 - 1) / 2;
+            for (place, line) in lines.into_iter().enumerate() {
+                area.draw(&text(line, (edge + 14, first + LABEL_LINE * place as i32)))?;
+            }
         }
         Ok(())
     })
 }
 
-/// Ones, twos and fives have a label: all nine of a decade would lie on each other.
-fn labelled(value: f64, label: fn(f64) -> String) -> String {
-    let digit = (value / 10f64.powf(value.log10().floor() + 1e-9)).round();
-    if [1.0, 2.0, 5.0, 10.0].contains(&digit) { label(value) } else { String::new() }
+const LEGEND_LINE: u32 = 22;
+/// Height of a line of a label beside its curve, and letters in it.
+const LABEL_LINE: i32 = 17;
+const LETTERS: usize = 26;
+
+fn text<'a>(words: String, at: (i32, i32)) -> Text<'a, (i32, i32), String> {
+    Text::new(words, at, TextStyle::from(("sans-serif", TEXT - 1)).pos(Pos::new(HPos::Left, VPos::Center)))
+}
+
+/// Words in lines of at most so many letters.
+fn lines_of(words: &str, most: usize) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for word in words.split(' ') {
+        let line = lines.last_mut().expect("there is one");
+        if line.is_empty() {
+            word.clone_into(line);
+        } else if line.chars().count() + 1 + word.chars().count() <= most {
+            line.push(' ');
+            line.push_str(word);
+        } else {
+            lines.push(word.to_owned());
+        }
+    }
+    lines
+}
+
+/// Where labels of these heights are, as near to the places that they belong to as they can without lying on each other.
+fn apart(wanted: &[i32], heights: &[i32], end: i32) -> Vec<i32> {
+    let mut order: Vec<usize> = (0..wanted.len()).collect();
+    order.sort_by_key(|number| wanted[*number]);
+    let mut places = vec![0; wanted.len()];
+    let mut free = 0;
+    for &number in &order {
+        let half = heights[number] / 2;
+        places[number] = wanted[number].max(free + half);
+        free = places[number] + half;
+    }
+    let mut limit = end;
+    for &number in order.iter().rev() {
+        let half = heights[number] / 2;
+        places[number] = places[number].min(limit - half);
+        limit = places[number] - half;
+    }
+    places
+}
+
+/// Ones, twos and fives of each decade within a range; fewer where they are more than so many.
+fn ticks(range: &Range<f64>, most: usize) -> Vec<f64> {
+    let all = |digits: &[f64], step: usize| -> Vec<f64> {
+        let decades = range.start.log10().floor() as i32..=range.end.log10().ceil() as i32;
+        let decades = decades.filter(|decade| decade.rem_euclid(step as i32) == 0);
+        let values = decades.flat_map(|decade| digits.iter().map(move |digit| power(decade) * digit));
+        values.filter(|value| (range.start * 0.999..range.end * 1.001).contains(value)).collect()
+    };
+    let choices = [(&[1.0, 2.0, 5.0][..], 1), (&[1.0, 3.0], 1), (&[1.0], 1), (&[1.0], 2), (&[1.0], 3)];
+    choices.into_iter().map(|(digits, step)| all(digits, step)).find(|ticks| ticks.len() <= most).unwrap_or_default()
+}
+
+/// 10^n, the nearest number to it.
+fn power(exponent: i32) -> f64 {
+    format!("1e{exponent}").parse().expect("a number was written")
 }
 
 /// Whole decades around all values.
@@ -108,11 +225,11 @@ pub fn decades(values: impl Iterator<Item = f64>) -> Range<f64> {
     10f64.powf(low)..10f64.powf(high.log10().ceil().max(low + 1.0))
 }
 
-/// A little wider than all values. Scales have marks around powers of ten only, so there is one.
+/// A little wider than all values, and wide enough to have a mark or two.
 pub fn around(values: impl Iterator<Item = f64>) -> Range<f64> {
     let (low, high) = extremes(values);
-    let power = 10f64.powf((low * high).sqrt().log10().round());
-    (low / 1.3).min(power / 1.05)..(high * 1.3).max(power * 1.05)
+    let wider = (3.0 * low / high).max(1.0).sqrt();
+    low / 1.3 / wider..high * 1.3 * wider
 }
 
 /// The least and the largest of values above 0.
@@ -131,11 +248,6 @@ pub fn svg(size: (u32, u32), draw: impl FnOnce(&DrawingArea<SVGBackend, Shift>) 
     text.replacen(" xmlns=\"http://www.w3.org/2000/svg\"", "", 1).replacen("<svg ", "<svg role=\"img\" ", 1)
 }
 
-/// A chart of a page as a file of its own.
-pub fn as_file(drawn: &str) -> Vec<u8> {
-    drawn.replacen("<svg ", "<svg xmlns=\"http://www.w3.org/2000/svg\" style=\"background:#fff\" ", 1).into_bytes()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -144,5 +256,24 @@ mod tests {
     fn scales_end_on_decades() {
         assert_eq!(decades([2130.0, 105_640.0].into_iter()), 1e3..1e6);
         assert_eq!(decades([100.0].into_iter()), 1e2..1e3);
+    }
+
+    #[test]
+    fn marks_are_ones_twos_and_fives_as_far_as_there_is_room() {
+        assert_eq!(ticks(&(0.9..30.0), 9), [1.0, 2.0, 5.0, 10.0, 20.0]);
+        assert_eq!(ticks(&(0.01..0.2), 9), [0.01, 0.02, 0.05, 0.1, 0.2]);
+        assert_eq!(ticks(&(0.9..1100.0), 5), [1.0, 10.0, 100.0, 1000.0]);
+        assert_eq!(ticks(&(1e-3..1e6), 5), [1e-2, 1.0, 1e2, 1e4, 1e6]);
+        // A range of one value still has marks.
+        assert!(!ticks(&around([3.3].into_iter()), 9).is_empty());
+    }
+
+    #[test]
+    fn labels_do_not_lie_on_each_other() {
+        let places = apart(&[50, 52, 390, 54], &[20, 20, 20, 40], 400);
+        assert_eq!(places, [50, 70, 390, 100]);
+        let places = apart(&[395, 398], &[20, 20], 400);
+        assert_eq!(places, [370, 390]);
+        assert_eq!(lines_of("a shrinking radius and more", 12), ["a shrinking", "radius and", "more"]);
     }
 }

@@ -46,7 +46,9 @@ struct Search<'a> {
 
 /// The shortest time to the error among several settings.
 pub fn measure(lab: &mut Lab, name: &str) -> Result<Found> {
-    let (scene, geometry) = named(name)?;
+    let (mut scene, geometry) = named(name)?;
+    // Square, whatever the camera asks for.
+    scene.cameras.iter_mut().for_each(|camera| camera.aspect = Some(1.0));
     let (size, samples, wanted, seconds) = lab.choose((8, 1024, 0.5, 2), (32, 1024, 0.05, 20), (256, 256, 0.01, 20));
     let patience = Duration::from_secs(seconds);
     let request = study::Request {
@@ -57,6 +59,7 @@ pub fn measure(lab: &mut Lab, name: &str) -> Result<Found> {
         seed: FIRST_SEED,
         reference_samples: samples,
         budget: patience,
+        peers: Vec::new(),
         most_rounds: study::MOST_ROUNDS,
     };
     let subjects = Subject::all(lab.gpu, &scene, &request, lab.cancelled, lab.tell)?;

@@ -26,7 +26,6 @@ use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::measure::compaction::{self, Map};
 use crate::output::destination::{Folder, write_all};
-use crate::output::svg::as_file;
 use crate::scene::Scene;
 use experiment::Experiment;
 use pass::Pass;
@@ -192,7 +191,7 @@ impl Bench {
 pub fn write(folder: &Folder, bench: &Bench) -> Result<()> {
     let mut files = vec![(folder.file("bench.json"), bench.json()), (folder.file("bench.txt"), table::text(bench).into_bytes())];
     if let Some(map) = &bench.compaction {
-        files.push((folder.file("compaction.svg"), as_file(&compaction::chart::draw(map))));
+        files.push((folder.file("compaction.svg"), compaction::chart::draw(map).as_file()));
     }
     if let Some(scale) = &bench.scale {
         files.extend(chart::all(scale).map(|(name, drawn)| (folder.file(&name), drawn)));

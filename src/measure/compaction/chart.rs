@@ -4,7 +4,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::Map;
-use crate::output::svg::{SCALE, TEXT, svg};
+use crate::output::svg::{Chart, SCALE, TEXT, svg};
 use crate::output::words::times;
 use crate::settings::Builder;
 
@@ -27,11 +27,11 @@ const TOP: i32 = 16;
 
 /// Photons to the right, survival upwards, a scene on top; in each cell the fastest builder, its speed-up over one atomic per thread, and,
 /// in small letters, the builders that are not significantly slower.
-pub fn draw(map: &Map) -> String {
+pub fn draw(map: &Map) -> Chart {
     let (sizes, rows) = (map.sizes(), map.rows());
     let width = LEFT + FIELD.0 * sizes.len() as i32 + 16;
     let height = TOP + FIELD.1 * rows.len() as i32 + 56;
-    svg((width as u32, height as u32), |area| {
+    let drawn = svg((width as u32, height as u32), |area| {
         let bottom = TOP + FIELD.1 * rows.len() as i32;
         for (row, cells) in rows.iter().enumerate() {
             let top = bottom - FIELD.1 * (row as i32 + 1);
@@ -57,7 +57,8 @@ pub fn draw(map: &Map) -> String {
         }
         let middle = LEFT + FIELD.0 * sizes.len() as i32 / 2;
         area.draw(&Text::new("photons", (middle, bottom + 38), text(TEXT - 3, HPos::Center, &SCALE)))
-    })
+    });
+    Chart::of_one_size(drawn)
 }
 
 fn text(size: u32, horizontal: HPos, colour: &RGBColor) -> TextStyle<'_> {

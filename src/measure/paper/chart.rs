@@ -6,12 +6,12 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use super::Reproduction;
 use super::experiments::{Implementation, Pass, TotalTime, series};
 use super::published;
-use crate::output::svg::{Axis, COLOURS, SCALE, Series, TEXT, decades, log_log, svg};
+use crate::output::svg::{Axis, COLOURS, Chart, SCALE, Series, TEXT, decades, log_log, svg};
 use crate::output::words;
 use crate::settings::Gather;
 
 /// Time against photons, both logarithmic, of table 1.
-pub fn totals(found: &Reproduction) -> Option<String> {
+pub fn totals(found: &Reproduction) -> Option<Chart> {
     let published = published::TABLE_1.map(|(rounds, ms)| (f64::from(rounds * published::PHOTONS), ms));
     let names = ["here, brute force", "here, grid", "here, grid, large rounds"];
     let here = series(&found.request).into_iter().zip(names).zip(1..).map(|(((photons, gather), name), colour)| {
@@ -21,7 +21,7 @@ pub fn totals(found: &Reproduction) -> Option<String> {
     let range = |of: fn(&(f64, f64)) -> f64| decades(series.iter().flat_map(|series| &series.points).map(of));
     let x = Axis { name: "photons", range: range(|point| point.0), label: |photons| words::count(photons as u64) };
     let y = Axis { name: "time", range: range(|point| point.1), label: words::tick };
-    (!found.totals.is_empty()).then(|| log_log(x, y, &series))
+    (!found.totals.is_empty()).then(|| log_log(&x, &y, &series))
 }
 
 /// A pass of a builder at the paper's size.
@@ -32,7 +32,7 @@ struct Row {
 }
 
 /// Both passes of every builder at the paper's size, each beside what the paper measured.
-pub fn running_times(found: &Reproduction) -> Option<String> {
+pub fn running_times(found: &Reproduction) -> Option<Chart> {
     let row = |implementation: Implementation, pass: Pass| {
         let time = found.running_time(published::PHOTONS, published::BOUNCES, implementation, pass)?;
         let grid = if pass == Pass::Rendering(Gather::Grid) { ", grid" } else { "" };
@@ -43,7 +43,7 @@ pub fn running_times(found: &Reproduction) -> Option<String> {
         })
     };
     let rows: Vec<Row> = Pass::ALL.iter().flat_map(|pass| found.implementations().into_iter().filter_map(|one| row(one, *pass))).collect();
-    (!rows.is_empty()).then(|| draw_running_times(&rows))
+    (!rows.is_empty()).then(|| Chart::of_one_size(draw_running_times(&rows)))
 }
 
 fn draw_running_times(rows: &[Row]) -> String {
@@ -94,7 +94,7 @@ mod tests {
     #[test]
     fn charts_name_their_series_and_no_address() {
         let found = sample::reproduction();
-        let drawn = totals(&found).unwrap() + &running_times(&found).unwrap();
+        let drawn = totals(&found).unwrap().wide + &running_times(&found).unwrap().wide;
         assert!(drawn.contains("here, brute force") && drawn.contains("map: naive"));
         assert!(!drawn.contains("http"));
     }

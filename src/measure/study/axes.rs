@@ -9,6 +9,8 @@ use crate::settings::{Builder, Gather, Math, RoomSettings, Sums};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Axis {
+    /// Runs that an error ends, with nothing set.
+    Default,
     Builder,
     Photons,
     Radius,
@@ -31,6 +33,7 @@ pub enum Axis {
 impl Axis {
     pub fn name(self) -> &'static str {
         match self {
+            Axis::Default => "default settings",
             Axis::Builder => "builder",
             Axis::Photons => "photons per round",
             Axis::Radius => "radius",

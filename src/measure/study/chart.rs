@@ -1,48 +1,90 @@
-//! Error against time, both logarithmic: the curves of an axis with their bands, and all points with the Pareto front.
+//! Error against time, both logarithmic: what matters of a part on one chart, the curves of an axis with their bands, and all points with
+//! the Pareto front.
 
 use super::Part;
+use super::peers::Peer;
 use super::point::{Curve, Point};
-use crate::output::svg::{Axis, Series, around, log_log};
+use crate::measure::paper::published;
+use crate::output::svg::{Axis, Chart, Series, around, log_log};
 use crate::output::words;
 
-/// A chart for each axis and one of everything, by names fit for files.
-pub fn all(part: &Part) -> Vec<(String, String)> {
+/// A chart for each axis, one of everything, and one of what matters, by names fit for files.
+pub fn all(part: &Part) -> Vec<(String, Chart)> {
+    let main = main(part, &[], &[]).map(|drawn| ("main".to_owned(), drawn));
     let overview = overview(part).map(|drawn| ("overview".to_owned(), drawn));
     let of_axes = part
         .comparisons
         .iter()
         .filter_map(|comparison| Some((comparison.axis.name().replace([' ', '\''], "-"), of_axis(&comparison.curves)?)));
-    overview.into_iter().chain(of_axes).collect()
+    main.into_iter().chain(overview).chain(of_axes).collect()
+}
+
+/// The default, the base, and the best choice, beside the paper's and other programs' points.
+pub fn main(part: &Part, paper: &[(f64, f64)], peers: &[Peer]) -> Option<Chart> {
+    let base = part.base()?;
+    let mut curves = vec![(base, format!("base: {}", base.label), 0)];
+    if let Some(default) = part.default.as_ref().filter(|default| !default.points.is_empty()) {
+        curves.push((default, "default settings, pilot included".to_owned(), 1));
+    }
+    if let Some((axis, best)) = part.best_choice() {
+        curves.push((best, format!("best single change: {}", super::findings::named(axis, &best.label)), 2));
+    }
+    let mut series: Vec<Series> = curves.into_iter().map(|(curve, label, colour)| with_band(curve, label, colour)).collect();
+    series.push(Series::line("the paper's GPU in 2008, error of the same photons here", 4, paper.to_vec()));
+    series.extend((5..).zip(peers).map(|(colour, peer)| Series::line(peer.name.clone(), colour, peer.points.clone())));
+    let (x, y) = axes(series.iter().flat_map(|series| &series.points).copied())?;
+    Some(log_log(&x, &y, &series))
+}
+
+/// Times that the paper printed, with the errors that its numbers of rounds have on this device, over the curve of its own settings.
+pub fn of_the_paper(base: &Curve) -> Vec<(f64, f64)> {
+    let error = |rounds: u32| {
+        // As the power law between two numbers of rounds.
+        let pair = base.points.windows(2).find(|pair| pair[0].rounds <= rounds && rounds <= pair[1].rounds)?;
+        let [from, to] = [&pair[0], &pair[1]];
+        let share = (f64::from(rounds) / f64::from(from.rounds)).ln() / (f64::from(to.rounds) / f64::from(from.rounds)).ln();
+        Some(from.error().value * (to.error().value / from.error().value).powf(share))
+    };
+    published::TABLE_1.into_iter().filter_map(|(rounds, ms)| Some((ms, error(rounds)?))).collect()
 }
 
 /// The curves with their bands; nothing where no time is known.
-pub fn of_axis(curves: &[Curve]) -> Option<String> {
-    let (x, y) = axes(curves.iter())?;
-    let series = curves.iter().enumerate().map(|(number, curve)| {
-        let low = curve.points.iter().map(|point| (point.ms().value, point.error().low));
-        let high = curve.points.iter().rev().map(|point| (point.ms().value, point.error().high));
-        Series { dot: 3, band: low.chain(high).collect(), ..Series::line(&curve.label, number, curve.points.iter().map(place).collect()) }
-    });
-    Some(log_log(x, y, &series.collect::<Vec<_>>()))
+pub fn of_axis(curves: &[Curve]) -> Option<Chart> {
+    let (x, y) = axes(curves.iter().flat_map(|curve| curve.points.iter().map(place)))?;
+    let series = curves.iter().enumerate().map(|(number, curve)| with_band(curve, curve.label.clone(), number));
+    Some(log_log(&x, &y, &series.collect::<Vec<_>>()))
 }
 
 /// Every point, and those that no other beats.
-pub fn overview(part: &Part) -> Option<String> {
-    let (x, y) = axes(part.curves())?;
+pub fn overview(part: &Part) -> Option<Chart> {
+    let (x, y) = axes(part.points().map(|(_, point)| place(point)))?;
     let places = |points: Vec<(&Curve, &Point)>| points.into_iter().map(|(_, point)| place(point)).collect();
-    let all = Series { dot: 2, has_line: false, ..Series::line("all points", 0, places(part.points().collect())) };
-    Some(log_log(x, y, &[all, Series::line("Pareto front", 1, places(part.pareto_front()))]))
+    let all = Series { dot: 2, ..Series::dots("all points", 0, places(part.points().collect())) };
+    Some(log_log(&x, &y, &[all, Series::line("Pareto front", 1, places(part.pareto_front()))]))
 }
+
+fn with_band(curve: &Curve, label: String, colour: usize) -> Series {
+    let is_known = |point: &&Point| point.error().high < MOST_NOISE * point.error().low;
+    let low = curve.points.iter().map(|point| (point.ms().value, point.error().low));
+    let high = curve.points.iter().rev().map(|point| (point.ms().value, point.error().high));
+    Series {
+        band: low.chain(high).collect(),
+        line: curve.points.iter().filter(is_known).map(place).collect(),
+        ..Series::dots(label, colour, curve.points.iter().map(place).collect())
+    }
+}
+
+/// A line goes through points whose interval is narrower than this.
+const MOST_NOISE: f64 = 2.5;
 
 fn place(point: &Point) -> (f64, f64) {
     (point.ms().value, point.error().value)
 }
 
-fn axes<'a>(curves: impl Iterator<Item = &'a Curve>) -> Option<(Axis, Axis)> {
-    let points: Vec<(f64, f64)> =
-        curves.flat_map(|curve| &curve.points).map(place).filter(|(ms, error)| *ms > 0.0 && *error > 0.0).collect();
+fn axes(points: impl Iterator<Item = (f64, f64)>) -> Option<(Axis, Axis)> {
+    let points: Vec<(f64, f64)> = points.filter(|(ms, error)| *ms > 0.0 && *error > 0.0).collect();
     let percent = |error: f64| format!("{} %", (100.0 * error * 1e6).round() / 1e6);
-    let x = Axis { name: "time", range: around(points.iter().map(|point| point.0)), label: words::tick };
+    let x = Axis { name: "time on this device", range: around(points.iter().map(|point| point.0)), label: words::tick };
     let y = Axis { name: "relative RMS error", range: around(points.iter().map(|point| point.1)), label: percent };
     (!points.is_empty()).then_some((x, y))
 }

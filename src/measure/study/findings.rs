@@ -16,7 +16,7 @@ pub fn percent(share: f64) -> String {
 }
 
 /// 'from a to b', or that nothing is known.
-fn between(estimate: Estimate, show: impl Fn(f64) -> String) -> String {
+pub fn between(estimate: Estimate, show: impl Fn(f64) -> String) -> String {
     // Beyond that it is no knowledge.
     if estimate.low > 0.0 && estimate.high < 100.0 * estimate.low {
         format!("{} to {}", show(estimate.low), show(estimate.high))
@@ -35,7 +35,7 @@ impl Part {
     }
 
     pub fn curves(&self) -> impl Iterator<Item = &Curve> {
-        self.comparisons.iter().flat_map(|comparison| &comparison.curves)
+        self.default.iter().chain(self.comparisons.iter().flat_map(|comparison| &comparison.curves))
     }
 
     pub fn points(&self) -> impl Iterator<Item = (&Curve, &Point)> {
@@ -60,6 +60,40 @@ impl Part {
         all
     }
 
+    /// What each choice changes, in the order of the axes.
+    pub fn choices(&self) -> Vec<Choice<'_>> {
+        let count: usize = self.comparisons.iter().map(|comparison| comparison.others().count()).sum();
+        // So that all of them together are as sure as one.
+        let confidence = 1.0 - (1.0 - CONFIDENCE) / count.max(1) as f64;
+        let least = self.least_error();
+        let mut choices = Vec::with_capacity(count);
+        for comparison in &self.comparisons {
+            if let Some(base) = comparison.base() {
+                let effect = |curve| effect(curve, base, least, confidence);
+                choices.extend(comparison.others().map(|curve| Choice { axis: comparison.axis, curve, effect: effect(curve) }));
+            }
+        }
+        choices
+    }
+
+    /// The choice that saves most time for the same error, by as much as is certain.
+    pub fn best_choice(&self) -> Option<(Axis, &Curve)> {
+        let gain = |choice: &Choice| match choice.effect {
+            Effect::Differs(_, longer) if longer.value < 1.0 => Some(longer.high),
+            _ => None,
+        };
+        let faster = self.choices().into_iter().filter_map(|choice| Some((gain(&choice)?, choice.axis, choice.curve.label.clone())));
+        let (_, axis, label) = faster.min_by(|one, other| one.0.total_cmp(&other.0))?;
+        let comparison = self.comparisons.iter().find(|comparison| comparison.axis == axis)?;
+        comparison.curves.iter().find(|curve| curve.label == label).map(|curve| (axis, curve))
+    }
+
+    /// A sentence for each choice that was left out.
+    pub fn not_measured(&self) -> Vec<String> {
+        let all = self.comparisons.iter().flat_map(|comparison| comparison.curves.iter().map(move |curve| (comparison.axis, curve)));
+        all.filter_map(|(axis, curve)| Some(format!("{} was not measured: {}.", named(axis, &curve.label), curve.left_out.as_ref()?))).collect()
+    }
+
     /// Sentences made of this part's numbers, the most asked for first.
     pub fn sentences(&self) -> Vec<String> {
         let Some(base) = self.base() else { return Vec::new() };
@@ -69,23 +103,15 @@ impl Part {
                 .into_iter()
                 .flatten()
                 .collect();
-        let choices: usize = self.comparisons.iter().map(|comparison| comparison.others().count()).sum();
-        // So that all of them together are as sure as one.
-        let confidence = 1.0 - (1.0 - CONFIDENCE) / choices.max(1) as f64;
         let (mut undecided, mut single) = (Vec::new(), Vec::new());
-        for comparison in &self.comparisons {
-            let Some(base) = comparison.base() else { continue };
-            for curve in comparison.others() {
-                match choice(comparison.axis, curve, base, least, confidence) {
-                    Choice::Differs(sentence) => sentences.push(sentence),
-                    Choice::Undecided(what) => undecided.push(what),
-                    Choice::SinglePoint => single.push(named(comparison.axis, &curve.label)),
-                }
+        for choice in self.choices() {
+            match choice.effect {
+                Effect::Differs(..) | Effect::Apart(..) => sentences.push(choice.sentence()),
+                Effect::Undecided(..) => undecided.push(choice.sentence()),
+                Effect::SinglePoint => single.push(choice.sentence()),
             }
-            let left_out =
-                |curve: &Curve| Some(format!("{} was not measured: {}.", named(comparison.axis, &curve.label), curve.left_out.as_ref()?));
-            sentences.extend(comparison.curves.iter().filter_map(left_out));
         }
+        sentences.extend(self.not_measured());
         if !undecided.is_empty() {
             sentences.push(format!("Not significantly faster or slower than the base: {}.", undecided.join("; ")));
         }
@@ -135,46 +161,74 @@ fn common_error(one: &Curve, other: &Curve, least: f64) -> Option<f64> {
 /// Clocks of shared machines drift by more than this.
 const NEXT_TO_NOTHING: f64 = 1.02;
 
-enum Choice {
-    Differs(String),
-    /// Name, ratio and interval.
-    Undecided(String),
+/// What a choice changes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Effect {
+    /// The time to this error over the base's, and that it is significantly more or less.
+    Differs(f64, Estimate),
+    Undecided(f64, Estimate),
+    /// The best errors that it and the base reach, and after how many milliseconds: the two have no error in common.
+    Apart([(f64, f64); 2]),
+    /// The budget allowed one point, which compares nothing.
     SinglePoint,
 }
 
+/// A choice and its effect.
+pub struct Choice<'a> {
+    pub axis: Axis,
+    pub curve: &'a Curve,
+    pub effect: Effect,
+}
+
+impl Choice<'_> {
+    pub fn name(&self) -> String {
+        named(self.axis, &self.curve.label)
+    }
+
+    fn sentence(&self) -> String {
+        let name = self.name();
+        match self.effect {
+            Effect::Apart([own, base]) => {
+                let reach = |(error, ms): (f64, f64)| format!("{} after {}", percent(error), duration(ms));
+                format!("{name} reaches {}, the base {}; the two ranges of error do not overlap.", reach(own), reach(base))
+            }
+            Effect::Differs(error, longer) if longer.value > 1.0 => {
+                let (at, interval) = (percent(error), between(longer, ratio));
+                format!("{name} takes {} as long as the base to reach {at} ({interval}).", ratio(longer.value))
+            }
+            Effect::Differs(error, longer) => {
+                let faster = Estimate { value: 1.0 / longer.value, low: 1.0 / longer.high, high: 1.0 / longer.low };
+                format!("{name} is {} as fast as the base in reaching {} ({}).", ratio(faster.value), percent(error), between(faster, ratio))
+            }
+            Effect::Undecided(error, longer) => {
+                format!("{name} takes {} as long to reach {} ({})", ratio(longer.value), percent(error), between(longer, ratio))
+            }
+            Effect::SinglePoint => name,
+        }
+    }
+}
+
 /// A configuration with its axis, unless its label names that already.
-fn named(axis: Axis, label: &str) -> String {
+pub fn named(axis: Axis, label: &str) -> String {
     if label.contains(axis.name()) { label.to_owned() } else { format!("{}: {label}", axis.name()) }
 }
 
 /// How much faster or slower a choice is than the base.
-fn choice(axis: Axis, curve: &Curve, base: &Curve, least: f64, confidence: f64) -> Choice {
-    let name = named(axis, &curve.label);
+fn effect(curve: &Curve, base: &Curve, least: f64, confidence: f64) -> Effect {
     if curve.points.len() < 2 || base.points.len() < 2 {
-        return Choice::SinglePoint;
+        return Effect::SinglePoint;
     }
     let Some((error, longer)) =
         common_error(curve, base, least).and_then(|error| Some((error, curve.times_longer(base, error, confidence)?)))
     else {
-        let reach = |curve: &Curve| format!("{} after {}", percent(curve.best_error()), duration(curve.longest()));
-        return Choice::Differs(format!(
-            "{name} reaches {}, the base {}; the two ranges of error do not overlap.",
-            reach(curve),
-            reach(base)
-        ));
+        return Effect::Apart([curve, base].map(|curve| (curve.best_error(), curve.longest())));
     };
-    let (at, interval) = (percent(error), between(longer, ratio));
-    if longer.low > 1.0 && longer.value > NEXT_TO_NOTHING {
-        Choice::Differs(format!("{name} takes {} as long as the base to reach {at} ({interval}).", ratio(longer.value)))
-    } else if longer.high < 1.0 && longer.value < 1.0 / NEXT_TO_NOTHING {
-        let faster = Estimate { value: 1.0 / longer.value, low: 1.0 / longer.high, high: 1.0 / longer.low };
-        Choice::Differs(format!("{name} is {} as fast as the base in reaching {at} ({}).", ratio(faster.value), between(faster, ratio)))
-    } else {
-        Choice::Undecided(format!("{name} takes {} as long to reach {at} ({interval})", ratio(longer.value)))
-    }
+    let is_slower = longer.low > 1.0 && longer.value > NEXT_TO_NOTHING;
+    let is_faster = longer.high < 1.0 && longer.value < 1.0 / NEXT_TO_NOTHING;
+    if is_slower || is_faster { Effect::Differs(error, longer) } else { Effect::Undecided(error, longer) }
 }
 
-fn ratio(value: f64) -> String {
+pub fn ratio(value: f64) -> String {
     format!("{}\u{a0}\u{d7}", number(value))
 }
 
@@ -351,9 +405,10 @@ pub fn csv(study: &Study) -> Vec<u8> {
     let seed = study.request.seed;
     let mut rows = Vec::new();
     for part in &study.parts {
-        for Comparison { axis, curves } in &part.comparisons {
-            let points = curves.iter().flat_map(|curve| curve.points.iter().map(move |point| (curve, point)));
-            rows.extend(points.map(|(curve, point)| Row { part, axis: *axis, curve, point, seed }));
+        let of_default = part.default.iter().map(|curve| (Axis::Default, curve));
+        let of_axes = part.comparisons.iter().flat_map(|comparison| comparison.curves.iter().map(|curve| (comparison.axis, curve)));
+        for (axis, curve) in of_default.chain(of_axes) {
+            rows.extend(curve.points.iter().map(|point| Row { part, axis, curve, point, seed }));
         }
     }
     csv_table(&columns, &rows)
@@ -385,6 +440,8 @@ mod tests {
             quantity: String::new(),
             reference: String::new(),
             reference_error: 0.0,
+            default: None,
+            strip: None,
             comparisons: vec![
                 comparison(Axis::Builder, to("base", 2), to("naive", 9)),
                 comparison(Axis::Radius, to("base", 7), to("twice", 8)),

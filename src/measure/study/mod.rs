@@ -7,12 +7,16 @@
 
 pub mod axes;
 pub mod chart;
+pub mod details;
 pub mod findings;
 pub mod page;
+pub mod peers;
 pub mod point;
 pub mod reference;
 pub mod store;
+pub mod strip;
 pub mod subject;
+pub mod summary;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -23,11 +27,12 @@ use crate::error::{Error, Result};
 use crate::gpu::{Gpu, clock};
 use crate::measure::compaction;
 use crate::output::destination::{Folder, write_all};
-use crate::output::svg::as_file;
 use crate::scene::Scene;
 use axes::{Axis, Group};
+use peers::Peer;
 use point::{Curve, Point};
 use store::Store;
+use strip::Strip;
 use subject::Subject;
 
 /// What is asked for.
@@ -35,7 +40,7 @@ use subject::Subject;
 pub struct Request {
     /// As the user names it.
     pub scene: String,
-    /// Pixels along each side of the picture, or texels along each wall of the paper's box.
+    /// Pixels along the longer side of the picture, or texels along each wall of the paper's box.
     pub size: u32,
     /// Photons of a round, from which the axis of photons goes up and down.
     pub photons: u32,
@@ -47,6 +52,9 @@ pub struct Request {
     /// Wall time of all measurements together, shared out evenly; not of the reference.
     #[serde(skip)]
     pub budget: Duration,
+    /// Other programs on the same scene, for the chart.
+    #[serde(skip)]
+    pub peers: Vec<Peer>,
     /// Rounds of the longest point, whatever time is left.
     #[serde(skip)]
     pub most_rounds: u32,
@@ -77,6 +85,10 @@ pub struct Part {
     /// Root mean square of the reference's own error over its root mean square.
     pub reference_error: f64,
     pub comparisons: Vec<Comparison>,
+    /// Runs with nothing set but their error, which a pilot divides; `None` of the paper's box.
+    pub default: Option<Curve>,
+    #[serde(skip)]
+    pub strip: Option<Strip>,
 }
 
 /// Curves that were measured in turn: the base, then its alternatives along an axis.
@@ -113,7 +125,9 @@ pub fn run(
     let count: usize = subjects.iter().flat_map(|subject| &subject.groups).map(|group| group.configurations.len()).sum();
     let is_of_paper = subjects.iter().any(Subject::is_of_paper);
     let of_builders = study.request.budget / COMPACTION_SHARE;
-    let share = (study.request.budget - of_builders) / count.max(1) as u32;
+    let of_defaults = study.request.budget / DEFAULTS_SHARE;
+    let share = (study.request.budget - of_builders - of_defaults) / count.max(1) as u32;
+    let with_default = subjects.iter().filter(|subject| subject.has_default()).count().max(1) as u32;
     clock::warm_up(gpu, FIRST_WARM_UP)?;
     let mut begun = 0;
     for subject in &subjects {
@@ -122,7 +136,16 @@ pub fn run(
             reference: subject.reference.method.clone(),
             reference_error: subject.reference.relative_error,
             comparisons: Vec::new(),
+            default: None,
+            strip: None,
         });
+        if subject.has_default() {
+            tell(&format!("{}: default settings, to an error of 20, 10, 5, 2 and 1 %", subject.quantity));
+            match strip::measure_defaults(gpu, subject, &study.request, of_defaults / with_default, cancelled, &mut store) {
+                Err(Error::Interrupted) => return Ok(study),
+                found => study.parts.last_mut().expect("pushed above").default = Some(found?),
+            }
+        }
         for group in &subject.groups {
             begun += group.configurations.len();
             tell(&format!("[{begun}/{count}] {}: {}", subject.quantity, group.axis.name()));
@@ -134,6 +157,13 @@ pub fn run(
                 Err(Error::Interrupted) => return Ok(study),
                 result => result?,
             }
+        }
+    }
+    if let Some((subject, part)) = subjects.iter().zip(&mut study.parts).next() {
+        tell("the pictures");
+        match strip::strip(gpu, subject, part, &study.request, cancelled) {
+            Err(Error::Interrupted) => return Ok(study),
+            found => part.strip = found?,
         }
     }
     let most = study.request.photons.saturating_mul(study.request.most_rounds).min(MOST_COMPACTED);
@@ -236,7 +266,8 @@ const FIRST_WARM_UP: Duration = Duration::from_secs(3);
 /// time, where that is longer.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// Of the budget, for the map of builders, and most photons in it.
+/// Of the budget, for runs with default settings, for the map of builders, and most photons in it.
+const DEFAULTS_SHARE: u32 = 4;
 const COMPACTION_SHARE: u32 = 8;
 const MOST_COMPACTED: u32 = 1 << 26;
 
@@ -252,11 +283,11 @@ pub fn write(folder: &Folder, study: &Study) -> Result<()> {
     ];
     for (number, part) in study.parts.iter().enumerate() {
         for (name, drawn) in chart::all(part) {
-            files.push((folder.file(&format!("{}-{name}.svg", number + 1)), as_file(&drawn)));
+            files.push((folder.file(&format!("{}-{name}.svg", number + 1)), drawn.as_file()));
         }
     }
     if let Some(map) = &study.compaction {
-        files.push((folder.file("compaction.svg"), as_file(&compaction::chart::draw(map))));
+        files.push((folder.file("compaction.svg"), compaction::chart::draw(map).as_file()));
     }
     write_all(files)
 }

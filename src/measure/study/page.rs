@@ -1,168 +1,182 @@
-//! The page: all results in one file that loads nothing.
+//! The page: pictures, three sentences, a chart and a table in one file that loads nothing; the rest folds away.
 
-use maud::{Markup, html};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use maud::{Markup, PreEscaped, html};
 
-use super::findings::{self, Row, clock, equal_error, equal_time, percent};
-use super::point::{Curve, Point};
-use super::{Part, Study, chart as charts};
-use crate::measure::compaction::{self, Map};
+use super::axes::Axis;
+use super::findings::{Choice, Effect, between, percent, ratio};
+use super::point::Estimate;
+use super::strip::{Frame, Strip};
+use super::{Part, Study, chart as charts, details, summary};
 use crate::output::page::{chart, page, software_notice, table};
-use crate::output::words::{count, duration, times};
+use crate::output::words::duration;
+use crate::text::counted;
 
 pub fn html(study: &Study) -> String {
     let title = format!("What accuracy costs in time: {}", study.request.scene);
+    let (main, others) = study.parts.split_first().map_or((None, &[][..]), |(main, others)| (Some(main), others));
     let content = html! {
         (head(study, &title))
-        @for part in &study.parts { (of_part(part)) }
-        @if let Some(map) = &study.compaction { (of_builders(map)) }
-        (how(study))
+        @if let Some(part) = main {
+            @if let Some(strip) = &part.strip { (pictures(strip)) }
+            @for sentence in summary::sentences(study, part) { p.lead { (sentence) } }
+            (chart(main_chart(study, part), "Error against time on logarithmic scales. Bands are 95 % confidence intervals; a line is drawn only where they are narrow."))
+            (choices(part))
+        }
+        @for part in others {
+            section {
+                h2 { (part.quantity) }
+                (choices(part))
+            }
+        }
+        @for part in &study.parts { (details::of_part(part)) }
+        @if let Some(map) = &study.compaction { (details::of_builders(map)) }
+        (details::how(study))
     };
     page(&title, &content)
 }
 
 fn head(study: &Study, title: &str) -> Markup {
-    let request = &study.request;
     html! {
         header {
             h1 { (title) }
-            p { "Relative RMS error against time, for every option of photonmill " (study.photonmill) " that applies to this scene." }
+            p.soft { "photonmill " (study.photonmill) " on " (study.device) ", driver " (study.driver) ". "
+                (counted(study.parts.iter().flat_map(Part::points).count(), "point")) ", each of " (counted(study.request.repeats as usize, "run")) "." }
             @if !study.complete {
                 p.notice { strong { "Incomplete." } " The study was interrupted. The same command continues it." }
             }
             @if study.is_cpu { (software_notice("")) }
-            dl {
-                dt { "Device" }
-                dd { (study.device) "; driver " (study.driver) }
-                dt { "Photons per round" }
-                dd { (count(u64::from(request.photons))) ", unless the configuration says otherwise" }
-                dt { "Runs per point" }
-                dd { (request.repeats) ", with seeds " (request.seed) " to " (request.seed + u64::from(request.repeats) - 1) }
-            }
         }
     }
 }
 
-fn of_builders(map: &Map) -> Markup {
-    let is_scene = map.cells.iter().all(|cell| cell.scene.is_some());
+/// Of a study of the paper's box, with the paper's own points.
+fn main_chart(study: &Study, part: &Part) -> Option<crate::output::svg::Chart> {
+    let papers = study.parts.iter().flat_map(|part| &part.comparisons).find(|comparison| comparison.axis == Axis::Paper);
+    let paper = papers.and_then(|comparison| comparison.base()).map(charts::of_the_paper).unwrap_or_default();
+    charts::main(part, &paper, &study.request.peers)
+}
+
+fn pictures(strip: &Strip) -> Markup {
+    let full = percent(strip.scale);
     html! {
-        section {
-            h2 { @if is_scene { "Fastest builder by photon count" } @else { "Fastest builder by photon count and survival" } }
-            p {
-                "Time to trace and store photons over " (map.bounces) " bounces"
-                @if is_scene { " in the scene. " } @else { " in a closed room. At every wall a given share of the photons survives. " }
-                "Each cell shows the fastest builder, its speed relative to one atomic per thread, and, below, the builders that are not significantly slower. "
-                "All builders gave the same result: bit-identical stored photons up to a million, and above that the same numbers of photons stored and absorbed at each bounce."
-            }
-            (chart(Some(compaction::chart::draw(map)), ""))
-            details {
-                summary { "All times" }
-                pre { (map.text()) }
-            }
+        div.strip {
+            @for frame in &strip.frames { (self::frame(frame)) }
         }
+        p.scale { "darker, -" (full) span style="background:linear-gradient(90deg,#0072b2,#fff,#d55e00)" {} "brighter, +" (full) " of the mean" }
+        @if !strip.frames.is_empty() { (slider(strip)) }
     }
 }
 
-fn of_part(part: &Part) -> Markup {
+fn frame(frame: &Frame) -> Markup {
     html! {
-        section {
-            h2 { (part.quantity) }
-            p { "Reference: " (part.reference) ". Its own error is " (percent(part.reference_error)) "; smaller errors in this section are not reliable." }
-            ul { @for sentence in part.sentences() { li { (sentence) } } }
-            (chart(
-                charts::overview(part),
-                "All points. The line is the Pareto front: the points that no other point beats in both time and error."
-            ))
-            (front(part))
-            @if let Some((ms, rows)) = equal_time(part) {
-                (equal(&format!("Error after {}", duration(ms)), "error", &rows, percent))
-            }
-            @if let Some((error, rows)) = equal_error(part) {
-                (equal(&format!("Time to reach {}", percent(error)), "time", &rows, duration))
-            }
-            @for comparison in &part.comparisons {
-                h3 { (comparison.axis.name()) }
-                (chart(charts::of_axis(&comparison.curves), ""))
-                @for curve in &comparison.curves { (points(curve)) }
-            }
+        div {
+            (image(&frame.picture, frame.size, &format!("The picture at an error of {}", percent(frame.error))))
+            (image(&frame.difference, frame.size, "Its difference from the reference in false colours"))
+            strong { (percent(frame.asked)) } " in " strong { (duration(frame.ms)) }
+            div.soft { "true error " (percent(frame.error)) ", " (counted(frame.rounds as usize, "round")) }
         }
     }
 }
 
-fn front(part: &Part) -> Markup {
-    let head = html! { tr { th.name { "Pareto front" } th { "rounds" } th { "time" } th { "error" } } };
-    let body = html! {
-        @for (curve, point) in part.pareto_front() {
-            tr { th scope="row" { (curve.label) } td { (point.rounds) } td { (duration(point.ms().value)) } td { (percent(point.error().value)) } }
-        }
-    };
-    table(&head, &body)
+fn image(png: &[u8], (width, height): (u32, u32), alt: &str) -> Markup {
+    html! { img src={ "data:image/png;base64," (STANDARD.encode(png)) } width=(width) height=(height) alt=(alt); }
 }
 
-/// All configurations at the same time or the same error.
-fn equal(title: &str, what: &str, rows: &[Row], show: impl Fn(f64) -> String) -> Markup {
-    let head =
-        html! { tr { th.name { (title) } th { (what) } th { (findings::words_of_confidence()) " interval" } th { "relative to base" } } };
-    let body = html! {
-        @for Row { name, value, ratio } in rows {
-            tr {
-                th scope="row" { (name) }
-                @match value {
-                    Ok(value) => {
-                        td { (show(value.value)) }
-                        td { @if value.low > 0.0 && value.low < value.high && value.high.is_finite() { (show(value.low)) " to " (show(value.high)) } }
-                    },
-                    Err(why) => { td { (why) } td {} },
-                }
-                td { (ratio.map_or_else(String::new, times)) }
-            }
-        }
+/// Any two pictures, one over the other up to a line that can be moved.
+fn slider(strip: &Strip) -> Markup {
+    let names: Vec<String> = strip.frames.iter().map(|frame| percent(frame.asked)).chain(["reference".to_owned()]).collect();
+    let last = names.len() - 1;
+    let choice = |id: &str, chosen: usize| html! {
+        select id=(id) { @for (number, name) in names.iter().enumerate() { option value=(number) selected[number == chosen] { (name) } } }
     };
     html! {
-        (table(&head, &body))
-        p { "Each option was measured alternately with the base; ratios compare these runs." }
-    }
-}
-
-fn points(curve: &Curve) -> Markup {
-    let head = html! { tr { th { "rounds" } th { "photons" } th { "time (median)" } th { "fastest to slowest" } th { "wall" } th { "error" } th { (findings::words_of_confidence()) " interval" } th { "noise" } th { "bias" } } };
-    html! {
-        details {
-            summary { (curve.label) ": all points" }
-            (table(&head, &html! { @for point in &curve.points { (row(point)) } }))
-            @for point in &curve.points { p { code { (point.command) } } }
-        }
-    }
-}
-
-fn row(point: &Point) -> Markup {
-    let (ms, error, bias) = (point.ms(), point.error(), point.bias());
-    html! {
-        tr {
-            td { (point.rounds) }
-            td { (count(point.photons)) }
-            td { (duration(ms.value)) " " small { (clock(point)) } }
-            td { (duration(ms.low)) " to " (duration(ms.high)) }
-            td { (duration(point.wall())) }
-            td { (percent(error.value)) }
-            td { @if error.high.is_finite() { (percent(error.low)) " to " (percent(error.high)) } @else { "unknown" } }
-            td { (percent(point.noise())) }
-            td { @if bias.low > 0.0 { (percent(bias.value)) } @else if bias.high.is_finite() { "at most " (percent(bias.high)) } @else { "unknown" } }
-        }
-    }
-}
-
-fn how(study: &Study) -> Markup {
-    html! {
-        section {
-            h2 { "How this was measured" }
-            ul {
-                li { "Error: RMS difference from the reference, relative to the RMS of the reference. The contribution of the reference's own noise is subtracted." }
-                li { "Noise is the error that differs between runs with different seeds. Bias is the error that they share. Both are computed from the " (study.request.repeats) " runs of a point. Intervals and bands are " (findings::words_of_confidence()) " confidence intervals (Student's t over those runs); few runs give wide bands." }
-                li { "Time: device time of all rounds by timestamps, without set-up; the CPU builder uses the host's clock. Warm-up work before each run brings the device to its full clock. The time of a point is the median of its runs; the fastest and the slowest run show the drift of the clock." }
-                li { "Times to reach an error are interpolated linearly between points on logarithmic scales, and never extrapolated." }
-                li { "Each command repeats the first run of its point. The other runs use the seeds that follow." }
-                li { "Pixels that show a light source directly are excluded from the error of images. This page has " (count(study.parts.iter().flat_map(Part::points).count() as u64)) " points." }
+        figure {
+            p.pick { "Compare " (choice("left", 0)) " with " (choice("right", last)) }
+            div.compare {
+                img id="below" alt="The picture chosen on the right";
+                img id="above" alt="The picture chosen on the left";
             }
+            input id="line" type="range" min="0" max="100" value="50" aria-label="Where the left picture ends";
+            div hidden id="reference" { (image(&strip.reference, strip.frames[0].size, "The reference")) }
+            script { (PreEscaped(SLIDER)) }
+        }
+    }
+}
+
+const SLIDER: &str = "
+const get = id => document.getElementById(id);
+const sources = [...document.querySelectorAll('.strip > div > img:first-child'), get('reference').firstChild].map(image => image.src);
+const show = () => {
+  get('above').src = sources[get('left').value];
+  get('below').src = sources[get('right').value];
+  get('above').style.clipPath = `inset(0 ${100 - get('line').value}% 0 0)`;
+};
+['left', 'right', 'line'].forEach(id => get(id).addEventListener('input', show));
+show();
+";
+
+/// What each choice buys, the fastest first; what noise hides at the end.
+fn choices(part: &Part) -> Markup {
+    let Some(base) = part.base() else { return html! {} };
+    let mut choices = part.choices();
+    let rank = |choice: &Choice| match choice.effect {
+        Effect::Differs(_, longer) => (0, longer.value),
+        Effect::Apart([own, base]) => (1, own.0 / base.0),
+        Effect::Undecided(_, longer) => (2, longer.value),
+        Effect::SinglePoint => (3, 0.0),
+    };
+    choices.sort_by(|one, other| rank(one).partial_cmp(&rank(other)).expect("no effect is NaN"));
+    let head = html! { tr { th.name { "What each choice buys" } th { "time to the same error" } th { "interval" } th { "faster · slower" } th { "at error" } } };
+    let left_out = part.not_measured();
+    html! {
+        (table(&head, &html! { @for choice in &choices { (row(choice)) } }))
+        p.soft {
+            "Each choice is one change to the base: " (base.label) ". Times are over the base's, measured in turn with it; all intervals of this table together hold with 95 % confidence. "
+            "Grey: not significantly different from the base."
+        }
+        @if !left_out.is_empty() { details { summary { "Not measured" } ul { @for sentence in &left_out { li { (sentence) } } } } }
+    }
+}
+
+fn row(choice: &Choice) -> Markup {
+    let name = choice.name();
+    match choice.effect {
+        Effect::Differs(error, longer) => measured(&name, error, longer, false),
+        Effect::Undecided(error, longer) => measured(&name, error, longer, true),
+        Effect::Apart([own, base]) => html! {
+            tr { th scope="row" { (name) } td colspan="4" { "reaches " (percent(own.0)) " in " (duration(own.1)) "; the base " (percent(base.0)) " in " (duration(base.1)) } }
+        },
+        Effect::SinglePoint => html! {
+            tr.undecided { th scope="row" { (name) } td colspan="4" { "one point only: a longer --budget compares it" } }
+        },
+    }
+}
+
+fn measured(name: &str, error: f64, longer: Estimate, undecided: bool) -> Markup {
+    html! {
+        tr.undecided[undecided] {
+            th scope="row" { (name) }
+            td { (ratio(longer.value)) }
+            td { (between(longer, ratio)) }
+            td.bar { (bar(longer)) }
+            td { (percent(error)) }
+        }
+    }
+}
+
+/// From the middle, which is as fast as the base, to the right where it is slower; the ends are this many times as fast and as slow.
+const END_OF_BAR: f64 = 16.0;
+
+fn bar(longer: Estimate) -> Markup {
+    let place = |ratio: f64| (50.0 + 50.0 * ratio.max(1e-9).ln() / END_OF_BAR.ln()).clamp(0.0, 100.0);
+    let (from, to) = (place(longer.value).min(50.0), place(longer.value).max(50.0));
+    let (low, high) = (place(longer.low), place(longer.high));
+    html! {
+        div {
+            i.slower[longer.value > 1.0] style={ "left:" (format!("{from:.1}")) "%;width:" (format!("{:.1}", to - from)) "%" } {}
+            b style={ "left:" (format!("{low:.1}")) "%;width:" (format!("{:.1}", high - low)) "%" } {}
         }
     }
 }

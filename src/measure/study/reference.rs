@@ -105,30 +105,30 @@ impl Reference {
     pub fn picture(
         scene: &Scene,
         camera: &Camera,
-        size: u32,
+        (width, height): (u32, u32),
         samples: u32,
         cancelled: &AtomicBool,
         tell: &mut dyn FnMut(&str),
     ) -> Result<Reference> {
-        let key = digest(format_args!("{JUDGE_VERSION} {scene:?} {camera:?} {size} {samples}"));
+        let key = digest(format_args!("{JUDGE_VERSION} {scene:?} {camera:?} {width} {height} {samples}"));
         cached(&format!("picture {key}"), || {
             let (batch, batches) = (samples / BATCHES, BATCHES);
             let judge = Judge::new(scene, u32::MAX);
-            let places = 3 * (size * size) as usize;
+            let places = 3 * (width * height) as usize;
             let (mut values, mut variances) = (vec![0.0; places], vec![0.0; places]);
             for number in 0..batches {
                 if cancelled.load(Ordering::Relaxed) {
                     return Err(Error::Interrupted);
                 }
                 tell(&format!("reference: {} of {samples} samples per pixel", number * batch));
-                let image = judge.image(camera, size, size, batch, SEED + u64::from(number));
+                let image = judge.image(camera, width, height, batch, SEED + u64::from(number));
                 for (place, (value, variance)) in values.iter_mut().zip(&mut variances).enumerate() {
                     let pixel = &image.pixels[place / 3];
                     *value += pixel.mean.total()[place % 3] / f64::from(batches);
                     *variance += (pixel.total_standard_error[place % 3] / f64::from(batches)).powi(2);
                 }
             }
-            let shining = Judge::new(scene, 0).image(camera, size, size, 64, SEED);
+            let shining = Judge::new(scene, 0).image(camera, width, height, 64, SEED);
             let reference = Reference {
                 method: String::new(),
                 values,

@@ -2,8 +2,9 @@
 
 use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use super::Request;
 use super::axes::{self, Configuration, Group, Line};
@@ -11,17 +12,22 @@ use super::point::Shot;
 use super::reference::{Reference, wall_points};
 use crate::engine::room::{self, film::estimate_walls};
 use crate::engine::scene::{self, RunResult, Target, View};
+use crate::engine::watch::End;
 use crate::engine::{self, Control};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::ledger::Ledger;
+use crate::output::colour::ColourPicture;
 use crate::output::command;
+use crate::output::image::view_of_values;
 use crate::plan::scene::ScenePlan;
 use crate::plan::sensor::Sensor;
+use crate::plan::work_division::Free;
 use crate::scene::geometry::Geometry;
 use crate::scene::open_box::open_box;
 use crate::scene::{Camera, Light, Mesh, Scene};
 use crate::settings::scene::{Effect, SceneSettings};
+use crate::settings::stop::Stop;
 use crate::settings::{Builder, Preset, RoomSettings};
 use crate::timings::Timings;
 use crate::verify::judge::radiosity::inward;
@@ -36,10 +42,33 @@ pub struct Subject {
     camera: Option<Camera>,
     /// Points and normals, where no camera looks.
     receivers: Vec<(DVec3, DVec3)>,
-    size: u32,
+    /// Texels along a wall, or points along a floor.
+    side: u32,
+    /// Of the camera's picture.
+    pixels: [u32; 2],
     /// The scene as the user named it.
     name: String,
 }
+
+/// What a pilot has chosen for an error.
+pub struct Chosen {
+    settings: SceneSettings,
+    /// Milliseconds of the pilot, of the device and of the host.
+    gpu_ms: f64,
+    wall_ms: f64,
+    /// What the run is expected to take.
+    pub expected: Duration,
+}
+
+/// Longer side of the picture, from the camera's aspect ratio.
+fn pixels_of(camera: &Camera, longer: u32) -> [u32; 2] {
+    let aspect = camera.aspect.unwrap_or(USUAL_ASPECT);
+    let shorter = |ratio: f64| ((f64::from(longer) * ratio).round() as u32).max(1);
+    if aspect >= 1.0 { [longer, shorter(1.0 / aspect)] } else { [shorter(aspect), longer] }
+}
+
+/// Where the camera leaves it open.
+const USUAL_ASPECT: f64 = 4.0 / 3.0;
 
 /// Triangles up to which a list of them may be asked for.
 const FEW_TRIANGLES: usize = 256;
@@ -49,6 +78,8 @@ impl Subject {
     pub fn all(gpu: &Gpu, scene: &Scene, request: &Request, cancelled: &AtomicBool, tell: &mut dyn FnMut(&str)) -> Result<Vec<Subject>> {
         let Request { scene: name, size, photons, reference_samples, .. } = request.clone();
         let geometry = Rc::new(Geometry::new(scene)?);
+        let camera = scene.first_camera();
+        let pixels = pixels_of(&camera, size);
         let subject = |quantity: &str, reference: &Reference, groups, (camera, receivers)| Subject {
             quantity: quantity.to_owned(),
             reference: reference.clone(),
@@ -57,10 +88,11 @@ impl Subject {
             geometry: geometry.clone(),
             camera,
             receivers,
-            size,
+            side: size,
+            pixels,
             name: name.clone(),
         };
-        let of_scene = |is_picture| scene_axes(gpu, scene, &geometry, request, is_picture);
+        let of_scene = |is_picture: bool| scene_axes(gpu, scene, &geometry, request, is_picture.then_some(pixels));
         if name == "open-box" {
             tell("reference: radiosity of the box");
             let reference = Reference::walls(&RoomSettings::default(), size)?;
@@ -74,21 +106,20 @@ impl Subject {
         if let Some((receivers, reference)) = Reference::floor(&name, size) {
             return Ok(vec![subject("Irradiance of the floor", &reference, of_scene(false)?, (None, receivers))]);
         }
-        let refuse = |why: &str| Err(Error::setting("study", &name, why));
-        if unknown_to_paths(scene) {
-            return refuse(
-                "has a point, spot, directional or disc light with mirrors or glass. Path tracing, the reference, cannot find the caustics of such lights; choose another scene",
-            );
-        }
-        tell(&format!(
-            "reference: path tracing of {size} x {size} pixels, {reference_samples} samples per pixel, unless it is in the cache"
-        ));
-        let camera = scene.first_camera();
-        let reference = Reference::picture(scene, &camera, size, reference_samples, cancelled, tell)?;
+        let [width, height] = pixels;
+        let reference = if unknown_to_paths(scene) {
+            tell("reference: a long run of photonmill itself, as path tracing cannot find the caustics of lights without a surface");
+            let seconds = (request.budget / OF_OWN_REFERENCE).as_secs_f64();
+            own_reference(gpu, scene, &geometry, &camera, pixels, seconds, cancelled)?
+        } else {
+            tell(&format!(
+                "reference: path tracing of {width} x {height} pixels, {reference_samples} samples per pixel, unless it is in the cache"
+            ));
+            Reference::picture(scene, &camera, (width, height), reference_samples, cancelled, tell)?
+        };
         if reference.mean_square() <= f64::MIN_POSITIVE {
-            return refuse(
-                "shows no light except light sources seen directly, so a relative error is not defined; choose another scene or camera",
-            );
+            let why = "shows no light except light sources seen directly, so a relative error is not defined; choose another scene or camera";
+            return Err(Error::setting("SCENE", &name, why));
         }
         Ok(vec![subject("Radiance of the image", &reference, of_scene(true)?, (Some(camera), Vec::new()))])
     }
@@ -103,13 +134,88 @@ impl Subject {
             }
             Line::Scene(settings) => {
                 let settings = SceneSettings { rounds, seed, ..settings.clone() };
-                let job = match self.camera {
-                    Some(_) => format!("render {} --size {}x{} -o picture.exr", quoted(&self.name), self.size, self.size),
-                    None => format!("probe {} --points {POINTS} -o irradiance.csv", quoted(&self.name)),
-                };
-                command::on_scene(&job, &settings) + WARM_UP
+                command::on_scene(&self.job(), &settings) + WARM_UP
             }
         }
+    }
+
+    fn job(&self) -> String {
+        let [width, height] = self.pixels;
+        match self.camera {
+            Some(_) => format!("render {} --size {width}x{height} -o picture.exr", quoted(&self.name)),
+            None => format!("probe {} --points {POINTS} -o irradiance.csv", quoted(&self.name)),
+        }
+    }
+
+    /// What repeats a run with nothing set but its error.
+    pub fn command_to(&self, error: f64, seed: u64) -> String {
+        format!("photonmill {} --error {}% --seed {seed}{WARM_UP}", self.job(), 100.0 * error)
+    }
+
+    /// What a pilot chooses for an error.
+    pub fn choose(&self, gpu: &Gpu, error: f64) -> Result<Chosen> {
+        let began = Instant::now();
+        let stop = Stop { error: Some(error), ..Stop::default() };
+        let settings = SceneSettings { rounds: MOST_ROUNDS, stop, ..SceneSettings::default() };
+        let target = self.target();
+        let view = View { geometry: &self.geometry, camera: target.camera(), phases: &target.phases(&self.geometry) };
+        let plan = scene::trial::plan(gpu, &self.scene, &view, &settings, target.sensor())?;
+        let free = Free { samples: self.camera.is_some(), ..Free::ALL };
+        let pilot = scene::pilot::choose(gpu, &self.scene, &view, &plan, free)?;
+        let expected = pilot.as_ref().map_or(0.0, |pilot| 1e-9 * pilot.rounds.until(pilot.chosen, error).1);
+        Ok(Chosen {
+            gpu_ms: pilot.as_ref().map_or(0.0, |pilot| pilot.spent),
+            settings: pilot.map_or(settings.clone(), |pilot| pilot.set(&settings)),
+            wall_ms: 1e3 * began.elapsed().as_secs_f64(),
+            expected: Duration::from_secs_f64(expected.clamp(0.0, 1e6)),
+        })
+    }
+
+    /// A run to its error, the pilot's time included, and its rounds; `None` if it was longer than `most`.
+    pub fn run_to_error(
+        &self,
+        gpu: &Gpu,
+        chosen: &Chosen,
+        seed: u64,
+        most: Duration,
+        cancelled: &AtomicBool,
+    ) -> Result<Option<(Shot, u32)>> {
+        let stop = Stop { seconds: Some(most.as_secs_f64()), ..chosen.settings.stop };
+        let lit = self.light(gpu, SceneSettings { seed, stop, ..chosen.settings.clone() }, &mut Control::quiet(cancelled))?;
+        if cancelled.load(Ordering::Relaxed) {
+            return Err(Error::Interrupted);
+        }
+        let shot = self.shot_of(&lit);
+        let with_pilot =
+            Shot { gpu_ms: shot.gpu_ms.map(|ms| ms + chosen.gpu_ms), wall_ms: shot.wall_ms + chosen.wall_ms, ..shot };
+        Ok((lit.end == End::Error).then_some((with_pilot, lit.film.rounds)))
+    }
+
+    /// Values as a picture, linear: as the camera sees them, or of the walls or the floor.
+    pub fn picture(&self, values: &[f64]) -> ColourPicture {
+        let of_greys = |width: u32, height: u32, values: Vec<f64>| ColourPicture {
+            width,
+            height,
+            pixels: values.into_iter().map(|value| Vec3::splat(value as f32)).collect(),
+        };
+        if self.camera.is_some() {
+            let [width, height] = self.pixels;
+            let pixels = values.chunks(3).map(|pixel| DVec3::from_slice(pixel).as_vec3()).collect();
+            return ColourPicture { width, height, pixels };
+        }
+        if self.name == "open-box" {
+            let room = open_box(&RoomSettings::default());
+            let per_wall = (self.side * self.side) as usize;
+            let walls: Vec<(usize, &[f64])> = room.walls().map(|(face, _)| face).zip(values.chunks(per_wall)).collect();
+            let seen = view_of_values(&room, &walls, BOX_PIXELS as usize);
+            return of_greys(BOX_PIXELS, BOX_PIXELS, seen.values);
+        }
+        of_greys(self.side, self.side, values.to_vec())
+    }
+
+    /// Whether runs with nothing set are measured too: the paper's box has no pilot.
+    pub fn has_default(&self) -> bool {
+        !self.is_of_paper()
     }
 
     /// The points that are probed, as `photonmill probe --points` reads them; `None` for a picture.
@@ -137,15 +243,22 @@ impl Subject {
             }
             Line::Scene(settings) => {
                 let settings = SceneSettings { rounds, seed, ..settings.clone() };
-                let lit = self.light(gpu, settings, &mut control)?;
-                let channels = if self.camera.is_some() { 3 } else { 1 };
-                let values = (0..lit.film.pixels()).flat_map(|pixel| lit.film.mean(pixel).to_array().into_iter().take(channels)).collect();
-                let global = lit.fates[0].ledger();
-                // A caustic map's photons end at the first surface that scatters, so the cap is the global map's.
-                Shot { photons: lit.ledger().emitted, ..shot(values, &lit.timings, global) }
+                self.shot_of(&self.light(gpu, settings, &mut control)?)
             }
         };
         if cancelled.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(shot) }
+    }
+
+    fn shot_of(&self, lit: &RunResult) -> Shot {
+        let channels = if self.camera.is_some() { 3 } else { 1 };
+        let values = (0..lit.film.pixels()).flat_map(|pixel| lit.film.mean(pixel).to_array().into_iter().take(channels)).collect();
+        let global = lit.fates[0].ledger();
+        // A caustic map's photons end at the first surface that scatters, so the cap is the global map's.
+        Shot { photons: lit.ledger().emitted, ..shot(values, &lit.timings, global) }
+    }
+
+    fn target(&self) -> Target<'_> {
+        self.camera.as_ref().map_or(Target::Points(&self.receivers), |camera| Target::Picture(camera, self.pixels))
     }
 
     fn light(&self, gpu: &Gpu, settings: SceneSettings, control: &mut Control) -> Result<RunResult> {
@@ -153,7 +266,7 @@ impl Subject {
             [] => self.geometry.clone(),
             without => Rc::new(Geometry::new(&self.scene.without(without))?),
         };
-        let target = self.camera.as_ref().map_or(Target::Points(&self.receivers), |camera| Target::Picture(camera, [self.size; 2]));
+        let target = self.target();
         let view = View { geometry: &geometry, camera: target.camera(), phases: &target.phases(&geometry) };
         let plan = scene::trial::plan(gpu, &self.scene, &view, &settings, target.sensor())?;
         scene::light(gpu, &view, plan, control)
@@ -174,6 +287,47 @@ fn unknown_to_paths(scene: &Scene) -> bool {
     scene.lights.iter().any(is_point_like) && scene.meshes.iter().any(is_specular)
 }
 
+/// A reference by photonmill itself, where no other method has one: with other random numbers than any run that it judges.
+fn own_reference(
+    gpu: &Gpu,
+    scene: &Scene,
+    geometry: &Geometry,
+    camera: &Camera,
+    pixels: [u32; 2],
+    seconds: f64,
+    cancelled: &AtomicBool,
+) -> Result<Reference> {
+    let stop = Stop { seconds: Some(seconds), ..Stop::default() };
+    let settings = SceneSettings { rounds: MOST_ROUNDS, stop, seed: OWN_SEED, ..SceneSettings::default() };
+    let target = Target::Picture(camera, pixels);
+    let view = View { geometry, camera: target.camera(), phases: &[] };
+    let plan = scene::trial::plan(gpu, scene, &view, &settings, target.sensor())?;
+    let chosen = scene::pilot::choose(gpu, scene, &view, &plan, Free::ALL)?.map_or(settings.clone(), |pilot| pilot.set(&settings));
+    let plan = scene::trial::plan(gpu, scene, &view, &chosen, target.sensor())?;
+    let lit = scene::light(gpu, &view, plan, &mut Control::quiet(cancelled))?.finished()?;
+    let (film, error) = (&lit.film, lit.error());
+    let all = |value: &dyn Fn(usize) -> DVec3| (0..film.pixels()).flat_map(|pixel| value(pixel).to_array()).collect::<Vec<f64>>();
+    let surfaces = film.surface_means().collect::<Vec<_>>();
+    let is_lamp = |pixel: usize| film.mean(pixel) != surfaces[pixel];
+    let reference = Reference {
+        method: "a long run of photonmill itself with other random numbers: path tracing cannot find the caustics of lights without a surface. What such runs have in common, as a bias, is not in the errors here".to_owned(),
+        values: all(&|pixel| film.mean(pixel)),
+        standard_errors: all(&|pixel| film.standard_error(pixel)).into_iter().map(|error| if error.is_finite() { error } else { 0.0 }).collect(),
+        counts: (0..3 * film.pixels()).map(|place| !is_lamp(place / 3)).collect(),
+        relative_error: 0.0,
+    }
+    .with_own_error();
+    let bias = error.bias.map_or(0.0, |bias| bias.relative);
+    Ok(Reference { relative_error: reference.relative_error.hypot(bias), ..reference })
+}
+
+/// Of the budget, a reference that photonmill makes itself.
+const OF_OWN_REFERENCE: u32 = 4;
+const OWN_SEED: u64 = 0x5eed_0000_0000;
+const MOST_ROUNDS: u32 = 1 << 16;
+/// Pixels along the picture of the paper's box.
+const BOX_PIXELS: u32 = 240;
+
 /// Runs of a study are timed at the clock of work.
 const WARM_UP: &str = " --warm-up";
 
@@ -191,11 +345,12 @@ fn shot(values: Vec<f64>, timings: &Timings, ledger: Ledger) -> Shot {
     }
 }
 
-fn scene_axes(gpu: &Gpu, scene: &Scene, geometry: &Geometry, request: &Request, is_picture: bool) -> Result<Vec<Group>> {
+fn scene_axes(gpu: &Gpu, scene: &Scene, geometry: &Geometry, request: &Request, picture: Option<[u32; 2]>) -> Result<Vec<Group>> {
     let settings = SceneSettings { photons: request.photons, caustic_photons: request.photons, block: Some(1), ..SceneSettings::default() };
-    let sensor = Sensor::Picture { width: request.size, height: request.size };
+    let [width, height] = picture.unwrap_or([request.size; 2]);
+    let sensor = Sensor::Picture { width, height };
     let plan = ScenePlan::new(scene, geometry, &settings, sensor, &engine::limits(gpu.facts()))?;
     let kept: Vec<Effect> = plan.decisions.iter().filter(|decision| decision.kept).map(|decision| decision.effect).collect();
     let radius = plan.global.as_ref().map(|map| map.radius * geometry.unit);
-    Ok(axes::of_scene(request.photons, &kept, radius, geometry.triangles.len() <= FEW_TRIANGLES, is_picture))
+    Ok(axes::of_scene(request.photons, &kept, radius, geometry.triangles.len() <= FEW_TRIANGLES, picture.is_some()))
 }

@@ -1,0 +1,101 @@
+//! Three sentences for whoever has a minute: what an error costs, what to change first, and what not to trust.
+
+use super::findings::{Effect, between, named, percent, ratio};
+use super::point::Curve;
+use super::{Part, Study};
+use crate::output::words::{duration, number};
+
+pub fn sentences(study: &Study, part: &Part) -> [String; 3] {
+    [cost(study, part), first_change(part), doubts(part)]
+}
+
+/// The curve that a user meets: default settings, else the base.
+fn usual(part: &Part) -> Option<(&Curve, &'static str)> {
+    let default = part.default.as_ref().filter(|default| !default.points.is_empty());
+    default.map(|default| (default, "with default settings")).or_else(|| part.base().map(|base| (base, "with the base settings")))
+}
+
+fn cost(study: &Study, part: &Part) -> String {
+    let device = &study.device;
+    let Some((curve, how)) = usual(part) else { return format!("Nothing was measured on {device}.") };
+    let mut points: Vec<(f64, f64)> = curve.points.iter().map(|point| (point.ms().value, point.error().value)).collect();
+    points.dedup_by(|next, before| next.1 >= before.1);
+    let reach = |&(ms, error): &(f64, f64)| format!("an error of {} takes {}", percent(error), duration(ms));
+    let told: Vec<String> = match points.as_slice() {
+        [] => return format!("Nothing was measured on {device}."),
+        [first, .., last] => vec![reach(first), reach(last)],
+        [only] => vec![reach(only)],
+    };
+    let halving = match points.as_slice() {
+        [first, .., last] if last.1 < 0.8 * first.1 => {
+            let power = (last.0 / first.0).ln() / (first.1 / last.1).ln();
+            format!(" Half the error takes about {} times the time.", number(2f64.powf(power)))
+        }
+        _ => String::new(),
+    };
+    format!("On {device}, {how}, {}.{halving}", told.join(", and "))
+}
+
+fn first_change(part: &Part) -> String {
+    let best = part.best_choice();
+    if let Some(default) = part.default.as_ref().filter(|default| default.points.len() > 1) {
+        // At the smallest error that both reach.
+        let against = best.map_or_else(|| part.base().map(|base| ("the base settings".to_owned(), base)), |(axis, curve)| Some((named(axis, &curve.label), curve)));
+        let errors = default.points.iter().rev().map(|point| point.error().value * 1.001);
+        let compared = against.and_then(|(name, curve)| {
+            errors.clone().find_map(|error| Some((name.clone(), error, default.time_to(error)?.value, curve.time_to(error)?.value)))
+        });
+        return match compared {
+            Some((name, error, own, other)) if own <= other => format!(
+                "Leave the settings alone: to {} the defaults are {} as fast as the best single change that was tried ({name}).",
+                percent(error),
+                ratio(other / own)
+            ),
+            Some((name, error, own, other)) => {
+                format!("Change this first: {name}. It reaches {} in {} of the defaults' time.", percent(error), ratio(other / own))
+            }
+            None => "The defaults and the other choices reached no error in common within this budget, so this study cannot tell which is faster."
+                .to_owned(),
+        };
+    }
+    match best {
+        Some((axis, curve)) => {
+            let choices = part.choices();
+            let of = choices.iter().find(|choice| choice.axis == axis && choice.curve.label == curve.label);
+            match of.map(|choice| choice.effect) {
+                Some(Effect::Differs(error, longer)) => format!(
+                    "Change this first: {}. It reaches {} in {} of the time ({}).",
+                    named(axis, &curve.label),
+                    percent(error),
+                    ratio(longer.value),
+                    between(longer, ratio)
+                ),
+                _ => String::new(),
+            }
+        }
+        None => "No single change that was tried is significantly faster than the base settings.".to_owned(),
+    }
+}
+
+fn doubts(part: &Part) -> String {
+    let least = part.least_error();
+    let of_reference = if least > 0.0 {
+        format!("Do not trust errors below {}: the reference itself is only known to {}", percent(least), percent(part.reference_error))
+    } else {
+        "The reference is exact".to_owned()
+    };
+    let undecided = part.choices().iter().filter(|choice| !matches!(choice.effect, Effect::Differs(..) | Effect::Apart(..))).count();
+    let of_noise = match undecided {
+        0 => String::new(),
+        1 => "; one choice below, in grey, could not be told from noise".to_owned(),
+        many => format!("; {many} choices below, in grey, could not be told from noise"),
+    };
+    let bias = part.base().and_then(|base| base.points.last()).map(|last| last.bias());
+    let of_bias = match bias {
+        Some(bias) if bias.low > least => {
+            format!("; the base keeps a bias of {} however long it runs", percent(bias.value))
+        }
+        _ => String::new(),
+    };
+    format!("{of_reference}{of_noise}{of_bias}.")
+}
