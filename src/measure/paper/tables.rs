@@ -124,7 +124,7 @@ mod tests {
         let table = lines(findings(&verdicts::all(&found)));
         assert_eq!(table[0], "finding,verdict,measured,value,low,high,claim");
         // Equal runs have no spread but that of rounding.
-        let row = "Atomics slow the map pass down,no longer holds,\"modified / naive, map pass: 5000 photons, 2 bounces\",1,0.99999";
+        let row = "Atomics slow the map pass down,no longer holds,\"modified / naive: 5000 photons, 2 bounces\",1,0.99999";
         assert!(table[1].starts_with(row) && table[1].ends_with(",does not hold"), "{}", table[1]);
         found.running_times.iter_mut().for_each(|time| time.runs_ms.truncate(2));
         let table = lines(findings(&verdicts::all(&found)));

@@ -39,7 +39,10 @@ fn figure(found: &Reproduction, figure: &Figure) -> Markup {
             div { h4 { "In the paper" } p { (figure.published) } }
             div {
                 @if let Some(verdict) = verdicts::of_figure(found, figure.number) {
-                    h4 { "Here " (badge(verdict.standing)) }
+                    h4 {
+                        "Here"
+                        @if let Some(standing) = verdict.standing { " " (badge(standing, standing.words_for_figures())) }
+                    }
                     p { (verdict.text) }
                 }
             }

@@ -18,11 +18,11 @@ pub fn summary(verdicts: &[Verdict]) -> Markup {
                 p { "Too few experiments were completed to say." }
             } @else {
                 p { strong { (tally(&claims)) } " Ranges in brackets are " (percent()) " confidence intervals. Open a row for every number behind it." }
-                (list("Finding of the paper", &claims))
+                (list("Finding of the paper", "Verdict", &claims))
             }
             @if !additions.is_empty() {
                 h3 { "Beyond the paper" }
-                (list("Finding of this run", &additions))
+                (list("Finding of this run", "", &additions))
             }
             details {
                 summary { "How a finding is decided" }
@@ -53,10 +53,10 @@ fn tally(claims: &[&Verdict]) -> String {
     format!("Of {}, {}.", counted(claims.len(), "finding"), words::list(&parts))
 }
 
-fn list(name: &str, verdicts: &[&Verdict]) -> Markup {
+fn list(name: &str, outcome: &str, verdicts: &[&Verdict]) -> Markup {
     html! {
         div.claims {
-            div.claim-head aria-hidden="true" { span { (name) } span { "2008" } span { "Here" } span { "Verdict" } }
+            div.claim-head aria-hidden="true" { span { (name) } span { "2008" } span { "Here" } span { (outcome) } }
             @for verdict in verdicts { (row(verdict)) }
         }
     }
@@ -74,7 +74,7 @@ fn row(verdict: &Verdict) -> Markup {
                     @if !verdict.elsewhere.is_empty() { small { (verdict.elsewhere) } }
                 }
                 span.outcome {
-                    (badge(verdict.standing))
+                    @if let Some(standing) = verdict.standing { (badge(standing, standing.words())) }
                     @let split = verdict.split();
                     @if !split.is_empty() { small { (split) } }
                 }
@@ -85,10 +85,8 @@ fn row(verdict: &Verdict) -> Markup {
     }
 }
 
-pub fn badge(standing: Option<Standing>) -> Markup {
-    html! {
-        @if let Some(standing) = standing { span class={ "standing " (standing.class()) } { (standing.words()) } }
-    }
+pub fn badge(standing: Standing, words: &str) -> Markup {
+    html! { span class={ "standing " (standing.class()) } { (words) } }
 }
 
 fn evidence(verdict: &Verdict) -> Markup {

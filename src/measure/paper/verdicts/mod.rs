@@ -41,6 +41,16 @@ impl Standing {
         self.words_and_class().1
     }
 
+    /// The same of what a figure shows.
+    pub fn words_for_figures(self) -> &'static str {
+        match self {
+            Standing::Holds => "the same is seen",
+            Standing::HoldsInPart => "the same is seen in part",
+            Standing::NoLonger => "the same is not seen",
+            Standing::Undecided => "not decided by this run",
+        }
+    }
+
     fn words_and_class(self) -> (&'static str, &'static str) {
         match self {
             Standing::Holds => ("still holds", "holds"),

@@ -95,7 +95,7 @@ pub(super) fn append(found: &Reproduction) -> Option<Verdict> {
         "Atomics slow the map pass down",
         published::MAP_MS.modified / published::MAP_MS.naive,
         &ratios(found, Builder::Atomic, Builder::Naive, Pass::Map),
-        "modified / naive, map pass",
+        "modified / naive",
         "The modified version appends each photon with an atomic addition; the naive one writes it to its own slot. \
          The factor is the time of the modified map pass over that of the naive one.",
     )
@@ -106,7 +106,7 @@ pub(super) fn packed(found: &Reproduction) -> Option<Verdict> {
         "A compact list renders faster",
         published::RENDERING_MS.naive / published::RENDERING_MS.modified,
         &ratios(found, Builder::Naive, Builder::Atomic, BRUTE),
-        "naive / modified, rendering pass",
+        "naive / modified",
         "The naive version searches all slots, including empty ones; the modified version searches a compact list. \
          The factor is the time of the naive rendering pass over that of the modified one, both by brute force.",
     )
@@ -129,12 +129,12 @@ fn on_gpu(found: &Reproduction, pass: Pass) -> Option<Verdict> {
     };
     let [naive, modified] = [Builder::Naive, Builder::Atomic].map(|builder| ratios(found, Builder::Cpu, builder, pass));
     let mut evidence = [("naive", &naive), ("modified", &modified)]
-        .map(|(name, ratios)| evidence(&format!("CPU / {name}, {} pass{how}", pass.name()), ratios, takes_longer))
+        .map(|(name, ratios)| evidence(&format!("CPU / {name}"), ratios, takes_longer))
         .concat();
     let standing = standing(&evidence)?;
     if pass == BRUTE {
         let grid = ratios(found, Builder::Cpu, Builder::Atomic, Pass::Rendering(Gather::Grid));
-        evidence.extend(self::evidence("CPU / modified, rendering pass, grid on both", &grid, |_| None));
+        evidence.extend(self::evidence("CPU / modified, grid on both", &grid, |_| None));
     }
     let mut text = format!("The factors are the times of the {} pass on one CPU thread{how}, over those on the GPU.", pass.name());
     if device.is_cpu {
@@ -176,7 +176,7 @@ pub(super) fn ballot(found: &Reproduction) -> Option<Verdict> {
         text: format!(
             "With a ballot, a whole subgroup needs one atomic addition. The factor is the time of this map pass over that with one atomic per thread. {end}"
         ),
-        evidence: evidence("ballot / modified, map pass", &ratios, |_| None),
+        evidence: evidence("ballot / modified", &ratios, |_| None),
         standing: None,
     })
 }
