@@ -304,13 +304,15 @@ mod tests {
 
     #[test]
     fn a_bias_stays_or_changes() {
-        let text = |rim_after: f64| {
-            let rim = |point: usize| [point / 8, point % 8].iter().any(|place| *place == 0 || *place == 7);
-            let after = move |_, point| if rim(point) { rim_after } else { 1.0 };
+        // Discs around corners lose the most: what lights them alone changes the share of all rims.
+        let text = |corners_after: f64| {
+            let is_end = |place: usize| place == 0 || place == 7;
+            let after = move |_, point: usize| if is_end(point / 8) && is_end(point % 8) { corners_after } else { 1.0 };
             let found = with_figure(4, SEEDS, |seed| vec![frame(1, seed, 0.01, |_, _| 1.0), frame(100, seed, 0.01, after)]);
             bias(&found).unwrap().text
         };
         assert!(text(1.0).contains("More photons do not reduce it"));
+        assert!(text(100.0).contains("It changes with the number of photons"));
     }
 
     #[test]
