@@ -22,7 +22,7 @@ pub fn running_times(found: &Reproduction) -> Markup {
             (beside_published(found))
             (chart(
                 charts::running_times(found),
-                "Both passes at the paper's size on a logarithmic scale. Grey: published in 2008. Orange: measured here. The paper has no grid."
+                "Both passes at the paper's size on a logarithmic scale: published in 2008, and measured here. The paper has no grid."
             ))
             details {
                 summary { "All sizes" }
