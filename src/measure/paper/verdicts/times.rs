@@ -206,7 +206,10 @@ pub(super) fn empty_slots(found: &Reproduction) -> Option<Verdict> {
 
 pub(super) fn memory(found: &Reproduction) -> Option<Verdict> {
     let on_device = found.running_times.iter().filter(|time| time.implementation.builder != Builder::Cpu);
-    let most = on_device.max_by_key(|time| time.photons).filter(|time| time.photons > published::PHOTONS)?;
+    let most = on_device.max_by_key(|time| time.photons)?;
+    if f64::from(most.photons) < MARGIN * f64::from(published::PHOTONS) {
+        return None;
+    }
     Some(Verdict {
         topic: "Memory limits a round to about 5000 photons",
         then: "about 5000".to_owned(),
@@ -402,6 +405,16 @@ mod tests {
             empty_slots(&found).unwrap().standing.unwrap()
         };
         assert_eq!([0.3, 0.49, 0.7].map(standing), [Standing::Holds, Standing::Undecided, Standing::NoLonger]);
+    }
+
+    #[test]
+    fn memory_is_judged_by_a_round_that_is_clearly_larger() {
+        let mut found = sample::reproduction();
+        assert_eq!(memory(&found).unwrap().standing, Some(Standing::NoLonger));
+        for time in &mut found.running_times {
+            time.photons = published::PHOTONS + 1;
+        }
+        assert_eq!(memory(&found), None);
     }
 
     #[test]
