@@ -38,6 +38,7 @@ const LINE: &[&[&str]] = &[
     &["engine::choose_builder"],
     &["output", "verify::selfcheck"],
     &["bake", "measure::compaction", "measure::line_fit", "verify::compare"],
+    &["measure::interval"],
     &["measure::paper"],
     &["measure::study"],
     &["measure::bench"],

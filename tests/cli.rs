@@ -511,10 +511,11 @@ fn a_measured_paper_run_is_not_lost_on_a_full_disk() {
     let (stdout, stderr) = (text(&output.stdout), text(&output.stderr));
     assert_eq!(output.status.code(), Some(2), "{stderr}");
     assert!(stderr.lines().last().is_some_and(|line| line.contains("-o p/") && line.contains("cannot be written")), "{stderr}");
-    // Both tables, of which the first has rows at least.
+    // All three tables, of which the first has rows at least.
     let tables: Vec<&str> = stdout.split("\n\n").collect();
-    assert!(tables.len() == 2 && tables[0].starts_with("photons,bounces,builder,") && tables[0].lines().count() > 1, "{stdout}");
+    assert!(tables.len() == 3 && tables[0].starts_with("photons,bounces,builder,") && tables[0].lines().count() > 1, "{stdout}");
     assert!(tables[1].starts_with("photons_per_round,rounds,"), "{stdout}");
+    assert!(tables[2].starts_with("finding,verdict,"), "{stdout}");
 }
 
 /// Headings of a help text, and the options under each.
@@ -583,8 +584,12 @@ fn the_paper_is_regenerated() {
     let place = Place::new();
     place.succeed(&validated("paper --out paper --large 5001 --repeats 1 --longest 9s"));
     let names = entries(&place.at("paper"));
-    let figures = ["figure1.png", "figure2.png", "figure3.png", "figure4.png"];
-    assert_eq!(names, [&figures[..], &["index.html", "running_times.csv", "table1.csv"]].concat());
+    let panels = [(1, "abcde"), (2, "ab"), (3, "abc"), (4, "abcdef")];
+    let panels = panels.iter().flat_map(|(figure, letters)| letters.chars().map(move |letter| format!("figure{figure}{letter}.png")));
+    let tables = ["findings.csv", "index.html", "running_times.csv", "table1.csv"].map(str::to_owned);
+    let mut wanted: Vec<String> = panels.chain(tables).collect();
+    wanted.sort();
+    assert_eq!(names, wanted);
     // Thousands are set apart by narrow spaces.
     let page = place.text("paper/index.html").replace('\u{202f}', "");
     for word in ["still holds", "105640", "7511", "Figure 4", "data:image/png;base64,"] {

@@ -10,7 +10,7 @@ use super::values::{parse_integer, parse_seconds, parse_threads};
 use super::{DeviceArgs, End, complain, say};
 use crate::error::{Error, Result, require};
 use crate::measure::paper::bench::Bench;
-use crate::measure::paper::{self, Reproduction, Request, published, tables};
+use crate::measure::paper::{self, Reproduction, Request, published, tables, verdicts};
 use crate::output::destination::Folder;
 use crate::text::counted;
 
@@ -22,7 +22,7 @@ pub(super) struct PaperArgs {
     /// Photons per round of the large size, which is to fill the device [default: 4194304; 65536 on a CPU]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Measurements")]
     large: Option<u32>,
-    /// Timed runs of each case, of which the median is shown; a first run is not timed, and the large size has at most 3
+    /// Timed runs of each case; a first run is not timed, and the large size has at most 3. Verdicts need at least 3
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, default_value = "7", help_heading = "Measurements")]
     repeats: u32,
     /// Leave out rows of table 1 that would take longer than this
@@ -74,7 +74,8 @@ pub(super) fn run(args: &PaperArgs, cancelled: &AtomicBool) -> Result<End> {
 fn write(folder: &Folder, found: &Reproduction) -> Result<()> {
     match paper::write(folder, found) {
         Err(error @ Error::Output { .. }) => {
-            let tables = [tables::running_times(&found.running_times), tables::totals(&found.totals)];
+            let findings = tables::findings(&verdicts::all(found));
+            let tables = [tables::running_times(&found.running_times), tables::totals(&found.totals), findings];
             let text = tables.map(|table| String::from_utf8_lossy(&table).into_owned()).join("\n");
             say(text.trim_end()).and(Err(error))
         }

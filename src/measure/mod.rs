@@ -2,6 +2,7 @@
 
 pub mod bench;
 pub mod compaction;
+pub mod interval;
 pub mod line_fit;
 pub mod paper;
 pub mod study;

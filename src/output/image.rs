@@ -72,20 +72,20 @@ pub fn overview(scene: &RoomScene, walls: &[WallEstimate]) -> Picture {
     let mut picture = Picture::black(3 * WALL_PIXELS + 2 * VIEW_PIXELS, 3 * WALL_PIXELS);
     picture.paste(&unfolded(scene, walls), 0, 0);
     for (place, eye) in VIEWS.iter().enumerate() {
-        let view = perspective(scene, &illumination(walls), *eye, VIEW_PIXELS);
+        let view = perspective(scene, &illumination(walls), eye.1, VIEW_PIXELS);
         picture.paste(&view, 3 * WALL_PIXELS + place % 2 * VIEW_PIXELS, place / 2 * VIEW_PIXELS);
     }
     picture
 }
 
-/// The box seen from one point, as one picture.
-pub fn view(scene: &RoomScene, walls: &[WallEstimate], pixels: usize) -> Picture {
-    view_of_values(scene, &illumination(walls), pixels)
+/// The box from one of [`VIEWS`].
+pub fn view(scene: &RoomScene, walls: &[WallEstimate], number: usize, pixels: usize) -> Picture {
+    view_of_values(scene, &illumination(walls), number, pixels)
 }
 
 /// The same with values of any kind, of the texels of each face.
-pub fn view_of_values(scene: &RoomScene, walls: &[(usize, &[f64])], pixels: usize) -> Picture {
-    perspective(scene, walls, VIEWS[1], pixels)
+pub fn view_of_values(scene: &RoomScene, walls: &[(usize, &[f64])], number: usize, pixels: usize) -> Picture {
+    perspective(scene, walls, VIEWS[number].1, pixels)
 }
 
 fn illumination(walls: &[WallEstimate]) -> Vec<(usize, &[f64])> {
@@ -124,8 +124,13 @@ fn mix(a: f64, b: f64, t: f64) -> f64 {
     a + (b - a) * t
 }
 
-/// Eyes, in half widths of the box from its centre, all in front of the opening.
-const VIEWS: [[f64; 3]; 4] = [[0.0, 0.0, 4.2], [1.7, 1.2, 4.2], [-1.7, 1.2, 4.2], [1.2, -1.8, 4.2]];
+/// Eyes and where they are: in half widths of the box from its centre, all in front of the opening.
+pub const VIEWS: [(&str, [f64; 3]); 4] = [
+    ("from the front", [0.0, 0.0, 4.2]),
+    ("from the upper right", [1.7, 1.2, 4.2]),
+    ("from the upper left", [-1.7, 1.2, 4.2]),
+    ("from the lower right", [1.2, -1.8, 4.2]),
+];
 
 /// Only the insides of walls are drawn, so that a wall between eye and box does not hide it.
 fn perspective(scene: &RoomScene, walls: &[(usize, &[f64])], eye: [f64; 3], pixels: usize) -> Picture {
@@ -230,7 +235,7 @@ mod tests {
         assert_eq!([at(0, 1), at(2, 1), at(1, 2), at(1, 0), at(1, 1), at(0, 0)], [1, 2, 3, 4, 5, 0]);
 
         // Straight in front, the back wall is in the middle, the floor below, the left wall left.
-        let front = perspective(&scene, &illumination(&walls), VIEWS[0], 64);
+        let front = perspective(&scene, &illumination(&walls), VIEWS[0].1, 64);
         let at = |i: usize, j: usize| (front.values[j * 64 + i] * 10.0).round() as usize;
         assert_eq!([at(32, 32), at(8, 32), at(55, 32), at(32, 55), at(32, 8)], [5, 1, 2, 3, 4]);
     }

@@ -5,12 +5,12 @@ use glam::{DVec3, Vec3};
 use super::light::{Light, LightKind};
 use super::material::{Material, Surface};
 use super::room::face_axis;
-use super::{Camera, Mesh, Scene, closed_forms, open_box};
+use super::{Camera, Mesh, Scene, closed_forms, open_box, showcase};
 use crate::settings::{Preset, RoomSettings};
 
 /// Every built-in scene, those of [`closed_forms`] last.
 pub fn names() -> Vec<&'static str> {
-    [&["open-box", "open-box-phong", "cornell", "cornell-spheres", "caustic-sphere"], &closed_forms::NAMES[..]].concat()
+    [&["open-box", "open-box-phong", "cornell", "cornell-spheres", "caustic-sphere"], &showcase::NAMES[..], &closed_forms::NAMES[..]].concat()
 }
 
 pub fn by_name(name: &str) -> Option<Scene> {
@@ -20,7 +20,7 @@ pub fn by_name(name: &str) -> Option<Scene> {
         "cornell" => Some(cornell()),
         "cornell-spheres" => Some(cornell_spheres()),
         "caustic-sphere" => Some(caustic_sphere()),
-        _ => closed_forms::by_name(name),
+        _ => showcase::by_name(name).or_else(|| closed_forms::by_name(name)),
     }
 }
 

@@ -22,6 +22,7 @@ pub mod overlap;
 mod planes;
 pub mod rectangle;
 pub mod room;
+pub mod showcase;
 pub mod sky;
 pub mod targets;
 pub mod texture;

@@ -86,6 +86,8 @@ pub struct RunningTime {
     pub pass: Pass,
     pub clock: Clock,
     pub ms: Spread,
+    /// Every run that counts.
+    pub runs_ms: Vec<f64>,
     /// Photons that the map holds.
     pub stored: u64,
     pub command: String,
@@ -115,7 +117,7 @@ pub struct LeftOut {
 pub const LONGEST_PASS_MS: f64 = 20_000.0;
 /// A row that is shorter is run once before it counts, as it makes pipelines.
 const SHORT_TOTAL_MS: f64 = 1_000.0;
-/// Runs whose median counts at the large size, at most.
+/// Runs that count at the large size, at most.
 pub const LARGE_REPEATS: usize = 3;
 const BOUNCES: [u32; 2] = [published::BOUNCES, 15];
 
@@ -223,13 +225,15 @@ fn running_time(case: &Case, pass: Pass, outcomes: &[RunResult], command: &str) 
         scopes.iter().filter(has_run).map(|scope| outcome.timings.best_ms(scope)).sum::<Option<f64>>()
     };
     let first = outcomes.first()?;
+    let runs_ms = outcomes.iter().map(sum).collect::<Option<Vec<f64>>>()?;
     Some(RunningTime {
         photons: case.photons,
         bounces: case.bounces,
         implementation: case.implementation,
         pass,
         clock: if first.device.is_some() { Clock::Gpu } else { Clock::Wall },
-        ms: Spread::of(outcomes.iter().map(sum).collect::<Option<Vec<f64>>>()?)?,
+        ms: Spread::of(runs_ms.clone())?,
+        runs_ms,
         stored: first.ledger().stored,
         command: command.to_owned(),
     })

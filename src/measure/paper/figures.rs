@@ -1,30 +1,35 @@
-//! The paper's four figures: films of its settings, as pictures side by side.
+//! The paper's four figures: films of its settings, as labelled pictures, and the same with other seeds.
 
 use super::bench::Bench;
 use super::published;
 use crate::engine::room::film::{WallEstimate, estimate_walls};
 use crate::error::Result;
+use crate::measure::interval::Interval;
 use crate::output::colour::Format;
 use crate::output::command;
-use crate::output::image::{Picture, overview, view};
+use crate::output::image::{VIEWS, unfolded, view};
 use crate::scene::open_box::open_box;
 use crate::settings::{Preset, RoomSettings};
 use crate::text::counted;
 
 pub const COUNT: usize = 4;
+/// Every figure is computed with the seeds from 1 to this; those of seed 1 are shown.
+pub const SEEDS: u64 = 5;
 
 pub struct Figure {
     pub number: usize,
     pub title: &'static str,
+    /// What the paper's figure shows.
+    pub published: &'static str,
     /// What to look for.
     pub caption: &'static str,
     pub frames: Vec<Frame>,
-    pub width: usize,
-    pub height: usize,
-    pub png: Vec<u8>,
+    /// The same frames with other seeds.
+    pub repeats: Vec<Vec<Frame>>,
+    pub panels: Vec<Panel>,
 }
 
-/// One picture of a figure.
+/// The light of one run.
 pub struct Frame {
     pub label: String,
     pub command: String,
@@ -32,25 +37,56 @@ pub struct Frame {
     pub walls: Vec<WallEstimate>,
 }
 
+/// One picture of a figure.
+pub struct Panel {
+    pub label: String,
+    /// Pixels along each side.
+    pub side: usize,
+    pub png: Vec<u8>,
+}
+
 /// What a figure shows, before it is made.
 struct Exhibit {
     title: &'static str,
+    published: &'static str,
     caption: &'static str,
     /// Label, preset and settings of each frame.
     frames: Vec<(String, Preset, RoomSettings)>,
-    columns: usize,
 }
 
 pub fn make(bench: &mut Bench, figures: &mut Vec<Figure>) -> Result<()> {
-    for (number, Exhibit { title, caption, frames, columns }) in (1..).zip(exhibits()) {
+    for (number, Exhibit { title, published, caption, frames }) in (1..).zip(exhibits()) {
         bench.begin(&format!("figure {number}: {title}"))?;
-        let frames = frames.into_iter().map(|(label, preset, settings)| frame(bench, label, preset, settings));
-        let frames = frames.collect::<Result<Vec<Frame>>>()?;
-        let picture = compose(&frames, columns);
-        let (width, height, png) = (picture.width, picture.height, picture.encode(Format::Png));
-        figures.push(Figure { number, title, caption, frames, width, height, png });
+        let with_seed = |seed: u64| frames.iter().map(|exhibited| frame(bench, exhibited, seed)).collect::<Result<Vec<Frame>>>();
+        let first = with_seed(1)?;
+        let panels = panels(&first);
+        figures.push(Figure { number, title, published, caption, frames: first, repeats: Vec::new(), panels });
+        for seed in 2..=SEEDS {
+            let repeat = with_seed(seed)?;
+            figures.last_mut().expect("pushed above").repeats.push(repeat);
+        }
     }
     Ok(())
+}
+
+impl Figure {
+    /// A number that follows from the figure's frames, over all seeds; it is positive.
+    pub fn over_seeds(&self, of: impl Fn(&[Frame]) -> f64) -> Interval {
+        let seeds = std::iter::once(&self.frames).chain(&self.repeats);
+        Interval::of_geometric_mean(&seeds.map(|frames| of(frames)).collect::<Vec<f64>>())
+    }
+}
+
+impl Panel {
+    /// `figure2b.png` is the second picture of figure 2.
+    pub fn file_name(number: usize, place: usize) -> String {
+        format!("figure{number}{}.png", letter(place))
+    }
+}
+
+/// The letter of a panel.
+pub fn letter(place: usize) -> char {
+    ('a'..='z').nth(place).expect("a figure has at most six panels")
 }
 
 fn exhibits() -> [Exhibit; COUNT] {
@@ -61,70 +97,65 @@ fn exhibits() -> [Exhibit; COUNT] {
     [
         Exhibit {
             title: "the naive implementation, 2 bounces",
-            caption: "Left: the box unfolded around its back wall. Right: four views from in front of its opening. \
-                A light emits away from its own wall, so the adjacent walls are brightest near it: \
+            published: "The box from several angles. Places near the lights are much brighter than places that only reflected light reaches, \
+                yet no place is black. The image is noisy, which the paper attributes to the small number of photons.",
+            caption: "A light emits away from its own wall, so the adjacent walls are brightest near it: \
                 low on the walls around the floor's light, and at the left of the walls around the left wall's light. \
-                Shaded places are dim but not black. \
                 The blotches are noise: there are only 5000 photons, each spread over a disc of radius 0.05 m.",
             frames: vec![("2 bounces".to_owned(), Preset::Naive, naive.clone())],
-            columns: 1,
         },
         Exhibit {
-            title: "15 bounces (left) and 2 bounces (right)",
+            title: "15 bounces and 2 bounces",
+            published: "Two images that differ little. The one with 15 bounces is brighter where light arrives only after reflections.",
             caption: "Both images contain the same photons for the first two bounces. The next thirteen bounces brighten every wall, including its shaded places. \
                 The paper's text and its caption disagree about the order of the two images; this page follows the text.",
             frames: vec![
                 ("15 bounces, modified".to_owned(), Preset::Modified, modified),
                 ("2 bounces, naive".to_owned(), Preset::Naive, naive),
             ],
-            columns: 2,
         },
         Exhibit {
             title: "Phong walls, shininess 2.0, 0.5 and 0.01",
+            published: "The box with Phong walls at three values of shininess. The text names the values and does not say how the images differ.",
             caption: "The weight of a photon is the cosine between its mirror direction and the direction to the eye, raised to the shininess. \
                 At 2.0 the back wall, which faces the eye, is brightest, and the walls along the line of sight are dark. \
-                As the shininess approaches 0, every photon reflected towards the eye's side has weight 1, and the image approaches the left image of figure 2.",
+                As the shininess approaches 0, every photon reflected towards the eye's side has weight 1, and the image approaches figure 2 (a).",
             frames: published::FIGURE_3_SHININESS
                 .map(|shininess| (format!("shininess {shininess}"), Preset::Phong, phong(shininess)))
                 .into(),
-            columns: 3,
         },
         Exhibit {
             title: "1, 5, 10, 25, 50 and 100 rounds",
-            caption: "From top left to bottom right. Every round adds 5000 photons. Noise decreases, but the radius (here 0.025 m) is fixed: \
+            published: "Six images of the same box. From 1 round of photons to 100 rounds the noise clearly decreases.",
+            caption: "Every round adds 5000 photons. Noise decreases, but the radius (here 0.025 m) is fixed: \
                 the dark rims along the edges, where part of each disc lies beyond the wall, remain after 100 rounds.",
             frames: published::FIGURE_4_ROUNDS.map(|count| (counted(count, "round"), Preset::Rounds, rounds(count))).into(),
-            columns: 3,
         },
     ]
 }
 
-fn frame(bench: &Bench, label: String, preset: Preset, settings: RoomSettings) -> Result<Frame> {
-    let settings = RoomSettings { builder: bench.available(settings.builder), ..settings };
+fn frame(bench: &Bench, (label, preset, settings): &(String, Preset, RoomSettings), seed: u64) -> Result<Frame> {
+    let settings = RoomSettings { builder: bench.available(settings.builder), seed, ..settings.clone() };
     let outcome = bench.run(&settings)?;
     let walls = estimate_walls(&outcome.film, &open_box(&settings), &outcome.plan);
-    Ok(Frame { label, command: command::main_job(preset, &settings), settings, walls })
+    Ok(Frame { label: label.clone(), command: command::main_job(*preset, &settings), settings, walls })
 }
 
-/// Pixels between pictures.
-const GAP: usize = 6;
-/// Pixels along a picture, for two and for three in a row.
-const HALF_ROW: usize = 480;
-const THIRD_ROW: usize = 384;
+/// Pixels along a picture, where a row has two and where it has more.
+const LARGE_SIDE: usize = 480;
+const SMALL_SIDE: usize = 384;
+/// The view of figures that show the box from one point.
+const VIEW: usize = 1;
 
-/// One frame as an overview, several as a mesh of views.
-fn compose(frames: &[Frame], columns: usize) -> Picture {
-    let scene = |frame: &Frame| open_box(&frame.settings);
+/// A single frame unfolded and from every side, several each from the same point.
+fn panels(frames: &[Frame]) -> Vec<Panel> {
     if let [only] = frames {
-        return overview(&scene(only), &only.walls);
+        let scene = open_box(&only.settings);
+        let seen = VIEWS.iter().enumerate().map(|(number, (name, _))| ((*name).to_owned(), view(&scene, &only.walls, number, SMALL_SIDE)));
+        let walls = std::iter::once(("walls unfolded around the back wall".to_owned(), unfolded(&scene, &only.walls)));
+        return walls.chain(seen).map(|(label, picture)| Panel { label, side: picture.width, png: picture.encode(Format::Png) }).collect();
     }
-    let side = if columns == 2 { HALF_ROW } else { THIRD_ROW };
-    let along = |count: usize| count * side + (count - 1) * GAP;
-    let mut picture = Picture::black(along(columns), along(frames.len().div_ceil(columns)));
-    picture.values.fill(1.0);
-    for (place, frame) in frames.iter().enumerate() {
-        let (column, row) = (place % columns, place / columns);
-        picture.paste(&view(&scene(frame), &frame.walls, side), column * (side + GAP), row * (side + GAP));
-    }
-    picture
+    let side = if frames.len() == 2 { LARGE_SIDE } else { SMALL_SIDE };
+    let picture = |frame: &Frame| view(&open_box(&frame.settings), &frame.walls, VIEW, side).encode(Format::Png);
+    frames.iter().map(|frame| Panel { label: frame.label.clone(), side, png: picture(frame) }).collect()
 }

@@ -16,14 +16,14 @@ use crate::error::{Error, Result};
 use crate::output::destination::{Folder, write_all};
 use bench::{Bench, Machine};
 use experiments::{LeftOut, RunningTime, TotalTime};
-use figures::Figure;
+use figures::{Figure, Panel};
 
 /// What is measured besides the paper's own settings.
 #[derive(Debug, Clone, Copy)]
 pub struct Request {
     /// Photons of a round at the size that fills the device.
     pub large: u32,
-    /// Runs whose median counts.
+    /// Runs that count, at most.
     pub repeats: usize,
     /// Threads of a second CPU builder; 1: there is none.
     pub threads: usize,
@@ -76,10 +76,14 @@ fn run_all(bench: &mut Bench, found: &mut Reproduction) -> Result<()> {
 
 /// Writes pictures, tables and the page.
 pub fn write(folder: &Folder, found: &Reproduction) -> Result<()> {
-    let mut files: Vec<_> =
-        found.figures.iter().map(|figure| (folder.file(&format!("figure{}.png", figure.number)), figure.png.clone())).collect();
+    let panels = |figure: &Figure| {
+        let file = |(place, panel): (usize, &Panel)| (folder.file(&Panel::file_name(figure.number, place)), panel.png.clone());
+        figure.panels.iter().enumerate().map(file).collect::<Vec<_>>()
+    };
+    let mut files: Vec<_> = found.figures.iter().flat_map(panels).collect();
     files.push((folder.file("running_times.csv"), tables::running_times(&found.running_times)));
     files.push((folder.file("table1.csv"), tables::totals(&found.totals)));
+    files.push((folder.file("findings.csv"), tables::findings(&verdicts::all(found))));
     files.push((folder.file("index.html"), page::html(found).into_bytes()));
     write_all(files)
 }

@@ -2,7 +2,7 @@
 
 use super::bench::{Device, Machine};
 use super::experiments::{Implementation, LeftOut, Pass, RunningTime, TotalTime};
-use super::figures::Figure;
+use super::figures::{Figure, Panel};
 use super::{Reproduction, Request, published};
 use crate::output::command;
 use crate::settings::{Builder, Gather, Preset, RoomSettings};
@@ -20,11 +20,11 @@ pub fn reproduction() -> Reproduction {
         figures: vec![Figure {
             number: 1,
             title: "a figure",
+            published: "What the paper shows.",
             caption: "A caption.",
             frames: Vec::new(),
-            width: 1,
-            height: 1,
-            png: vec![1, 2, 3],
+            repeats: Vec::new(),
+            panels: vec![Panel { label: "a panel".to_owned(), side: 1, png: vec![1, 2, 3] }],
         }],
         running_times: running_times(),
         totals: totals(),
@@ -46,6 +46,7 @@ fn running_times() -> Vec<RunningTime> {
                     pass,
                     clock: if builder == Builder::Cpu { Clock::Wall } else { Clock::Gpu },
                     ms: Spread { median: f64::from(photons) / 1000.0, min: 0.5, max: 100.0, repeats: 7 },
+                    runs_ms: vec![f64::from(photons) / 1000.0; 7],
                     stored: u64::from(photons),
                     command: command::main_job(Preset::Modified, &RoomSettings { builder, photons, ..RoomSettings::default() }),
                 }));

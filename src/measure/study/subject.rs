@@ -207,7 +207,7 @@ impl Subject {
             let room = open_box(&RoomSettings::default());
             let per_wall = (self.side * self.side) as usize;
             let walls: Vec<(usize, &[f64])> = room.walls().map(|(face, _)| face).zip(values.chunks(per_wall)).collect();
-            let seen = view_of_values(&room, &walls, BOX_PIXELS as usize);
+            let seen = view_of_values(&room, &walls, BOX_VIEW, BOX_PIXELS as usize);
             return of_greys(BOX_PIXELS, BOX_PIXELS, seen.values);
         }
         of_greys(self.side, self.side, values.to_vec())
@@ -325,7 +325,8 @@ fn own_reference(
 const OF_OWN_REFERENCE: u32 = 4;
 const OWN_SEED: u64 = 0x5eed_0000_0000;
 const MOST_ROUNDS: u32 = 1 << 16;
-/// Pixels along the picture of the paper's box.
+/// Which of the box's views is shown, and pixels along it.
+const BOX_VIEW: usize = 1;
 const BOX_PIXELS: u32 = 240;
 
 /// Runs of a study are timed at the clock of work.

@@ -1,0 +1,58 @@
+//! Figures: labelled panels, what the paper's figure shows, and whether the same is seen here.
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use maud::{Markup, html};
+
+use super::summary::badge;
+use crate::measure::paper::figures::{Figure, letter};
+use crate::measure::paper::{Reproduction, verdicts};
+
+pub fn figures(found: &Reproduction) -> Markup {
+    html! {
+        section id="figures" {
+            h2 { "Figures 1 to 4" }
+            p { "All figures use 5000 photons per round, rand48 and seed 1. White is full illumination." }
+            @for figure in &found.figures { (self::figure(found, figure)) }
+        }
+    }
+}
+
+fn figure(found: &Reproduction, figure: &Figure) -> Markup {
+    let columns = match figure.panels.len() {
+        2 => "two",
+        5 => "one-and-four",
+        _ => "three",
+    };
+    html! {
+        h3 { "Figure " (figure.number) ": " (figure.title) }
+        div class={ "panels " (columns) } {
+            @for (place, panel) in figure.panels.iter().enumerate() {
+                @let label = format!("({}) {}", letter(place), panel.label);
+                figure {
+                    img src={ "data:image/png;base64," (STANDARD.encode(&panel.png)) } width=(panel.side) height=(panel.side) alt={ "The open box, figure " (figure.number) " " (label) };
+                    figcaption { (label) }
+                }
+            }
+        }
+        div.beside {
+            div { h4 { "In the paper" } p { (figure.published) } }
+            div {
+                @if let Some(verdict) = verdicts::of_figure(found, figure.number) {
+                    h4 {
+                        "Here"
+                        @if let Some(standing) = verdict.standing { " " (badge(standing, standing.words_for_figures())) }
+                    }
+                    p { (verdict.text) }
+                }
+            }
+        }
+        details {
+            summary { "What to look for, and commands" }
+            p { (figure.caption) }
+            @for frame in &figure.frames {
+                p { (frame.label) ": " code { (frame.command) } }
+            }
+        }
+    }
+}
