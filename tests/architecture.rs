@@ -41,7 +41,7 @@ const LINE: &[&[&str]] = &[
     &["measure::interval"],
     &["measure::paper"],
     &["measure::study"],
-    &["measure::bench"],
+    &["measure::bench", "measure::gallery"],
     &["cli"],
     &["main", "lib"],
 ];

@@ -128,6 +128,13 @@ Examples:
   photonmill bench --scale -o bench
       Time and memory against photons and triangles, with charts";
 
+pub(super) const GALLERY: &str = "\
+Examples:
+  photonmill gallery -o gallery
+      Eleven pictures; open gallery/index.html
+  photonmill gallery -o gallery --size 320 --error 2%
+      Smaller, and sooner done";
+
 pub(super) const PAPER: &str = "\
 Examples:
   photonmill paper -o paper

@@ -5,6 +5,7 @@ mod bench;
 mod chosen;
 mod compare;
 mod devices;
+mod gallery;
 mod help;
 mod info;
 mod interrupt;
@@ -94,6 +95,9 @@ enum Command {
     /// Measure the speed of every pass against the limits of the device
     #[command(after_help = help::BENCH)]
     Bench(bench::BenchArgs),
+    /// Make pictures that show what photonmill does best, each with its time and its error, and a page of them
+    #[command(after_help = help::GALLERY)]
+    Gallery(gallery::GalleryArgs),
     /// Reproduce every figure and table of the paper as images, CSV and one HTML page
     #[command(after_help = help::PAPER)]
     Paper(paper::PaperArgs),
@@ -227,6 +231,7 @@ pub fn main() -> u8 {
         Some(Command::Selfcheck(args)) => interruptible(|| selfcheck::run(&args, &cancelled)),
         Some(Command::Study(args)) => interruptible(|| study::run(&args, &cancelled)),
         Some(Command::Bench(args)) => interruptible(|| bench::run(&args, &cancelled)),
+        Some(Command::Gallery(args)) => interruptible(|| gallery::run(&args, &cancelled)),
         Some(Command::Paper(args)) => interruptible(|| paper::run(&args, &cancelled)),
     };
     match result {

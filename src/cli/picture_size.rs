@@ -12,7 +12,7 @@ pub(super) enum PictureSize {
 }
 
 /// Along each side.
-const MAX_SIDE: u32 = 65_535;
+pub(super) const MAX_SIDE: u32 = 65_535;
 /// Pixel numbers are 32-bit, with sums over them.
 const MAX_PIXELS: u32 = 1 << 28;
 /// Pixels of a picture whose size is not given.

@@ -1,7 +1,8 @@
-//! What photonmill costs: benchmarks, builders compared, accuracy against time, and the paper's tables.
+//! What photonmill costs: benchmarks, builders compared, accuracy against time, pictures to show, and the paper's tables.
 
 pub mod bench;
 pub mod compaction;
+pub mod gallery;
 pub mod interval;
 pub mod line_fit;
 pub mod paper;

@@ -139,7 +139,8 @@ fn draw(x: &Axis, y: &Axis, series: &[Series], layout: &Layout) -> String {
             return Ok(());
         }
         let edge = (layout.width - layout.labels) as i32;
-        let ends: Vec<(i32, i32)> = series.iter().map(|series| chart.backend_coord(within(&series.points).last().expect("not empty"))).collect();
+        let ends: Vec<(i32, i32)> =
+            series.iter().map(|series| chart.backend_coord(within(&series.points).last().expect("not empty"))).collect();
         let labels: Vec<Vec<String>> = series.iter().map(|series| lines_of(&series.label, LETTERS)).collect();
         let heights: Vec<i32> = labels.iter().map(|lines| LABEL_LINE * lines.len() as i32 + 4).collect();
         let places = apart(&ends.iter().map(|end| end.1).collect::<Vec<_>>(), &heights, layout.height as i32);

@@ -10,7 +10,8 @@ use crate::settings::{Preset, RoomSettings};
 
 /// Every built-in scene, those of [`closed_forms`] last.
 pub fn names() -> Vec<&'static str> {
-    [&["open-box", "open-box-phong", "cornell", "cornell-spheres", "caustic-sphere"], &showcase::NAMES[..], &closed_forms::NAMES[..]].concat()
+    [&["open-box", "open-box-phong", "cornell", "cornell-spheres", "caustic-sphere"], &showcase::NAMES[..], &closed_forms::NAMES[..]]
+        .concat()
 }
 
 pub fn by_name(name: &str) -> Option<Scene> {

@@ -124,14 +124,14 @@ fn prism() -> Scene {
         meshes.push(Mesh::parallelogram(name, slit + off * across - 0.2 * DVec3::Z, 0.12 * across, 0.4 * DVec3::Z, BLACK));
     }
     let spot = LightKind::Spot { position: lamp, direction: beam, intensity: Vec3::splat(60.0), inner_angle: 0.05, outer_angle: 0.06 };
-    let room = LightKind::Environment { radiance: Vec3::splat(0.15) };
+    let room = LightKind::Environment { radiance: Vec3::splat(0.05) };
     Scene {
         name: "prism".into(),
         meshes,
         materials,
         lights: [("lamp", spot), ("room", room)].map(|(name, kind)| Light { name: name.into(), kind }).into(),
         cameras: vec![
-            Camera::looking_at("front", DVec3::new(-0.35, 0.75, 2.6), DVec3::new(0.35, 0.4, 0.0), DVec3::Y, 0.62).with_aspect(16.0 / 9.0),
+            Camera::looking_at("front", DVec3::new(-0.1, 0.8, 2.2), DVec3::new(0.32, 0.36, 0.0), DVec3::Y, 0.58).with_aspect(16.0 / 9.0),
         ],
         ..Scene::default()
     }

@@ -91,7 +91,8 @@ impl Part {
     /// A sentence for each choice that was left out.
     pub fn not_measured(&self) -> Vec<String> {
         let all = self.comparisons.iter().flat_map(|comparison| comparison.curves.iter().map(move |curve| (comparison.axis, curve)));
-        all.filter_map(|(axis, curve)| Some(format!("{} was not measured: {}.", named(axis, &curve.label), curve.left_out.as_ref()?))).collect()
+        all.filter_map(|(axis, curve)| Some(format!("{} was not measured: {}.", named(axis, &curve.label), curve.left_out.as_ref()?)))
+            .collect()
     }
 
     /// Sentences made of this part's numbers, the most asked for first.
@@ -198,7 +199,12 @@ impl Choice<'_> {
             }
             Effect::Differs(error, longer) => {
                 let faster = Estimate { value: 1.0 / longer.value, low: 1.0 / longer.high, high: 1.0 / longer.low };
-                format!("{name} is {} as fast as the base in reaching {} ({}).", ratio(faster.value), percent(error), between(faster, ratio))
+                format!(
+                    "{name} is {} as fast as the base in reaching {} ({}).",
+                    ratio(faster.value),
+                    percent(error),
+                    between(faster, ratio)
+                )
             }
             Effect::Undecided(error, longer) => {
                 format!("{name} takes {} as long to reach {} ({})", ratio(longer.value), percent(error), between(longer, ratio))

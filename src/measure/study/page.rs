@@ -88,8 +88,10 @@ fn image(png: &[u8], (width, height): (u32, u32), alt: &str) -> Markup {
 fn slider(strip: &Strip) -> Markup {
     let names: Vec<String> = strip.frames.iter().map(|frame| percent(frame.asked)).chain(["reference".to_owned()]).collect();
     let last = names.len() - 1;
-    let choice = |id: &str, chosen: usize| html! {
-        select id=(id) { @for (number, name) in names.iter().enumerate() { option value=(number) selected[number == chosen] { (name) } } }
+    let choice = |id: &str, chosen: usize| {
+        html! {
+            select id=(id) { @for (number, name) in names.iter().enumerate() { option value=(number) selected[number == chosen] { (name) } } }
+        }
     };
     html! {
         figure {

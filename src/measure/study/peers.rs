@@ -22,7 +22,9 @@ pub fn read(path: &Path, scene: &str) -> Result<Vec<Peer>> {
     let found: Value = serde_json::from_str(&text).map_err(|error| refuse(format!("is not JSON: {error}")))?;
     let own = |name: &str| name.starts_with("photonmill");
     let peers: Vec<Peer> = match (&found["contestants"], &found["scenes"]) {
-        (Value::Array(programs), _) if scene == "open-box" => programs.iter().filter_map(|program| of(program, &program["points"])).collect(),
+        (Value::Array(programs), _) if scene == "open-box" => {
+            programs.iter().filter_map(|program| of(program, &program["points"])).collect()
+        }
         (_, Value::Array(scenes)) => {
             let stem = Path::new(scene).file_stem().and_then(|stem| stem.to_str()).unwrap_or(scene);
             let own_scene = scenes.iter().find(|one| one["name"] == stem);
@@ -40,7 +42,8 @@ pub fn read(path: &Path, scene: &str) -> Result<Vec<Peer>> {
 }
 
 fn of(program: &Value, points: &Value) -> Option<Peer> {
-    let points = points.as_array()?.iter().filter_map(|point| Some((1e3 * middle(&point["computing_s"])?, middle(&point["error"])?))).collect();
+    let points =
+        points.as_array()?.iter().filter_map(|point| Some((1e3 * middle(&point["computing_s"])?, middle(&point["error"])?))).collect();
     Some(Peer { name: program["name"].as_str()?.to_owned(), points })
 }
 

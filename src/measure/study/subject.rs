@@ -118,7 +118,8 @@ impl Subject {
             Reference::picture(scene, &camera, (width, height), reference_samples, cancelled, tell)?
         };
         if reference.mean_square() <= f64::MIN_POSITIVE {
-            let why = "shows no light except light sources seen directly, so a relative error is not defined; choose another scene or camera";
+            let why =
+                "shows no light except light sources seen directly, so a relative error is not defined; choose another scene or camera";
             return Err(Error::setting("SCENE", &name, why));
         }
         Ok(vec![subject("Radiance of the image", &reference, of_scene(true)?, (Some(camera), Vec::new()))])
@@ -186,8 +187,7 @@ impl Subject {
             return Err(Error::Interrupted);
         }
         let shot = self.shot_of(&lit);
-        let with_pilot =
-            Shot { gpu_ms: shot.gpu_ms.map(|ms| ms + chosen.gpu_ms), wall_ms: shot.wall_ms + chosen.wall_ms, ..shot };
+        let with_pilot = Shot { gpu_ms: shot.gpu_ms.map(|ms| ms + chosen.gpu_ms), wall_ms: shot.wall_ms + chosen.wall_ms, ..shot };
         Ok((lit.end == End::Error).then_some((with_pilot, lit.film.rounds)))
     }
 

@@ -40,7 +40,10 @@ fn first_change(part: &Part) -> String {
     let best = part.best_choice();
     if let Some(default) = part.default.as_ref().filter(|default| default.points.len() > 1) {
         // At the smallest error that both reach.
-        let against = best.map_or_else(|| part.base().map(|base| ("the base settings".to_owned(), base)), |(axis, curve)| Some((named(axis, &curve.label), curve)));
+        let against = best.map_or_else(
+            || part.base().map(|base| ("the base settings".to_owned(), base)),
+            |(axis, curve)| Some((named(axis, &curve.label), curve)),
+        );
         let errors = default.points.iter().rev().map(|point| point.error().value * 1.001);
         let compared = against.and_then(|(name, curve)| {
             errors.clone().find_map(|error| Some((name.clone(), error, default.time_to(error)?.value, curve.time_to(error)?.value)))
@@ -90,7 +93,7 @@ fn doubts(part: &Part) -> String {
         1 => "; one choice below, in grey, could not be told from noise".to_owned(),
         many => format!("; {many} choices below, in grey, could not be told from noise"),
     };
-    let bias = part.base().and_then(|base| base.points.last()).map(|last| last.bias());
+    let bias = part.base().and_then(|base| base.points.last()).map(super::point::Point::bias);
     let of_bias = match bias {
         Some(bias) if bias.low > least => {
             format!("; the base keeps a bias of {} however long it runs", percent(bias.value))
