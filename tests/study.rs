@@ -89,7 +89,7 @@ fn the_check_of_errors_complains() {
 fn the_open_box_is_studied_against_radiosity_and_goes_on_where_it_ended() {
     let Some(gpu) = device() else { return };
     let folder = Place::new();
-    let first = run(&gpu, folder.path(), request("open-box", 2)).unwrap();
+    let first = run(&gpu, folder.path(), request("open-box", 4)).unwrap();
     assert!(first.complete);
     let axes: Vec<Axis> = first.parts.iter().flat_map(|part| part.comparisons.iter().map(|comparison| comparison.axis)).collect();
     for axis in [Axis::Builder, Axis::Photons, Axis::Radius, Axis::Schedule, Axis::Kernel, Axis::Edges, Axis::Bounces, Axis::Randomness] {
@@ -144,7 +144,7 @@ fn the_open_box_is_studied_against_radiosity_and_goes_on_where_it_ended() {
     let kept: Vec<&str> = whole.lines().take(1 + 3 * count / 4).collect();
     folder.write("points.jsonl", kept.join("\n") + "\n[\"builder\",{\"comm");
     let kept = kept.into_iter().skip(1).map(|line| serde_json::from_str(line).unwrap()).collect::<Vec<(Axis, Point)>>();
-    let mut second = run(&gpu, folder.path(), request("open-box", 2)).unwrap();
+    let mut second = run(&gpu, folder.path(), request("open-box", 4)).unwrap();
     assert!(second.complete);
     assert_holds("the study that went on", resumed_check(&second, &first, &kept));
     let spoiled = |second: &mut Study, spoil: &dyn Fn(&mut Vec<Point>)| {
@@ -163,7 +163,7 @@ fn the_open_box_is_studied_against_radiosity_and_goes_on_where_it_ended() {
     assert_holds("the study that went on", resumed_check(&second, &first, &kept));
 
     // Another study does not mix with it.
-    let error = run(&gpu, folder.path(), Request { photons: 4096, ..request("open-box", 2) }).unwrap_err().to_string();
+    let error = run(&gpu, folder.path(), Request { photons: 4096, ..request("open-box", 4) }).unwrap_err().to_string();
     assert!(error.starts_with("-o ") && error.contains("points.jsonl") && !error.contains('\n'), "{error}");
 }
 
@@ -226,7 +226,7 @@ fn a_study_that_is_cancelled_keeps_what_it_has() {
     let mut told = 0;
     let scene = scene("open-box");
     let out = Folder::open("-o", folder.path()).unwrap();
-    let study = study::run(&gpu, &scene, request("open-box", 2), &out, &cancelled, &mut |_| {
+    let study = study::run(&gpu, &scene, request("open-box", 4), &out, &cancelled, &mut |_| {
         told += 1;
         // At the third comparison.
         if told == 4 {

@@ -22,8 +22,8 @@ pub(super) struct StudyArgs {
     output: PathBuf,
     #[arg(value_name = "SCENE", help = scene_help())]
     scene: String,
-    /// Time of all measurements together, without the reference: 90s, 10m
-    #[arg(long, value_name = "TIME", value_parser = parse_seconds, allow_hyphen_values = true, default_value = "2m", help_heading = "When to stop")]
+    /// Time of all measurements together, without a path-traced reference: 90s, 10m
+    #[arg(long, value_name = "TIME", value_parser = parse_seconds, allow_hyphen_values = true, default_value = "4m", help_heading = "When to stop")]
     budget: f64,
     /// Runs of every setting and number of rounds; their spread gives the confidence intervals
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, default_value = "5", help_heading = "Measurements")]

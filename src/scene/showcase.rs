@@ -76,6 +76,7 @@ fn prism() -> Scene {
     const SCREEN: usize = 0;
     const BLACK: usize = 1;
     const GLASS: usize = 2;
+    const DARK: usize = 3;
     let glass = Layers {
         metallic: 0.0,
         roughness: 0.0,
@@ -90,6 +91,7 @@ fn prism() -> Scene {
         Material::lambert("screen", Vec3::splat(0.75)),
         Material { two_sided: true, ..Material::lambert("black", Vec3::splat(0.02)) },
         Material::layered("glass", Vec3::ONE, glass),
+        Material::lambert("dark", Vec3::splat(0.06)),
     ];
     // Its edge is up, along z; the base is 0.35 m above the floor.
     let (side, length, base) = (0.3, 0.5, 0.35);
@@ -107,7 +109,7 @@ fn prism() -> Scene {
     let mut meshes = vec![
         Mesh::parallelogram("floor", DVec3::new(-1.2, 0.0, -0.7), DVec3::Z * 1.4, DVec3::X * 2.6, SCREEN),
         Mesh::parallelogram("wall", DVec3::new(1.4, 0.0, -0.7), DVec3::Z * 1.4, DVec3::Y * 1.1, SCREEN),
-        Mesh::parallelogram("back", DVec3::new(-1.2, 0.0, -0.7), DVec3::X * 2.6, DVec3::Y * 1.1, SCREEN),
+        Mesh::parallelogram("back", DVec3::new(-1.2, 0.0, -0.7), DVec3::X * 2.6, DVec3::Y * 1.1, DARK),
         quad("prism, left", left, along, top - left),
         quad("prism, right", right, top - right, along),
         quad("prism, base", left, right - left, along),

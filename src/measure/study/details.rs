@@ -33,7 +33,7 @@ pub fn of_part(part: &Part) -> Markup {
     html! {
         details {
             summary { h2 { "All measurements: " (part.quantity) } }
-            p { "Reference: " (part.reference) ". Its own error is " (percent(part.reference_error)) "; smaller errors in this section are not reliable." }
+            p { "Reference: " (part.reference) ". Its own error is " (percent(part.reference_error)) "; errors below " (percent(part.least_error)) " are not reliable." }
             ul { @for sentence in part.sentences() { li { (sentence) } } }
             (chart(
                 charts::overview(part),

@@ -42,11 +42,6 @@ impl Part {
         self.curves().flat_map(|curve| curve.points.iter().map(move |point| (curve, point)))
     }
 
-    /// Errors below this say more of the reference than of what it judges.
-    pub fn least_error(&self) -> f64 {
-        2.0 * self.reference_error
-    }
-
     /// Points that no other beats in both error and time, the fastest first.
     pub fn pareto_front(&self) -> Vec<(&Curve, &Point)> {
         let mut all: Vec<(&Curve, &Point)> = self.points().collect();
@@ -65,7 +60,7 @@ impl Part {
         let count: usize = self.comparisons.iter().map(|comparison| comparison.others().count()).sum();
         // So that all of them together are as sure as one.
         let confidence = 1.0 - (1.0 - CONFIDENCE) / count.max(1) as f64;
-        let least = self.least_error();
+        let least = self.least_error;
         let mut choices = Vec::with_capacity(count);
         for comparison in &self.comparisons {
             if let Some(base) = comparison.base() {
@@ -98,7 +93,7 @@ impl Part {
     /// Sentences made of this part's numbers, the most asked for first.
     pub fn sentences(&self) -> Vec<String> {
         let Some(base) = self.base() else { return Vec::new() };
-        let least = self.least_error();
+        let least = self.least_error;
         let mut sentences: Vec<String> =
             [price(base, least), halving(base, least), law("the base", base, least), floor("the base", base, least)]
                 .into_iter()
@@ -369,7 +364,7 @@ pub fn equal_error(part: &Part) -> Option<(f64, Vec<Row>)> {
     let base = part.base()?;
     let reach = |error: f64| part.curves().filter(|curve| curve.time_to(error).is_some()).count();
     let most = part.curves().count();
-    let error = steps(part.least_error()).find(|error| base.time_to(*error).is_some() && 2 * reach(*error) >= most)?;
+    let error = steps(part.least_error).find(|error| base.time_to(*error).is_some() && 2 * reach(*error) >= most)?;
     Some((error, rows(part, |curve| curve.time_to(error).ok_or_else(|| beyond(curve, error)))))
 }
 
@@ -446,6 +441,7 @@ mod tests {
             quantity: String::new(),
             reference: String::new(),
             reference_error: 0.0,
+            least_error: 0.0,
             default: None,
             strip: None,
             comparisons: vec![

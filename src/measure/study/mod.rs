@@ -1,6 +1,6 @@
 //! What accuracy costs in time: error against time on this device, for every option.
 //!
-//! A study runs each configuration of each axis ([`axes`]) at numbers of rounds that double, several times with seeds of
+//! A study runs each configuration of each axis ([`axes`]) at numbers of rounds that grow four-fold, several times with seeds of
 //! their own, compares the results with a reference from another method ([`mod@reference`]), and writes what it found
 //! as a page, CSV, JSON and SVG. Points that are finished are kept ([`store`]), so that a study that was cut off goes on
 //! where it ended.
@@ -84,6 +84,8 @@ pub struct Part {
     pub reference: String,
     /// Root mean square of the reference's own error over its root mean square.
     pub reference_error: f64,
+    /// Errors below this say more of the reference than of what it judges.
+    pub least_error: f64,
     pub comparisons: Vec<Comparison>,
     /// Runs with nothing set but their error, which a pilot divides; `None` of the paper's box.
     pub default: Option<Curve>,
@@ -126,7 +128,7 @@ pub fn run(
     let is_of_paper = subjects.iter().any(Subject::is_of_paper);
     let of_builders = study.request.budget / COMPACTION_SHARE;
     let of_defaults = study.request.budget / DEFAULTS_SHARE;
-    let share = (study.request.budget - of_builders - of_defaults) / count.max(1) as u32;
+    let start = Instant::now();
     let with_default = subjects.iter().filter(|subject| subject.has_default()).count().max(1) as u32;
     clock::warm_up(gpu, FIRST_WARM_UP)?;
     let mut begun = 0;
@@ -135,6 +137,7 @@ pub fn run(
             quantity: subject.quantity.clone(),
             reference: subject.reference.method.clone(),
             reference_error: subject.reference.relative_error,
+            least_error: subject.reference.least_error(),
             comparisons: Vec::new(),
             default: None,
             strip: None,
@@ -149,6 +152,9 @@ pub fn run(
         for group in &subject.groups {
             begun += group.configurations.len();
             tell(&format!("[{begun}/{count}] {}: {}", subject.quantity, group.axis.name()));
+            // What is left is shared out evenly: pipelines and what the others did not use count.
+            let left = (study.request.budget - of_builders).saturating_sub(start.elapsed());
+            let share = left / (count + group.configurations.len() - begun).max(1) as u32;
             let mut measuring = Measuring { gpu, subject, group, request: &study.request, share, cancelled, store: &mut store };
             let mut curves: Vec<Curve> = group.configurations.iter().map(|configuration| Curve::new(&configuration.label)).collect();
             let ended = measuring.climb(&mut curves);
@@ -195,29 +201,31 @@ struct Measuring<'a> {
 }
 
 impl Measuring<'_> {
-    /// Points of every configuration at numbers of rounds that double until its share of time is spent.
+    /// Points of every configuration at numbers of rounds that grow four-fold until its share of time is spent.
     fn climb(&mut self, curves: &mut [Curve]) -> Result<()> {
-        // First rounds, which no point holds.
-        let mut unmeasured = vec![Duration::ZERO; curves.len()];
-        for doublings in 0..=self.request.most_rounds.ilog2() as usize {
-            let rounds = 1 << doublings;
-            // Those that have time left for twice the photons of before, which take at most twice the time.
+        for level in 0..=self.request.most_rounds.ilog(GROWTH) {
+            let rounds = GROWTH.pow(level);
+            // Those that have time left: a run's set-up takes as long as before, and its rounds longer.
+            let next = |last: &Point| {
+                let (seconds, of_rounds) = (last.spent().as_secs_f64(), 1e-3 * last.wall_ms.iter().sum::<f64>());
+                Duration::from_secs_f64(seconds + f64::from(GROWTH - 1) * of_rounds.min(seconds))
+            };
             let going: Vec<usize> = (0..curves.len())
                 .filter(|which| {
                     let Curve { points, left_out, .. } = &curves[*which];
-                    let spent: Duration = unmeasured[*which] + points.iter().map(Point::spent).sum::<Duration>();
-                    let next = points.last().map_or(Duration::ZERO, |last| 2 * last.spent());
+                    let spent: Duration = points.iter().map(Point::spent).sum();
                     let allowed = rounds <= self.group.configurations[*which].most_rounds();
-                    left_out.is_none() && points.len() == doublings && allowed && spent + next <= self.share
+                    let fits = points.last().is_none_or(|last| spent + next(last) <= self.share);
+                    left_out.is_none() && points.len() == level as usize && allowed && fits
                 })
                 .collect();
-            self.level(&going, rounds, curves, &mut unmeasured)?;
+            self.level(&going, rounds, curves)?;
         }
         Ok(())
     }
 
     /// Adds a point to each of these curves, their runs in turn.
-    fn level(&mut self, going: &[usize], rounds: u32, curves: &mut [Curve], unmeasured: &mut [Duration]) -> Result<()> {
+    fn level(&mut self, going: &[usize], rounds: u32, curves: &mut [Curve]) -> Result<()> {
         let Measuring { gpu, subject, group, request, cancelled, share, .. } = *self;
         let command = |which: usize| subject.command(&group.configurations[which], rounds, request.seed);
         let known: Option<Vec<Point>> = going.iter().map(|which| self.store.find(group.axis, &command(*which))).collect();
@@ -237,7 +245,6 @@ impl Measuring<'_> {
                 let (rounds, seed) = if turn == 0 { (1, request.seed) } else { (rounds, request.seed + turn - 1) };
                 match subject.run(gpu, &group.configurations[which], rounds, seed, cancelled) {
                     Ok(_) if turn == 0 => {
-                        unmeasured[which] += began.elapsed();
                         if began.elapsed() > PATIENCE.max(2 * share) {
                             let seconds = began.elapsed().as_secs_f64();
                             curves[which].left_out = Some(format!("one round takes {seconds:.1} s, too long for the budget"));
@@ -258,6 +265,9 @@ impl Measuring<'_> {
         Ok(())
     }
 }
+
+/// Times as many rounds from one point of a curve to the next.
+const GROWTH: u32 = 4;
 
 /// A card that idled while references were made takes longer to come to its clock than each run gives it.
 const FIRST_WARM_UP: Duration = Duration::from_secs(3);

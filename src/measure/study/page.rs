@@ -74,10 +74,15 @@ fn frame(frame: &Frame) -> Markup {
         div {
             (image(&frame.picture, frame.size, &format!("The picture at an error of {}", percent(frame.error))))
             (image(&frame.difference, frame.size, "Its difference from the reference in false colours"))
-            strong { (percent(frame.asked)) } " in " strong { (duration(frame.ms)) }
+            strong { (asked(frame)) } " in " strong { (duration(frame.ms)) }
             div.soft { "true error " (percent(frame.error)) ", " (counted(frame.rounds as usize, "round")) }
         }
     }
+}
+
+/// A round number.
+fn asked(frame: &Frame) -> String {
+    format!("{}\u{a0}%", 100.0 * frame.asked)
 }
 
 fn image(png: &[u8], (width, height): (u32, u32), alt: &str) -> Markup {
@@ -86,7 +91,7 @@ fn image(png: &[u8], (width, height): (u32, u32), alt: &str) -> Markup {
 
 /// Any two pictures, one over the other up to a line that can be moved.
 fn slider(strip: &Strip) -> Markup {
-    let names: Vec<String> = strip.frames.iter().map(|frame| percent(frame.asked)).chain(["reference".to_owned()]).collect();
+    let names: Vec<String> = strip.frames.iter().map(asked).chain(["reference".to_owned()]).collect();
     let last = names.len() - 1;
     let choice = |id: &str, chosen: usize| {
         html! {

@@ -49,6 +49,14 @@ impl Reference {
         self.mean_over(|place| (found[place] - self.values[place]).powi(2) - self.standard_errors[place].powi(2))
     }
 
+    /// Smallest relative error that this can judge. Its noise is taken out of what it judges, in squares, and what that leaves is a quarter of
+    /// the square at most, as the noise is known to a few percent; of other errors of its own nothing is known.
+    pub fn least_error(&self) -> f64 {
+        let noise = self.mean_over(|place| self.standard_errors[place].powi(2)) / self.mean_square();
+        let rest = (self.relative_error.powi(2) - noise).max(0.0);
+        (0.25 * noise + 4.0 * rest).sqrt()
+    }
+
     /// With the relative error that its own noise makes at the places that count.
     pub fn with_own_error(self) -> Reference {
         let noise = self.mean_over(|place| self.standard_errors[place].powi(2));

@@ -3,7 +3,7 @@
 use super::findings::{Effect, between, named, percent, ratio};
 use super::point::Curve;
 use super::{Part, Study};
-use crate::output::words::{duration, number};
+use crate::output::words::{duration, times};
 
 pub fn sentences(study: &Study, part: &Part) -> [String; 3] {
     [cost(study, part), first_change(part), doubts(part)]
@@ -29,7 +29,7 @@ fn cost(study: &Study, part: &Part) -> String {
     let halving = match points.as_slice() {
         [first, .., last] if last.1 < 0.8 * first.1 => {
             let power = (last.0 / first.0).ln() / (first.1 / last.1).ln();
-            format!(" Half the error takes about {} times the time.", number(2f64.powf(power)))
+            format!(" Half the error takes about {} the time.", times(2f64.powf(power)))
         }
         _ => String::new(),
     };
@@ -81,9 +81,9 @@ fn first_change(part: &Part) -> String {
 }
 
 fn doubts(part: &Part) -> String {
-    let least = part.least_error();
+    let least = part.least_error;
     let of_reference = if least > 0.0 {
-        format!("Do not trust errors below {}: the reference itself is only known to {}", percent(least), percent(part.reference_error))
+        format!("Do not trust errors below {}: the reference has an error of {} itself", percent(least), percent(part.reference_error))
     } else {
         "The reference is exact".to_owned()
     };
