@@ -164,7 +164,7 @@ fn cost_follows_photons_and_memory_the_plan() {
         let growth = series.growth.iter().find(|growth| growth.pass == pass).unwrap_or_else(|| panic!("no {pass}"));
         assert!(growth.power.value.is_finite() && growth.power.error >= 0.0, "{pass}: {:?}", growth.power);
     }
-    for file in ["bench.json", "bench.txt", "scale-photons.svg", "scale-triangles.svg"] {
+    for file in ["index.html", "bench.json", "bench.txt", "scale-photons.svg", "scale-triangles.svg"] {
         let content = place.text(file);
         assert!(content.len() > 500, "{file}: {content}");
     }

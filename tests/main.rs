@@ -24,6 +24,7 @@ mod extensions;
 mod extremes;
 mod faults;
 mod film;
+mod gallery;
 mod gltf;
 mod guide;
 mod hard_cases;

@@ -14,7 +14,18 @@ use photonmill::output::destination::Folder;
 /// Bounded by rounds alone, so that a slow machine finds the same.
 fn request(scene: &str, most_rounds: u32) -> Request {
     let (scene, budget) = (scene.to_owned(), Duration::from_secs(3600));
-    Request { scene, size: 6, photons: 2048, repeats: 3, seed: 1, reference_samples: 512, budget, peers: Vec::new(), most_rounds }
+    Request {
+        scene,
+        size: 6,
+        photons: 2048,
+        repeats: 3,
+        seed: 1,
+        reference_samples: 512,
+        budget,
+        asked: vec![0.5, 0.3],
+        peers: Vec::new(),
+        most_rounds,
+    }
 }
 
 fn run(gpu: &Gpu, folder: &Path, request: Request) -> photonmill::error::Result<Study> {
@@ -119,6 +130,12 @@ fn the_open_box_is_studied_against_radiosity_and_goes_on_where_it_ended() {
 
     let page = folder.text("index.html");
     assert!(page.contains("What accuracy costs in time") && page.contains("<svg") && !page.contains("http"));
+    assert!(page.len() < 3_000_000, "{} bytes", page.len());
+    // The paper's own points stand on the chart of its box, whose errors its rounds have here.
+    assert!(page.contains("the paper's GPU in 2008") && page.contains("data:image/png;base64,"));
+    let strip = first.parts[0].strip.as_ref().unwrap();
+    assert!(!strip.frames.is_empty() && strip.frames.iter().all(|frame| frame.error <= frame.asked && frame.size == (240, 240)));
+    assert!(first.parts[1].default.as_ref().is_some_and(|curve| curve.points.len() == 2) && first.parts[0].default.is_none());
     let count = first.parts.iter().flat_map(Part::points).count();
     assert_eq!(folder.text("points.csv").lines().count(), 1 + count);
     assert_eq!(folder.text("points.jsonl").lines().count(), 1 + count);
@@ -174,6 +191,15 @@ fn sentences_of(scene: &str, rounds: u32) -> Option<String> {
     let study = run(&gpu, folder.path(), request(scene, rounds)).unwrap();
     let part = &study.parts[0];
     assert!(part.reference.contains("path tracing") && part.reference_error < 0.2, "{} {}", part.reference, part.reference_error);
+    // What a pilot divides reaches the error that it was asked for, and is shown.
+    let default = part.default.as_ref().unwrap();
+    for (point, asked) in pairs(&default.points, &[0.5, 0.3]) {
+        assert!(point.error().value < 1.1 * asked && point.command.contains("--error"), "{asked}: {:?}", point.error());
+    }
+    let strip = part.strip.as_ref().unwrap();
+    assert!(strip.frames.iter().all(|frame| frame.size == (6, 6) && frame.picture != strip.reference), "{strip:?}");
+    let page = folder.text("index.html");
+    assert_eq!(page.matches("in false colours").count(), strip.frames.len());
     let without = part.curves().find(|curve| curve.label == "without indirect").unwrap();
     let base = part.base().unwrap();
     assert!(without.best_error() > base.best_error(), "{} {}", without.best_error(), base.best_error());
@@ -216,6 +242,21 @@ fn floors_are_studied_against_their_closed_form() {
         // Few photons are noisy, and right on average.
         assert!(base.error().value < 0.6 && base.bias().value < 0.2, "{name}: {:?}, bias {:?}", base.error(), base.bias());
     }
+}
+
+/// A spot light and a prism: no path from the eye finds such light, so photonmill judges itself, and says so.
+#[test]
+fn light_that_no_path_finds_is_studied_against_a_long_run() {
+    let Some(gpu) = device() else { return };
+    let folder = Place::new();
+    let (out, cancelled) = (Folder::open("-o", folder.path()).unwrap(), AtomicBool::new(false));
+    let mut tell = |line: &str| cancelled.store(cancelled.load(Ordering::Relaxed) || line.starts_with('['), Ordering::Relaxed);
+    let request = Request { budget: Duration::from_secs(24), asked: vec![0.6], ..request("prism", 1) };
+    let study = study::run(&gpu, &scene("prism"), request, &out, &cancelled, &mut tell).unwrap();
+    let part = &study.parts[0];
+    assert!(part.reference.contains("a long run of photonmill itself"), "{}", part.reference);
+    // Wider than high, as the camera.
+    assert!(part.reference_error > 0.0 && part.reference_error < 1.0 && part.least_error > 0.0, "{}", part.reference_error);
 }
 
 #[test]

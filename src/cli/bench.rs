@@ -18,7 +18,7 @@ use crate::scene::{Scene, built_in};
 
 #[derive(Args)]
 pub(super) struct BenchArgs {
-    /// Folder for the report as JSON and text, and for the charts of --scale; created if needed
+    /// Folder for the report as a page, JSON and text, and for charts; created if needed
     #[arg(short, long, alias = "out", value_name = "DIR", help_heading = "Output")]
     output: Option<PathBuf>,
     #[command(flatten)]

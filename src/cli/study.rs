@@ -11,7 +11,7 @@ use super::values::{parse_integer, parse_seconds, parse_within};
 use super::{DeviceArgs, End, complain, help, say};
 use crate::error::{Result, require, within};
 use crate::gpu::Gpu;
-use crate::measure::study::{self, Request, peers};
+use crate::measure::study::{self, Request, peers, strip};
 use crate::output::destination::Folder;
 use crate::scene::Scene;
 
@@ -82,6 +82,7 @@ pub(super) fn run(args: &StudyArgs, cancelled: &AtomicBool) -> Result<End> {
         reference_samples: args.reference_samples,
         budget: Duration::from_secs_f64(args.budget),
         most_rounds: args.rounds,
+        asked: strip::ASKED.to_vec(),
         peers: args.peers.as_ref().map_or(Ok(Vec::new()), |path| peers::read(path, &args.scene))?,
     };
     reporter.note(&format!(

@@ -59,6 +59,7 @@ pub fn measure(lab: &mut Lab, name: &str) -> Result<Found> {
         seed: FIRST_SEED,
         reference_samples: samples,
         budget: patience,
+        asked: Vec::new(),
         peers: Vec::new(),
         most_rounds: study::MOST_ROUNDS,
     };

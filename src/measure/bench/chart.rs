@@ -10,7 +10,7 @@ pub fn all(scale: &Scale) -> impl Iterator<Item = (String, Vec<u8>)> {
     measured.map(|series| (format!("scale-{}.svg", series.over), draw(series).as_file()))
 }
 
-fn draw(series: &scale::Series) -> Chart {
+pub fn draw(series: &scale::Series) -> Chart {
     let lines = series.growth.iter().enumerate().map(|(number, growth)| {
         let label = format!("{}: power {:.3} \u{b1} {:.3}", growth.pass, growth.power.value, growth.power.error);
         let points = scale::times_of(&series.steps, &growth.pass).into_iter().map(|(size, ms)| (size, ms.max(1e-6)));

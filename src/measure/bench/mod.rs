@@ -8,6 +8,7 @@ pub mod accuracy;
 pub mod chart;
 pub mod experiment;
 pub mod experiments;
+pub mod page;
 pub mod pass;
 pub mod rates;
 pub mod room;
@@ -189,7 +190,11 @@ impl Bench {
 
 /// Writes the report and its charts.
 pub fn write(folder: &Folder, bench: &Bench) -> Result<()> {
-    let mut files = vec![(folder.file("bench.json"), bench.json()), (folder.file("bench.txt"), table::text(bench).into_bytes())];
+    let mut files = vec![
+        (folder.file("index.html"), page::html(bench).into_bytes()),
+        (folder.file("bench.json"), bench.json()),
+        (folder.file("bench.txt"), table::text(bench).into_bytes()),
+    ];
     if let Some(map) = &bench.compaction {
         files.push((folder.file("compaction.svg"), compaction::chart::draw(map).as_file()));
     }

@@ -3,7 +3,7 @@
 use super::pass::Pass;
 use super::rates::Rates;
 use super::scale::{Growth, PassTime, Series};
-use super::targets::{Finding, Wanted};
+use super::targets::{Finding, Target, Wanted};
 use super::{Bench, tuning};
 use crate::output::command::lower_case;
 use crate::timings::Spread;
@@ -58,7 +58,7 @@ pub fn scaled(value: f64) -> String {
 }
 
 /// The same with its unit; seconds below one as milliseconds.
-fn quantity(value: f64, unit: &str) -> String {
+pub fn quantity(value: f64, unit: &str) -> String {
     match unit {
         _ if !value.is_finite() => "-".to_owned(),
         "/s" => scaled(value) + "/s",
@@ -107,14 +107,18 @@ fn passes(text: &mut String, passes: &[Pass]) {
     }
 }
 
+pub fn wanted(target: &Target) -> String {
+    match target.wanted {
+        Wanted::AtLeast(least) => format!(">= {}", quantity(least, target.unit)),
+        Wanted::AtMost(most) => format!("<= {}", quantity(most, target.unit)),
+    }
+}
+
 fn targets(text: &mut String, findings: &[Finding]) {
     *text += &format!("\n{:<14} {:>11} {:>11} {:>9}  work\n", "target", "found", "limit", "met");
     for Finding { target, found, limit, met, how } in findings {
         let value = |value: f64| quantity(value, target.unit);
-        let wanted = match target.wanted {
-            Wanted::AtLeast(least) => format!(">= {}", value(least)),
-            Wanted::AtMost(most) => format!("<= {}", value(most)),
-        };
+        let wanted = wanted(target);
         let met = met.map_or("H200 only", |met| if met { "yes" } else { "no" });
         let limit = limit.map_or("-".to_owned(), value);
         *text += &format!("{wanted:<14} {:>11} {limit:>11} {met:>9}  {}\n", value(*found), target.work);

@@ -52,6 +52,9 @@ pub struct Request {
     /// Wall time of all measurements together, shared out evenly; not of the reference.
     #[serde(skip)]
     pub budget: Duration,
+    /// Errors that end runs with default settings, the largest first.
+    #[serde(skip)]
+    pub asked: Vec<f64>,
     /// Other programs on the same scene, for the chart.
     #[serde(skip)]
     pub peers: Vec<Peer>,

@@ -127,18 +127,23 @@ show();
 /// What each choice buys, the fastest first; what noise hides at the end.
 fn choices(part: &Part) -> Markup {
     let Some(base) = part.base() else { return html! {} };
-    let mut choices = part.choices();
+    let (single, mut choices): (Vec<Choice>, Vec<Choice>) =
+        part.choices().into_iter().partition(|choice| choice.effect == Effect::SinglePoint);
     let rank = |choice: &Choice| match choice.effect {
         Effect::Differs(_, longer) => (0, longer.value),
         Effect::Apart([own, base]) => (1, own.0 / base.0),
         Effect::Undecided(_, longer) => (2, longer.value),
-        Effect::SinglePoint => (3, 0.0),
+        Effect::SinglePoint => unreachable!("taken out above"),
     };
     choices.sort_by(|one, other| rank(one).partial_cmp(&rank(other)).expect("no effect is NaN"));
     let head = html! { tr { th.name { "What each choice buys" } th { "time to the same error" } th { "interval" } th { "faster · slower" } th { "at error" } } };
     let left_out = part.not_measured();
     html! {
-        (table(&head, &html! { @for choice in &choices { (row(choice)) } }))
+        @if !choices.is_empty() { div.choices { (table(&head, &html! { @for choice in &choices { (row(choice)) } })) } }
+        @if !single.is_empty() {
+            p.soft { "Not compared, as the budget allowed a single point of each (a longer " code { "--budget" } " compares them): "
+                (single.iter().map(Choice::name).collect::<Vec<_>>().join("; ")) "." }
+        }
         p.soft {
             "Each choice is one change to the base: " (base.label) ". Times are over the base's, measured in turn with it; all intervals of this table together hold with 95 % confidence. "
             "Grey: not significantly different from the base."
@@ -155,9 +160,7 @@ fn row(choice: &Choice) -> Markup {
         Effect::Apart([own, base]) => html! {
             tr { th scope="row" { (name) } td colspan="4" { "reaches " (percent(own.0)) " in " (duration(own.1)) "; the base " (percent(base.0)) " in " (duration(base.1)) } }
         },
-        Effect::SinglePoint => html! {
-            tr.undecided { th scope="row" { (name) } td colspan="4" { "one point only: a longer --budget compares it" } }
-        },
+        Effect::SinglePoint => html! {},
     }
 }
 

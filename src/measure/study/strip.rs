@@ -52,7 +52,7 @@ pub fn measure_defaults(
 ) -> Result<Curve> {
     let mut curve = Curve::new("default settings");
     let began = Instant::now();
-    for asked in ASKED {
+    for &asked in &request.asked {
         let command = subject.command_to(asked, request.seed);
         if let Some(point) = store.find(Axis::Default, &command) {
             curve.points.push(point);
@@ -97,7 +97,7 @@ pub fn strip(gpu: &Gpu, subject: &Subject, part: &Part, request: &Request, cance
     let mean = reference.mean_over(|place| reference.values[place]).abs();
     let mut found: Vec<(f64, &Point, Vec<f64>)> = Vec::new();
     if let Some(curve) = &part.default {
-        for (point, asked) in curve.points.iter().zip(ASKED) {
+        for (point, asked) in curve.points.iter().zip(request.asked.iter().copied()) {
             let chosen = subject.choose(gpu, asked)?;
             let Some((shot, _)) = subject.run_to_error(gpu, &chosen, request.seed, LONGEST, cancelled)? else { continue };
             // Few rounds may do for several errors.
@@ -107,7 +107,7 @@ pub fn strip(gpu: &Gpu, subject: &Subject, part: &Part, request: &Request, cance
             found.push((asked, point, shot.values));
         }
     } else if let Some((configuration, curve)) = subject.groups.first().map(|group| &group.configurations[0]).zip(part.base()) {
-        for asked in ASKED {
+        for &asked in &request.asked {
             let Some(point) = curve.points.iter().find(|point| point.error().value <= asked) else { break };
             if found.last().is_some_and(|(_, last, _)| last.rounds == point.rounds) {
                 found.pop();

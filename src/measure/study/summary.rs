@@ -87,7 +87,7 @@ fn doubts(part: &Part) -> String {
     } else {
         "The reference is exact".to_owned()
     };
-    let undecided = part.choices().iter().filter(|choice| !matches!(choice.effect, Effect::Differs(..) | Effect::Apart(..))).count();
+    let undecided = part.choices().iter().filter(|choice| matches!(choice.effect, Effect::Undecided(..))).count();
     let of_noise = match undecided {
         0 => String::new(),
         1 => "; one choice below, in grey, could not be told from noise".to_owned(),
