@@ -98,8 +98,18 @@ impl Chosen {
         if chosen.format != FORMAT {
             return Err(other(&format!("its format is not '{FORMAT}'")));
         }
-        let base = SceneSettings { rounds: chosen.rounds, ..chosen.settings.set(&SceneSettings::default()) };
-        base.validate().map_err(|error| other(&error))?;
+        chosen.validate().map_err(|error| other(&error))?;
+        Ok(chosen)
+    }
+
+    fn validate(&self) -> Result<()> {
+        SceneSettings { rounds: self.rounds, ..self.settings.set(&SceneSettings::default()) }.validate()
+    }
+
+    /// What a picture's file holds of it; fails with what is wrong with it.
+    pub(super) fn from_value(value: &serde_json::Value) -> std::result::Result<Chosen, String> {
+        let chosen = Chosen::deserialize(value).map_err(|error| error.to_string())?;
+        chosen.validate().map_err(|error| error.to_string())?;
         Ok(chosen)
     }
 

@@ -75,7 +75,7 @@ pub(super) fn run(args: &MergeArgs) -> Result<()> {
     let mut files = Vec::new();
     if let (Some(film), Some(Sensor::Picture { width, height })) = (film, run.sensor) {
         let show = Show { size: (width, height), exposure: args.exposure, tone: args.tone.map_or(Tone::default(), Tone::from) };
-        files.extend(picture.zip(format).map(|(picture, format)| (picture, show.picture(film, format).0)));
+        files.extend(picture.zip(format).map(|(picture, format)| (picture, show.picture(film, format, |_| None).0)));
         files.extend(errors.map(|errors| (errors, show.errors(film))));
         files.extend(json.map(|json| (json, merge_report::json(&run, film, &missing))));
     }

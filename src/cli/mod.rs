@@ -6,6 +6,7 @@ mod chosen;
 mod compare;
 mod devices;
 mod help;
+mod how_made;
 mod info;
 mod interrupt;
 mod job;
@@ -19,11 +20,13 @@ mod plan;
 mod probe;
 mod progress;
 mod render;
+mod repeat;
 mod run;
 mod scene;
 mod selfcheck;
 mod stop;
 mod study;
+mod typed;
 mod usage;
 mod values;
 
@@ -40,6 +43,7 @@ use crate::gpu::{Gpu, Options};
 use crate::output::destination::Destination;
 use interrupt::{cancel_on_signal, exit_code, interruptible};
 use progress::print_line;
+use typed::Typed;
 use values::parse_bytes;
 
 /// Photon mapping on any Vulkan GPU.
@@ -67,6 +71,9 @@ enum Command {
     /// Compute the irradiance at given points of a scene
     #[command(after_help = help::PROBE)]
     Probe(probe::ProbeArgs),
+    /// Run a picture again from what its file says of how it was made, and check that the same bits come out
+    #[command(after_help = help::REPEAT)]
+    Repeat(repeat::RepeatArgs),
     /// Add the parts of a run that --shard or --checkpoint left, to the bits of one run
     #[command(after_help = help::MERGE)]
     Merge(merge::MergeArgs),
@@ -216,7 +223,8 @@ pub fn main() -> u8 {
     let result = match cli.command {
         None => interruptible(|| run::run(&cli.run, &cancelled)),
         Some(Command::Devices(args)) => devices::run(&args).map(|()| End::Finished),
-        Some(Command::Render(args)) => render::run(&args, &cancelled),
+        Some(Command::Render(args)) => render::run(&args, &Typed::of(&matches, &command), &cancelled),
+        Some(Command::Repeat(args)) => repeat::run(args, &cancelled),
         Some(Command::Bake(args)) => bake::run(&args, &cancelled),
         Some(Command::Probe(args)) => probe::run(&args, &cancelled),
         Some(Command::Map(args)) => map::run(&args, &cancelled),

@@ -398,7 +398,7 @@ impl Outputs {
         let error = room_report::error(&outcome, scene);
         let (destination, format) = self.picture;
         let picture = destination.path().display().to_string();
-        let mut files = vec![(destination, overview(scene, &walls).encode(format))];
+        let mut files = vec![(destination, overview(scene, &walls).encode(format, None))];
         for (folder, quantity) in [(&self.irradiance, Quantity::Irradiance), (&self.radiosity, Quantity::Radiosity)] {
             files.extend(folder.iter().flat_map(|folder| lightmap::files(folder, quantity, scene, &walls)));
         }

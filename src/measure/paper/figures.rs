@@ -47,7 +47,7 @@ pub fn make(bench: &mut Bench, figures: &mut Vec<Figure>) -> Result<()> {
         let frames = frames.into_iter().map(|(label, preset, settings)| frame(bench, label, preset, settings));
         let frames = frames.collect::<Result<Vec<Frame>>>()?;
         let picture = compose(&frames, columns);
-        let (width, height, png) = (picture.width, picture.height, picture.encode(Format::Png));
+        let (width, height, png) = (picture.width, picture.height, picture.encode(Format::Png, None));
         figures.push(Figure { number, title, caption, frames, width, height, png });
     }
     Ok(())
