@@ -1,12 +1,12 @@
 //! What a picture's file says of how it was made.
 
-use serde_json::to_value;
+use serde_json::{Value, to_value};
 
 use super::chosen::{Chosen, For};
 use super::typed::Typed;
 use crate::engine::error_bound::FilmError;
 use crate::engine::saved::SavedRun;
-use crate::engine::scene::RunResult;
+use crate::engine::scene::{RunResult, SceneFilm};
 use crate::engine::watch::End;
 use crate::gpu::DeviceFacts;
 use crate::output::colour::{Format, Tone};
@@ -14,6 +14,32 @@ use crate::output::metadata::{Metadata, Repeat};
 use crate::plan::work_division::Division;
 use crate::settings::scene::SceneSettings;
 use crate::settings::tile_samples::TileSamples;
+
+/// A picture that was put together from parts of a run.
+pub(super) fn of_merge(typed: &Typed, run: &SavedRun, film: &SceneFilm, units: String, format: Format) -> Metadata {
+    let confidence = film.plan.confidence;
+    let [error, error_bound] = errors(&film.error(confidence), confidence);
+    Metadata {
+        photonmill: env!("CARGO_PKG_VERSION").to_owned(),
+        devices: run.identity.device.iter().cloned().collect(),
+        scene: run.identity.scene.clone(),
+        scene_hash: None,
+        seed: run.identity.settings.get("seed").and_then(Value::as_u64).unwrap_or_default(),
+        rounds: film.rounds,
+        error,
+        error_bound,
+        confidence,
+        units,
+        command: typed.line(&[("-o", name_in_text(format).to_owned())]),
+        settings: run.identity.settings.clone().into(),
+        repeat: Repeat::Not("was put together by merge; repeat the picture of one run that does all of it".to_owned()),
+    }
+}
+
+/// Under whatever name a picture is written: equal results are equal files.
+fn name_in_text(format: Format) -> &'static str {
+    if format == Format::Png { "picture.png" } else { "picture.exr" }
+}
 
 /// A picture of a scene and its run.
 pub(super) struct Made<'a> {
@@ -101,8 +127,7 @@ impl Made<'_> {
     }
 
     pub(super) fn metadata(&self, units: String, format: Format) -> Metadata {
-        // Under whatever name: equal results are equal files.
-        let output = if format == Format::Png { "picture.png" } else { "picture.exr" };
+        let output = name_in_text(format);
         let Made { typed, lit, scene, ref scene_hash, .. } = *self;
         let settings = &lit.plan.settings;
         let confidence = settings.stop.confidence;

@@ -228,7 +228,7 @@ pub fn main() -> u8 {
         Some(Command::Bake(args)) => bake::run(&args, &cancelled),
         Some(Command::Probe(args)) => probe::run(&args, &cancelled),
         Some(Command::Map(args)) => map::run(&args, &cancelled),
-        Some(Command::Merge(args)) => merge::run(&args).map(|()| End::Finished),
+        Some(Command::Merge(args)) => merge::run(&args, &Typed::of(&matches, &command)).map(|()| End::Finished),
         Some(Command::Plan(args)) => plan::run(&args).map(|()| End::Finished),
         Some(Command::Info(args)) => info::run(&args).map(|()| End::Finished),
         Some(Command::Compare(args)) => compare::run(&args).map(|()| End::Finished),

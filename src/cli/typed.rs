@@ -8,7 +8,7 @@ use clap::{Arg, ArgMatches, Command};
 /// that it had say enough.
 const WITHOUT_EFFECT: [&str; 5] = ["Output", "Messages", "Checks", "Device", "When to stop"];
 /// Options under them that do change the file.
-const WITH_EFFECT: [&str; 4] = ["exposure", "tone", "measure", "confidence"];
+const WITH_EFFECT: [&str; 5] = ["exposure", "tone", "layers", "measure", "confidence"];
 /// Options under other headings, in whose place the metadata has what came of them.
 const REPLACED: [&str; 3] = ["rounds", "settings", "save_settings"];
 
@@ -41,14 +41,19 @@ impl Typed {
             None => ("", matches, command),
         };
         let was_typed = |argument: &&Arg| matches.value_source(argument.get_id().as_str()) == Some(ValueSource::CommandLine);
-        let argument = |argument: &Arg| {
+        let of_argument = |argument: &Arg| -> Vec<Argument> {
             let values = matches.get_raw(argument.get_id().as_str()).into_iter().flatten();
-            let values: Vec<_> = values.map(|value| value.to_string_lossy()).collect();
-            let value = argument.get_action().takes_values().then(|| values.join(","));
-            Argument { option: argument.get_long().map(|long| format!("--{long}")), value }
+            let values: Vec<String> = values.map(|value| value.to_string_lossy().into_owned()).collect();
+            match argument.get_long() {
+                Some(long) => {
+                    let value = argument.get_action().takes_values().then(|| values.join(","));
+                    vec![Argument { option: Some(format!("--{long}")), value }]
+                }
+                None => values.into_iter().map(|value| Argument { option: None, value: Some(value) }).collect(),
+            }
         };
         let known = command.get_arguments().filter(|argument| is_kept(argument)).filter(was_typed);
-        Typed { command: name.to_owned(), arguments: known.map(argument).collect() }
+        Typed { command: name.to_owned(), arguments: known.flat_map(of_argument).collect() }
     }
 
     pub(super) fn has(&self, option: &str) -> bool {

@@ -25,7 +25,7 @@ pub struct Identity {
 }
 
 /// Settings that change no bit of a block.
-const WITHOUT_EFFECT: [&str; 8] = ["rounds", "stop", "builder", "chunk", "group_size", "paranoid", "counters", "threads"];
+const WITHOUT_EFFECT: [&str; 9] = ["rounds", "stop", "keeps_parts", "builder", "chunk", "group_size", "paranoid", "counters", "threads"];
 
 impl Identity {
     /// `settings` are those of either world.
