@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::complain;
 use crate::error::{Error, Result};
 use crate::output::destination::{Destination, write_all};
+use crate::output::metadata::Metadata;
 use crate::plan::work_division::Division;
 use crate::settings::scene::SceneSettings;
 use crate::settings::tile_samples::TileSamples;
@@ -106,10 +107,20 @@ impl Chosen {
         SceneSettings { rounds: self.rounds, ..self.settings.set(&SceneSettings::default()) }.validate()
     }
 
-    /// What a picture's file holds of it; fails with what is wrong with it.
-    pub(super) fn from_value(value: &serde_json::Value) -> std::result::Result<Chosen, String> {
-        let chosen = Chosen::deserialize(value).map_err(|error| error.to_string())?;
-        chosen.validate().map_err(|error| error.to_string())?;
+    /// What a picture's file says of its rounds; fails where that is nothing that a run can do.
+    pub(super) fn of_picture(made: &Metadata, settings: Division, tiles: Option<TileSamples>) -> Result<Chosen> {
+        let chosen = Chosen {
+            format: FORMAT.into(),
+            version: made.photonmill.clone(),
+            scene: made.scene.clone(),
+            scene_hash: made.scene_hash.clone().unwrap_or_default(),
+            size: [0; 2],
+            device: String::new(),
+            settings,
+            tiles,
+            rounds: made.rounds,
+        };
+        chosen.validate()?;
         Ok(chosen)
     }
 

@@ -1,10 +1,11 @@
 //! What a picture's file says of how it was made.
 
-use serde_json::{Value, to_value};
+use serde_json::Value;
 
-use super::chosen::{Chosen, For};
 use super::typed::Typed;
 use crate::engine::error_bound::FilmError;
+use crate::engine::identity::settings_with_effect;
+use crate::engine::room::RunResult as RoomResult;
 use crate::engine::saved::SavedRun;
 use crate::engine::scene::{RunResult, SceneFilm};
 use crate::engine::watch::End;
@@ -12,6 +13,7 @@ use crate::gpu::DeviceFacts;
 use crate::output::colour::{Format, Tone};
 use crate::output::metadata::{Metadata, Repeat};
 use crate::plan::work_division::Division;
+use crate::settings::Builder;
 use crate::settings::scene::SceneSettings;
 use crate::settings::tile_samples::TileSamples;
 
@@ -31,8 +33,38 @@ pub(super) fn of_merge(typed: &Typed, run: &SavedRun, film: &SceneFilm, units: S
         confidence,
         units,
         command: typed.line(&[("-o", name_in_text(format).to_owned())]),
-        settings: run.identity.settings.clone().into(),
+        settings: run.identity.settings.clone(),
         repeat: Repeat::Not("was put together by merge; repeat the picture of one run that does all of it".to_owned()),
+    }
+}
+
+/// A picture of the paper's box, which its command line makes again.
+pub(super) fn of_room(typed: &Typed, outcome: &RoomResult, error: &FilmError, format: Format) -> Metadata {
+    let settings = &outcome.plan.settings;
+    let confidence = settings.stop.confidence;
+    let [error, error_bound] = errors(error, confidence);
+    let builder = outcome.device.is_none().then(|| ("--variant", Builder::Cpu.name().to_owned()));
+    let options = [("--rounds", outcome.film.rounds.to_string()), ("-o", name_in_text(format).to_owned())];
+    let devices = devices(outcome.device.iter().chain(&outcome.more_devices));
+    Metadata {
+        photonmill: env!("CARGO_PKG_VERSION").to_owned(),
+        devices: if devices.is_empty() { vec!["cpu".to_owned()] } else { devices },
+        scene: "open-box".to_owned(),
+        scene_hash: None,
+        seed: settings.seed,
+        rounds: outcome.film.rounds,
+        error,
+        error_bound,
+        confidence,
+        units: match format {
+            Format::Png => "the paper's illumination, from 0 to 1 as codes from 0 to 255".to_owned(),
+            Format::Exr => "the paper's illumination, not clamped to 1".to_owned(),
+        },
+        command: typed.line(&builder.into_iter().chain(options).collect::<Vec<_>>()),
+        settings: settings_with_effect(settings),
+        repeat: Repeat::Not(
+            "is of the paper's box, and only pictures of render are repeated; run the command line in it instead".to_owned(),
+        ),
     }
 }
 
@@ -44,8 +76,6 @@ fn name_in_text(format: Format) -> &'static str {
 /// A picture of a scene and its run.
 pub(super) struct Made<'a> {
     pub(super) typed: &'a Typed,
-    /// What the options say without a pilot.
-    pub(super) asked: &'a SceneSettings,
     pub(super) lit: &'a RunResult,
     pub(super) scene: &'a str,
     pub(super) scene_hash: String,
@@ -105,21 +135,22 @@ impl Made<'_> {
         }
     }
 
-    /// Options that say what a pilot chose, so that the command line needs none.
+    /// Options that say what each round did, where that is not what it does without them.
     fn options(&self) -> Vec<(&'static str, String)> {
-        let (asked, used) = (Division::of(self.asked), Division::of(&self.lit.plan.settings));
-        let Division { samples, shadow_rays, photons, caustic_photons, neighbours, caustic_neighbours } = used;
-        let of_points = [
-            ("--samples", samples),
-            ("--shadow-rays", shadow_rays),
-            ("--neighbours", neighbours),
-            ("--caustic-neighbours", caustic_neighbours),
-        ];
-        let of_photons = [("--photons", photons), ("--caustic-photons", caustic_photons)];
+        let usual = Division::of(&SceneSettings::default());
+        let used = Division::of(&self.lit.plan.settings);
         // Photons of a file are as many as they are.
-        let of_photons = of_photons.into_iter().filter(|_| !self.typed.has("--map"));
-        let all = of_points.into_iter().chain(of_photons).filter(|(option, _)| asked != used && !self.typed.has(option));
-        all.chain([("--rounds", self.lit.film.rounds)]).map(|(option, value)| (option, value.to_string())).collect()
+        let traces = !self.typed.has("--map");
+        let options = [
+            ("--photons", used.photons, used.photons != usual.photons && traces),
+            ("--caustic-photons", used.caustic_photons, used.caustic_photons != used.photons && traces),
+            ("--samples", used.samples, used.samples != usual.samples),
+            ("--shadow-rays", used.shadow_rays, used.shadow_rays != usual.shadow_rays),
+            ("--neighbours", used.neighbours, used.neighbours != usual.neighbours),
+            ("--caustic-neighbours", used.caustic_neighbours, used.caustic_neighbours != (used.neighbours / 4).max(1)),
+            ("--rounds", self.lit.film.rounds, true),
+        ];
+        options.into_iter().filter(|(.., is_needed)| *is_needed).map(|(option, value, _)| (option, value.to_string())).collect()
     }
 
     pub(super) fn devices(&self) -> Vec<String> {
@@ -132,9 +163,6 @@ impl Made<'_> {
         let settings = &lit.plan.settings;
         let confidence = settings.stop.confidence;
         let [error, error_bound] = errors(&lit.error(), confidence);
-        let device = lit.device.as_ref().map_or("cpu", |facts| facts.kind);
-        let made_for = For { scene, scene_hash: scene_hash.clone(), size: lit.plan.sensor.size(), device };
-        let chosen = Chosen::new(settings, lit.film.rounds, &made_for);
         let is_even = settings.tiles.as_ref().is_none_or(|tiles: &TileSamples| tiles.most() == 0);
         let command = match is_even {
             true => typed.line(&[&self.options()[..], &[("-o", output.to_owned())]].concat()),
@@ -146,7 +174,8 @@ impl Made<'_> {
             None => Repeat::With {
                 command: typed.command.clone(),
                 arguments: typed.words(),
-                chosen: to_value(&chosen).expect("settings are numbers and names"),
+                division: Division::of(settings),
+                tiles: settings.tiles.clone(),
             },
         };
         Metadata {
@@ -161,7 +190,7 @@ impl Made<'_> {
             confidence,
             units,
             command,
-            settings: to_value(settings).expect("settings are numbers and names"),
+            settings: settings_with_effect(settings),
             repeat,
         }
     }

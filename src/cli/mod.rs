@@ -221,7 +221,7 @@ pub fn main() -> u8 {
     };
     let cancelled = cancel_on_signal();
     let result = match cli.command {
-        None => interruptible(|| run::run(&cli.run, &cancelled)),
+        None => interruptible(|| run::run(&cli.run, &Typed::of(&matches, &command), &cancelled)),
         Some(Command::Devices(args)) => devices::run(&args).map(|()| End::Finished),
         Some(Command::Render(args)) => render::run(&args, &Typed::of(&matches, &command), &cancelled),
         Some(Command::Repeat(args)) => repeat::run(args, &cancelled),

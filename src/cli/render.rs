@@ -251,7 +251,6 @@ pub(super) fn run(args: &RenderArgs, typed: &Typed, cancelled: &AtomicBool) -> R
     if let (Some(picture), Some(format), Some(output)) = (&picture, format, output) {
         let made = Made {
             typed,
-            asked: &args.settings(map.as_ref(), None),
             lit: &lit,
             scene: &scene.name,
             scene_hash: scene_hash(geometry),
@@ -363,9 +362,8 @@ pub(super) fn again(args: &RenderArgs, again: &Again, cancelled: &AtomicBool) ->
     let lit = job.run(&mut gpus, stop, &mut keeper, &reporter, cancelled)?.finished()?;
     reporter.finish();
     let show = args.show(&subject);
-    let asked = args.settings(map.as_ref(), None);
     let scene = &subject.scene.name;
-    let made = Made { typed, asked: &asked, lit: &lit, scene, scene_hash: hash, is_shard: false, blocks_with_gaps: 0 };
+    let made = Made { typed, lit: &lit, scene, scene_hash: hash, is_shard: false, blocks_with_gaps: 0 };
     let (content, _) = file(&made, &show, format, &subject.scene, &subject.camera);
     Ok(Repeated { content, devices: made.devices() })
 }

@@ -1,5 +1,6 @@
 //! `photonmill repeat`: runs a picture again, from what its file says of how it was made.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
@@ -49,12 +50,12 @@ pub(super) fn run(args: RepeatArgs, cancelled: &AtomicBool) -> Result<End> {
         return Err(Error::setting("-o", output.display(), allowed));
     }
     check_not_read(output.as_slice(), [path.as_path()])?;
-    let (command, arguments, chosen) = match &made.repeat {
-        Repeat::With { command, arguments, chosen } => (command, arguments, chosen),
+    let (command, arguments, division, tiles) = match &made.repeat {
+        Repeat::With { command, arguments, division, tiles } => (command, arguments, *division, tiles.clone()),
         Repeat::Not(reason) => return Err(refuse(reason.clone())),
     };
     let damaged = |reason: &dyn std::fmt::Display| refuse(format!("says otherwise than photonmill does how it was made ({reason})"));
-    let chosen = Chosen::from_value(chosen).map_err(|reason| damaged(&reason))?;
+    let chosen = Chosen::of_picture(&made, division, tiles).map_err(|error| damaged(&error))?;
     let (cli, typed) = parsed(command, arguments, &chosen).map_err(|reason| damaged(&reason))?;
     let Some(Command::Render(mut render)) = cli.command else { return Err(damaged(&"it is of no scene")) };
     let has_moved = args.scene.is_some();
@@ -103,21 +104,28 @@ struct Differing {
     of: usize,
 }
 
-/// Compares the values of two pictures of one format, to the bit.
+/// Compares the values of a picture with those of another one, to the bit. What the other one has beside them is not compared: layers
+/// that a run could not keep, which went on with a checkpoint without them.
 fn differing(before: &[u8], after: &[u8], format: Format) -> std::result::Result<Differing, String> {
     let [before, after] = [values(before, format)?, values(after, format)?];
-    let of = before.len().max(after.len());
-    let same = before.iter().zip(&after).filter(|(before, after)| before == after).count();
-    Ok(Differing { count: of - same, of })
+    let mut differing = Differing { count: 0, of: 0 };
+    for (name, values) in &before {
+        let others = after.get(name).map_or(&[][..], Vec::as_slice);
+        let same = values.iter().zip(others).filter(|(value, other)| value == other).count();
+        differing.of += values.len();
+        differing.count += values.len() - same;
+    }
+    Ok(differing)
 }
 
-/// All channels in the order of their names, as bits; a PNG's codes.
-fn values(content: &[u8], format: Format) -> std::result::Result<Vec<u32>, String> {
+/// Values of each channel as bits, by its name; a PNG's codes have none.
+fn values(content: &[u8], format: Format) -> std::result::Result<BTreeMap<String, Vec<u32>>, String> {
     match format {
-        Format::Png => Ok(colour::png_codes(content)?.into_iter().map(u32::from).collect()),
+        Format::Png => Ok([(String::new(), colour::png_codes(content)?.into_iter().map(u32::from).collect())].into()),
         Format::Exr => {
             let (_, channels) = exr_file::decode(content)?;
-            Ok(channels.into_iter().flat_map(|channel| channel.values).map(f32::to_bits).collect())
+            let bits = |values: Vec<f32>| values.into_iter().map(f32::to_bits).collect();
+            Ok(channels.into_iter().map(|channel| (channel.name, bits(channel.values))).collect())
         }
     }
 }

@@ -4,13 +4,16 @@
 use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Command};
 
-/// Headings of options that change no pixel: where results go, how they are watched, and when the run ends, of which the rounds
-/// that it had say enough.
-const WITHOUT_EFFECT: [&str; 5] = ["Output", "Messages", "Checks", "Device", "When to stop"];
+/// Headings of options that change no pixel: where results go, how they are made and watched, and when the run ends, of which the
+/// rounds that it had say enough.
+const WITHOUT_EFFECT: [&str; 6] = ["Output", "Messages", "Checks", "Device", "When to stop", "Implementation"];
 /// Options under them that do change the file.
-const WITH_EFFECT: [&str; 5] = ["exposure", "tone", "layers", "measure", "confidence"];
-/// Options under other headings, in whose place the metadata has what came of them.
-const REPLACED: [&str; 3] = ["rounds", "settings", "save_settings"];
+const WITH_EFFECT: [&str; 8] = ["exposure", "tone", "layers", "measure", "confidence", "math", "sums", "gather"];
+/// The option under another heading in whose place the metadata has what came of it.
+const ROUNDS: &str = "rounds";
+/// The same of scenes.
+const REPLACED: [&str; 8] =
+    ["settings", "save_settings", "samples", "shadow_rays", "photons", "caustic_photons", "neighbours", "caustic_neighbours"];
 
 #[derive(Debug, Clone, PartialEq)]
 struct Argument {
@@ -28,10 +31,10 @@ pub(super) struct Typed {
     arguments: Vec<Argument>,
 }
 
-fn is_kept(argument: &Arg) -> bool {
+fn is_kept(argument: &Arg, is_of_box: bool) -> bool {
     let id = argument.get_id().as_str();
     let is_under = argument.get_help_heading().is_some_and(|heading| WITHOUT_EFFECT.contains(&heading));
-    (!is_under || WITH_EFFECT.contains(&id)) && !REPLACED.contains(&id)
+    (!is_under || WITH_EFFECT.contains(&id)) && id != ROUNDS && (is_of_box || !REPLACED.contains(&id))
 }
 
 impl Typed {
@@ -52,10 +55,11 @@ impl Typed {
                 None => values.into_iter().map(|value| Argument { option: None, value: Some(value) }).collect(),
             }
         };
-        let known = command.get_arguments().filter(|argument| is_kept(argument)).filter(was_typed);
+        let known = command.get_arguments().filter(|argument| is_kept(argument, name.is_empty())).filter(was_typed);
         Typed { command: name.to_owned(), arguments: known.flat_map(of_argument).collect() }
     }
 
+    /// Whether it has this option, of those that decide pixels.
     pub(super) fn has(&self, option: &str) -> bool {
         self.arguments.iter().any(|argument| argument.option.as_deref() == Some(option))
     }

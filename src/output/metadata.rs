@@ -7,7 +7,10 @@ use exr::meta::MetaData;
 use exr::meta::attribute::{AttributeValue, Text};
 use exr::meta::header::LayerAttributes;
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde_json::{Map, Value};
+
+use crate::plan::work_division::Division;
+use crate::settings::tile_samples::TileSamples;
 
 /// Keyword of a PNG's text, and name of an EXR's attribute, that hold all of it as JSON.
 pub const KEY: &str = "photonmill";
@@ -36,7 +39,8 @@ pub struct Metadata {
     pub units: String,
     /// The command line that makes the same picture.
     pub command: String,
-    pub settings: Value,
+    /// Those that decide a bit.
+    pub settings: Map<String, Value>,
     pub repeat: Repeat,
 }
 
@@ -44,9 +48,9 @@ pub struct Metadata {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Repeat {
-    /// `command` is the subcommand, empty for the paper's box; `arguments` are those that decide the picture, as they were typed; and
-    /// `chosen` is what a pilot may choose.
-    With { command: String, arguments: Vec<String>, chosen: Value },
+    /// `command` is the subcommand; `arguments` are those that decide the picture, as they were typed; `division` is what each round did,
+    /// as a pilot may have chosen it, and `tiles` have more samples.
+    With { command: String, arguments: Vec<String>, division: Division, tiles: Option<TileSamples> },
     /// It cannot be repeated, for this reason.
     Not(String),
 }
