@@ -56,7 +56,10 @@ impl Typed {
             }
         };
         let known = command.get_arguments().filter(|argument| is_kept(argument, name.is_empty())).filter(was_typed);
-        Typed { command: name.to_owned(), arguments: known.flat_map(of_argument).collect() }
+        let mut arguments: Vec<Argument> = known.flat_map(of_argument).collect();
+        // The scene first.
+        arguments.sort_by_key(|argument| argument.option.is_some());
+        Typed { command: name.to_owned(), arguments }
     }
 
     /// Whether it has this option, of those that decide pixels.
