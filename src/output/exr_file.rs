@@ -5,6 +5,10 @@ use std::io::Cursor;
 use exr::prelude::*;
 
 use super::metadata::Metadata;
+use crate::scene::linear_picture::check_layers;
+
+/// Of a file that is read: as many as a picture may have.
+const MOST_PIXELS: u64 = 1 << 28;
 
 /// Values of all pixels, row by row from the top; `name` is R, or that of a layer before it: `albedo.R`.
 pub struct Channel {
@@ -37,6 +41,7 @@ pub fn encode((width, height): (u32, u32), channels: Vec<Channel>, metadata: Opt
 
 /// Size and channels of a file of 32-bit floats in one part.
 pub fn decode(content: &[u8]) -> std::result::Result<((u32, u32), Vec<Channel>), String> {
+    check_layers(content, MOST_PIXELS)?;
     let image = read()
         .no_deep_data()
         .largest_resolution_level()
