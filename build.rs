@@ -158,6 +158,7 @@ const PACKED: [(&str, &[&str]); 5] = [
             "sums_of_block",
             "surface_sums_of_block",
             "surface_sums",
+            "part_sums",
             "surface_squares",
         ],
     ),

@@ -45,6 +45,10 @@ pub enum Error {
     #[error("--fail-above {allowed}: the RMSE of {} is {found}", echo(path.display()))]
     PictureAbove { allowed: String, path: PathBuf, found: String },
 
+    /// A picture that was run again has other values.
+    #[error("{}: {differing} of {of} values differ from those of the repeated run: {why}", echo(path.display()))]
+    NotRepeated { path: PathBuf, differing: usize, of: usize, why: String },
+
     /// There is no Vulkan loader, or no device behind it.
     #[error("no Vulkan device: {reason}; {INSTALL_VULKAN}")]
     NoVulkan { reason: String },

@@ -170,6 +170,7 @@ fn standard_errors_survive_a_mean_far_above_them() {
         latest: LatestBlocks::default(),
         one_hits: vec![0; 3],
         part_totals: Vec::new(),
+        parts: None,
         anomalies: Default::default(),
         class_counts: Vec::new(),
         stored: [0; 3],

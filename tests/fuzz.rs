@@ -782,6 +782,7 @@ fn checkpoint_of_picture() -> SavedRun {
         differences: Differences(vec![0; difference_count(4)]),
         one_hits: vec![0; 4 * photonmill::constants::HIT_KINDS as usize],
         part_totals: vec![3; 4],
+        parts: None,
         anomalies: [0; photonmill::plan::buffers::ANOMALY_WORDS],
         class_counts: vec![0; 2 * photonmill::constants::RADIUS_CLASSES as usize],
         stored: [1; 3],

@@ -46,7 +46,7 @@ fn commands(text: &str) -> Vec<String> {
 }
 
 /// Commands that start so are not run, and why.
-const NOT_RUN: [(&str, &str); 12] = [
+const NOT_RUN: [(&str, &str); 13] = [
     ("tools/setup && tools/test", "runs this test"),
     ("tools/test", "runs this test"),
     ("tools/bench/run ", "writes into the repository"),
@@ -57,6 +57,7 @@ const NOT_RUN: [(&str, &str); 12] = [
     ("tools/sanitize", "needs a nightly toolchain"),
     ("tools/sample_models ", "needs a collection of files"),
     ("tools/blender/test_addon.py", "needs Blender's Python module"),
+    ("tools/open_pictures", "installs Blender's Python module and Mitsuba"),
     ("node tools/viewers/try.mjs", "needs Chromium and three.js"),
     ("photonmill selfcheck", "takes half a minute at any size; `every_closed_form_holds` runs the same"),
 ];
@@ -102,7 +103,9 @@ fn short(arguments: &[&str]) -> Vec<String> {
         Some(&"probe") => &[],
         Some(&"map") if matches!(arguments[1], "info" | "export") => return arguments.iter().map(ToString::to_string).collect(),
         Some(&"map") => &[],
-        Some(&"plan" | &"info" | &"compare" | &"devices" | &"merge") => return arguments.iter().map(ToString::to_string).collect(),
+        Some(&"plan" | &"info" | &"compare" | &"devices" | &"merge" | &"repeat") => {
+            return arguments.iter().map(ToString::to_string).collect();
+        }
         _ => &[("--mesh", "8")],
     };
     shrunk(arguments, &[&of_run, &there[..], more].concat())
@@ -238,7 +241,8 @@ fn options(text: &str) -> BTreeSet<String> {
 
 #[test]
 fn options_of_readme_and_guide_exist() {
-    let names = ["", "render", "bake", "probe", "merge", "plan", "info", "compare", "devices", "selfcheck", "study", "bench", "paper"];
+    let names =
+        ["", "render", "repeat", "bake", "probe", "merge", "plan", "info", "compare", "devices", "selfcheck", "study", "bench", "paper"];
     let help = |name: &str| {
         let output = Place::new().run(&format!("{name} --help"));
         assert!(output.status.success(), "{name}");

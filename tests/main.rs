@@ -50,6 +50,7 @@ mod overlap;
 mod packing;
 mod paranoid;
 mod photons;
+mod picture_files;
 mod pilot;
 mod plates;
 mod primitives;

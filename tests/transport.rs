@@ -144,6 +144,8 @@ fn the_four_parts_add_up_to_the_whole_to_the_bit() {
         SceneSettings { illumination: Illumination::Photons, ..small() },
     ] {
         let whole = picture(&gpu, &scene, &settings);
+        let apart = picture(&gpu, &scene, &SceneSettings { keeps_parts: true, ..settings.clone() });
+        assert!(apart.film == whole.film && whole.film.parts.is_none(), "parts change the whole");
         let parts: Vec<RunResult> = Part::EACH.map(|part| picture(&gpu, &scene, &SceneSettings { part, ..settings.clone() })).into();
         for (sum, place) in whole.film.sums.iter().zip(0..) {
             let of_parts: u64 = parts.iter().map(|part| part.film.sums[place]).sum();
@@ -153,6 +155,9 @@ fn the_four_parts_add_up_to_the_whole_to_the_bit() {
             assert!(part.film.sums.iter().any(|sum| *sum > 0), "part {number} is dark");
             let own: u64 = part.film.part_totals.iter().sum();
             assert_eq!(own, whole.film.part_totals[number], "total of part {number}");
+            let pixels = 0..whole.film.pixels();
+            let kept: Vec<u64> = pixels.flat_map(|pixel| apart.film.sum_of_part(number, pixel).unwrap()).collect();
+            assert!(kept == part.film.sums, "part {number} of {:?} is not what it is alone", settings.illumination);
         }
     }
 }

@@ -8,6 +8,12 @@ uint kept_step(uint place_count)
     return (place_count + KEPT_PLACES - 1) / KEPT_PLACES;
 }
 
+uint kept_count(uint place_count)
+{
+    uint step = kept_step(place_count);
+    return (place_count + step - 1) / step;
+}
+
 // The number of a place among those that are kept, which lie at random; NONE: it is not kept.
 uint kept_number(uint place, uint place_count)
 {

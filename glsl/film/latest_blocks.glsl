@@ -5,8 +5,7 @@ layout(set = 1, binding = 4, scalar) writeonly buffer LatestBlocks { float lates
 // Where a block's values of kept places begin.
 uint first_of_block(uint block, uint place_count)
 {
-    uint step = kept_step(place_count);
-    return block % KEPT_BLOCKS * ((place_count + step - 1) / step);
+    return block % KEPT_BLOCKS * kept_count(place_count);
 }
 
 float float_of(uvec2 sum)

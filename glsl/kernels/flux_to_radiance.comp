@@ -190,9 +190,7 @@ void main()
             uvec2 units = to_film_units(radiance[channel], push.film_scale, push.film_limit, chance);
             sums[channel] = add64(sums[channel], units);
             totals[part] = add64(totals[part], units);
-            if (kept != NONE) {
-                add_to_kept(kept, part, channel, units);
-            }
+            add_to_parts(kept, pixel, push.pixel_count, part, channel, units);
         }
         is_lit = true;
         change -= radiance;

@@ -1,6 +1,7 @@
 // Ends a round: what the paths of each pixel found and what their points were lit by joins the sums of its block. At the end of a
 // block the film takes these sums and their squares, and they are empty for the next one. All of that twice for a
-// picture: of all light, and of what surfaces scatter, which errors refer to. Of some pixels the parts of a block's light are kept.
+// picture: of all light, and of what surfaces scatter, which errors refer to. Of some pixels the parts of a block's light are kept;
+// where a picture keeps its parts, those of all pixels join the sums of theirs.
 // Dispatched by src/engine/scene/estimate.rs once a round. One thread = one pixel or receiver.
 #include "records.glsl"
 
@@ -15,6 +16,8 @@ layout(set = 1, binding = 6, scalar) buffer SumsOfBlock { uvec2 sums_of_block[];
 layout(set = 1, binding = 7, scalar) buffer SurfaceSumsOfBlock { uvec2 surface_sums_of_block[]; };
 layout(set = 1, binding = 8, scalar) buffer SurfaceSums { uvec2 surface_sums[]; };
 layout(set = 1, binding = 9, scalar) buffer SurfaceSquares { uvec4 surface_squares[]; };
+// Parts of each pixel's light but direct light, as film/kept_parts.glsl has them in a block.
+layout(set = 1, binding = 10, scalar) buffer PartSums { uvec2 part_sums[]; };
 
 #include "dispatch/dispatch.glsl"
 #include "world/scene/effects.glsl"
@@ -63,6 +66,15 @@ void main()
             if (HAS_SEEN_LIGHT) {
                 surface_sums[place] = add64(surface_sums[place], surface);
                 surface_squares[place] = add128(surface_squares[place], square64(surface));
+            }
+        }
+        if (HAS_PARTS && ends_block) {
+            for (uint part = 1; part < PART_COUNT; part++) {
+                uint from = place_of_pixel_part(pixel, push.pixel_count, part, channel);
+                uint to = ((PART_COUNT - 1) * pixel + part - 1) * 3 + channel;
+                part_sums[to] = add64(part_sums[to], uvec2(part_totals[from], part_totals[from + 1]));
+                part_totals[from] = 0;
+                part_totals[from + 1] = 0;
             }
         }
         if (kept != NONE) {

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::complain;
 use crate::error::{Error, Result};
 use crate::output::destination::{Destination, write_all};
+use crate::output::metadata::Metadata;
 use crate::plan::work_division::Division;
 use crate::settings::scene::SceneSettings;
 use crate::settings::tile_samples::TileSamples;
@@ -98,8 +99,28 @@ impl Chosen {
         if chosen.format != FORMAT {
             return Err(other(&format!("its format is not '{FORMAT}'")));
         }
-        let base = SceneSettings { rounds: chosen.rounds, ..chosen.settings.set(&SceneSettings::default()) };
-        base.validate().map_err(|error| other(&error))?;
+        chosen.validate().map_err(|error| other(&error))?;
+        Ok(chosen)
+    }
+
+    fn validate(&self) -> Result<()> {
+        SceneSettings { rounds: self.rounds, ..self.settings.set(&SceneSettings::default()) }.validate()
+    }
+
+    /// What a picture's file says of its rounds; fails where that is nothing that a run can do.
+    pub(super) fn of_picture(made: &Metadata, settings: Division, tiles: Option<TileSamples>) -> Result<Chosen> {
+        let chosen = Chosen {
+            format: FORMAT.into(),
+            version: made.photonmill.clone(),
+            scene: made.scene.clone(),
+            scene_hash: made.scene_hash.clone().unwrap_or_default(),
+            size: [0; 2],
+            device: String::new(),
+            settings,
+            tiles,
+            rounds: made.rounds,
+        };
+        chosen.validate()?;
         Ok(chosen)
     }
 

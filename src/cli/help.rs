@@ -41,6 +41,13 @@ Examples:
   photonmill render scene.glb -o picture.png --camera Camera.001 --time 1m --error-image error.exr
       Another camera, one minute, and the standard error of each pixel";
 
+pub(super) const REPEAT: &str = "\
+Examples:
+  photonmill repeat picture.exr
+      Renders it again; exit code 1 if a single bit of its values differs
+  photonmill repeat picture.png --scene moved/scene.glb -o again.png
+      The same where the scene has moved, and writes what comes out";
+
 pub(super) const BAKE: &str = "\
 Examples:
   photonmill bake scene.glb -o baked

@@ -4,8 +4,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::how_made::{of_merge, units};
 use super::keep::read;
 use super::scene::ToneArg;
+use super::typed::Typed;
 use super::values::parse_stops;
 use super::{JsonArg, complain, optional_file, say_beside};
 use crate::engine::blocks::Share;
@@ -15,7 +17,7 @@ use crate::error::{Error, Result, require};
 use crate::output::colour::{Format, Tone};
 use crate::output::destination::{Destination, check_distinct, check_not_read, write_all, write_synced};
 use crate::output::merge_report;
-use crate::output::show::Show;
+use crate::output::show::{Layer, Show};
 use crate::plan::sensor::Sensor;
 
 #[derive(Args)]
@@ -45,7 +47,7 @@ pub(super) struct MergeArgs {
     partial: bool,
 }
 
-pub(super) fn run(args: &MergeArgs) -> Result<()> {
+pub(super) fn run(args: &MergeArgs, typed: &Typed) -> Result<()> {
     let format = args.output.as_ref().map(|path| Format::of("-o", path)).transpose()?;
     if let Some(path) = &args.error_image {
         require(Format::of("--error-image", path)? == Format::Exr, "--error-image", path.display(), "must end in .exr")?;
@@ -74,8 +76,17 @@ pub(super) fn run(args: &MergeArgs) -> Result<()> {
     let film = film_of(&run, args)?;
     let mut files = Vec::new();
     if let (Some(film), Some(Sensor::Picture { width, height })) = (film, run.sensor) {
-        let show = Show { size: (width, height), exposure: args.exposure, tone: args.tone.map_or(Tone::default(), Tone::from) };
-        files.extend(picture.zip(format).map(|(picture, format)| (picture, show.picture(film, format).0)));
+        let show = Show {
+            size: (width, height),
+            exposure: args.exposure,
+            tone: args.tone.map_or(Tone::default(), Tone::from),
+            layers: Layer::ALL.into(),
+        };
+        files.extend(picture.zip(format).map(|(picture, format)| {
+            let metadata = |stops| of_merge(typed, &run, film, units(format, stops, show.tone), format);
+            let content = if format == Format::Exr { show.exr(film, &[], Some(&metadata(0.0))) } else { show.png(film, metadata).0 };
+            (picture, content)
+        }));
         files.extend(errors.map(|errors| (errors, show.errors(film))));
         files.extend(json.map(|json| (json, merge_report::json(&run, film, &missing))));
     }

@@ -7,6 +7,7 @@ mod compare;
 mod devices;
 mod gallery;
 mod help;
+mod how_made;
 mod info;
 mod interrupt;
 mod job;
@@ -20,11 +21,13 @@ mod plan;
 mod probe;
 mod progress;
 mod render;
+mod repeat;
 mod run;
 mod scene;
 mod selfcheck;
 mod stop;
 mod study;
+mod typed;
 mod usage;
 mod values;
 
@@ -41,6 +44,7 @@ use crate::gpu::{Gpu, Options};
 use crate::output::destination::Destination;
 use interrupt::{cancel_on_signal, exit_code, interruptible};
 use progress::print_line;
+use typed::Typed;
 use values::parse_bytes;
 
 /// Photon mapping on any Vulkan GPU.
@@ -68,6 +72,9 @@ enum Command {
     /// Compute the irradiance at given points of a scene
     #[command(after_help = help::PROBE)]
     Probe(probe::ProbeArgs),
+    /// Run a picture again from what its file says of how it was made, and check that the same bits come out
+    #[command(after_help = help::REPEAT)]
+    Repeat(repeat::RepeatArgs),
     /// Add the parts of a run that --shard or --checkpoint left, to the bits of one run
     #[command(after_help = help::MERGE)]
     Merge(merge::MergeArgs),
@@ -218,13 +225,14 @@ pub fn main() -> u8 {
     };
     let cancelled = cancel_on_signal();
     let result = match cli.command {
-        None => interruptible(|| run::run(&cli.run, &cancelled)),
+        None => interruptible(|| run::run(&cli.run, &Typed::of(&matches, &command), &cancelled)),
         Some(Command::Devices(args)) => devices::run(&args).map(|()| End::Finished),
-        Some(Command::Render(args)) => render::run(&args, &cancelled),
+        Some(Command::Render(args)) => render::run(&args, &Typed::of(&matches, &command), &cancelled),
+        Some(Command::Repeat(args)) => repeat::run(args, &cancelled),
         Some(Command::Bake(args)) => bake::run(&args, &cancelled),
         Some(Command::Probe(args)) => probe::run(&args, &cancelled),
         Some(Command::Map(args)) => map::run(&args, &cancelled),
-        Some(Command::Merge(args)) => merge::run(&args).map(|()| End::Finished),
+        Some(Command::Merge(args)) => merge::run(&args, &Typed::of(&matches, &command)).map(|()| End::Finished),
         Some(Command::Plan(args)) => plan::run(&args).map(|()| End::Finished),
         Some(Command::Info(args)) => info::run(&args).map(|()| End::Finished),
         Some(Command::Compare(args)) => compare::run(&args).map(|()| End::Finished),

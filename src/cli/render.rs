@@ -1,34 +1,39 @@
 //! `photonmill render`: what a camera sees of a scene.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use clap::Args;
 
 use super::chosen::Chosen;
+use super::how_made::{Made, blocks_with_gaps, devices, units};
 use super::job::{Job, MessageArgs};
 use super::keep::Snapshot;
 use super::options::{DevicesOfRunArgs, ReportArgs};
-use super::progress::ProgressReporter;
+use super::progress::{ProgressArgs, ProgressReporter};
 use super::scene::{FilterArg, MOST_ROUNDS, PictureArgs, Subject, ToneArg};
+use super::typed::Typed;
 use super::values::{parse_integer, parse_photon_name, parse_seconds, parse_stops};
-use super::{End, optional_file, say, say_beside};
+use super::{End, complain, optional_file, say, say_beside};
 use crate::engine;
 use crate::engine::replay::PhotonName;
 use crate::engine::saved::{SavedFilm, SavedRun};
 use crate::engine::scene::map_file::MapFile;
-use crate::engine::scene::{RunResult, View, replay};
-use crate::error::{Result, require};
+use crate::engine::scene::{RunResult, View, replay, scene_hash};
+use crate::error::{Error, Result, require};
+use crate::gpu::Gpu;
 use crate::output::colour::{Format, Tone};
 use crate::output::destination::{Destination, check_distinct, write_all};
+use crate::output::metadata::Metadata;
 use crate::output::scene_report;
-use crate::output::show::Show;
+use crate::output::show::{Layer, Show, Surface};
 use crate::plan::scene::ScenePlan;
 use crate::plan::work_division::Free;
 use crate::scene::{Camera, Scene};
+use crate::settings::Math;
 use crate::settings::scene::{Filter, Part, SceneSettings};
-use crate::verify::judge::{Judge, Verdict};
+use crate::verify::judge::{FirstSurface, Judge, Verdict, first_surfaces};
 
 #[derive(Args)]
 pub(super) struct RenderArgs {
@@ -50,6 +55,10 @@ pub(super) struct RenderArgs {
     /// Tone curve of a PNG [default: neutral]
     #[arg(long, value_enum, value_name = "CURVE", help_heading = "Output")]
     tone: Option<ToneArg>,
+    /// Layers of an EXR beside the light: all, none, or some of direct, specular, caustic, indirect, standard_error, albedo, normal and
+    /// depth [default: all]
+    #[arg(long, value_name = "all|none|LAYER,...", value_parser = parse_layers, allow_hyphen_values = true, help_heading = "Output")]
+    layers: Option<Layers>,
     #[command(flatten)]
     picture: PictureArgs,
     /// Camera paths per pixel and round, a power of two. Every path queries the caustic map; where all of them
@@ -69,12 +78,29 @@ pub(super) struct RenderArgs {
     /// Trace a single photon of this run, print its path, and exit; rounds and photons count from 0, and `:caustic` at the
     /// end takes a photon of the caustic map
     #[arg(long, value_name = "ROUND:PHOTON", value_parser = parse_photon_name, help_heading = "Checks",
-        conflicts_with_all = ["output", "error_image", "exposure", "tone", "judge", "explain", "json", "trace", "save_settings", "time_dispatches", "map", "devices"])]
+        conflicts_with_all = ["output", "error_image", "exposure", "tone", "layers", "judge", "explain", "json", "trace", "save_settings", "time_dispatches", "map", "devices"])]
     replay: Option<PhotonName>,
     #[command(flatten)]
     messages: MessageArgs,
     #[command(flatten)]
     device: DevicesOfRunArgs,
+}
+
+/// Of an EXR.
+#[derive(Debug, Clone)]
+struct Layers(Vec<Layer>);
+
+fn parse_layers(text: &str) -> std::result::Result<Layers, String> {
+    let names: Vec<&str> = match text {
+        "all" => Layer::ALL.map(Layer::name).into(),
+        "none" => Vec::new(),
+        _ => text.split(',').map(str::trim).collect(),
+    };
+    let known = Layer::ALL.map(Layer::name);
+    if names.iter().any(|name| !known.contains(name)) {
+        return Err(format!("must be all, none, or some of {}, with commas between them", known.join(", ")));
+    }
+    Ok(Layers(Layer::ALL.into_iter().filter(|layer| names.contains(&layer.name())).collect()))
 }
 
 impl RenderArgs {
@@ -84,6 +110,44 @@ impl RenderArgs {
         let tiles = usual.tiles.clone().filter(|_| self.samples.is_none());
         let filter = self.filter.map_or(usual.filter, Filter::from);
         SceneSettings { filter, samples: self.samples.unwrap_or(usual.samples), tiles, ..usual }
+    }
+
+    /// Takes from the user what decides no pixel, and where the scene is.
+    pub(super) fn set(&mut self, scene: Option<String>, progress: ProgressArgs, device: DevicesOfRunArgs) {
+        scene.into_iter().for_each(|scene| self.picture.set_scene(scene));
+        self.messages.progress = progress;
+        self.device = device;
+    }
+
+    fn job<'a>(&self, subject: &'a Subject, settings: &'a SceneSettings, map: Option<&'a MapFile>) -> Job<'a> {
+        Job {
+            scene: &subject.scene,
+            geometry: &subject.geometry,
+            settings,
+            sensor: subject.sensor(),
+            camera: Some(&subject.camera),
+            phases: &[],
+            map,
+            free: self.free(),
+            chosen: None,
+            save_settings: None,
+            explain: self.messages.explain,
+            point: "pixel",
+        }
+    }
+
+    fn show(&self, subject: &Subject) -> Show {
+        let size = (subject.width, subject.height);
+        Show { size, exposure: self.exposure, tone: self.tone.map_or(Tone::default(), Tone::from), layers: self.layers() }
+    }
+
+    fn layers(&self) -> Vec<Layer> {
+        self.layers.as_ref().map_or(Layer::ALL.into(), |Layers(layers)| layers.clone())
+    }
+
+    /// Whether the picture has layers of the parts of its light.
+    fn shows_parts(&self, format: Option<Format>) -> bool {
+        format == Some(Format::Exr) && self.layers().into_iter().any(Layer::is_part)
     }
 
     /// What a pilot may choose: what is not set, of a run that ends by its error or its time.
@@ -106,7 +170,7 @@ fn longest_seconds(kind: &str) -> f64 {
 /// Between two pictures of such a run.
 const SNAPSHOT_SECONDS: f64 = 5.0;
 
-pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
+pub(super) fn run(args: &RenderArgs, typed: &Typed, cancelled: &AtomicBool) -> Result<End> {
     let map = args.picture.transport.map()?;
     let chosen = args.picture.transport.light.chosen.open()?;
     let mut settings = args.settings(map.as_ref(), chosen.as_ref());
@@ -132,6 +196,9 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     if let Some(exposure) = args.exposure {
         require(format == Some(Format::Png), "--exposure", exposure, "is for PNG only: an EXR holds linear radiance")?;
     }
+    if let (Some(_), Some(output)) = (&args.layers, output) {
+        require(format == Some(Format::Exr), "--layers", output.display(), "is for EXR only: a PNG holds what the eye sees")?;
+    }
     if args.tone.is_some() {
         let name = output.map_or_else(String::new, |output| output.display().to_string());
         require(format == Some(Format::Png), "--tone", name, "is for PNG only: an EXR holds linear radiance")?;
@@ -144,6 +211,8 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     let reports = args.report.open()?;
     let stop = &args.picture.transport.stop;
     let mut keeper = args.picture.transport.keep.open(stop)?;
+    // A run that goes on with one that has no parts has none.
+    settings.keeps_parts = args.shows_parts(format) && keeper.resumed().is_none_or(SavedRun::has_parts);
     let save_settings = optional_file("--save-settings", args.save_settings.as_ref())?;
     let files = [&picture, &errors, &save_settings].into_iter().flatten().cloned().collect();
     let all: Vec<Destination> = [files, reports.destinations(), keeper.destinations()].concat();
@@ -152,29 +221,15 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
 
     let reporter = ProgressReporter::new(&args.messages.progress);
     let subject = args.picture.open(&settings, &reporter)?;
-    let Subject { scene, camera, width, height, geometry } = &subject;
+    let Subject { scene, camera, geometry, .. } = &subject;
     let mut gpus = args.device.open(&reporter)?;
     if has_no_end {
         settings.stop.seconds = Some(longest_seconds(gpus[0].facts().kind));
     }
-    let job = Job {
-        scene,
-        geometry,
-        settings: &settings,
-        sensor: subject.sensor(),
-        camera: Some(camera),
-        phases: &[],
-        map: map.as_ref(),
-        free: args.free(),
-        chosen: chosen.as_ref(),
-        save_settings: save_settings.as_ref(),
-        explain: args.messages.explain,
-        point: "pixel",
-    };
-    let size = (*width, *height);
-    let show = Show { size, exposure: args.exposure, tone: args.tone.map_or(Tone::default(), Tone::from) };
+    let job = Job { chosen: chosen.as_ref(), save_settings: save_settings.as_ref(), ..args.job(&subject, &settings, map.as_ref()) };
+    let show = args.show(&subject);
     let mut snapshot = |run: &SavedRun| match (&run.film, &picture, format) {
-        (SavedFilm::Scene(film), Some(picture), Some(format)) => write_all([(picture.clone(), show.picture(film, format).0)]),
+        (SavedFilm::Scene(film), Some(picture), Some(format)) => write_all([(picture.clone(), show.so_far(film, format))]),
         _ => Ok(()),
     };
     if let Some(seconds) = args.snapshot.or(has_no_end.then_some(SNAPSHOT_SECONDS)) {
@@ -187,15 +242,27 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
         reporter.finish();
         return Ok(End::Finished);
     }
+    let blocks_with_gaps = blocks_with_gaps(keeper.resumed());
     let lit = job.run(&mut gpus, stop, &mut keeper, &reporter, cancelled)?;
 
     let text = scene_report::text(&scene.name, &lit, job.point, args.messages.explain);
     let mut files = Vec::new();
     let mut shown = String::new();
     if let (Some(picture), Some(format), Some(output)) = (&picture, format, output) {
-        let (bytes, stops) = show.picture(&lit.film, format);
+        let made = Made {
+            typed,
+            lit: &lit,
+            scene: &scene.name,
+            scene_hash: scene_hash(geometry),
+            is_shard: args.picture.transport.keep.shard.is_some(),
+            blocks_with_gaps,
+        };
+        if args.shows_parts(Some(format)) && settings.part == Part::All && lit.film.parts.is_none() {
+            let layers = "has no layers of the parts of its light, which this run does not keep apart";
+            complain(&format!("warning: -o {}: {layers}: {}", output.display(), no_parts(&lit, &settings)));
+        }
+        let (bytes, exposure) = file(&made, &show, format, scene, camera);
         files.push((picture.clone(), bytes));
-        let exposure = if format == Format::Png { format!(" at {stops:+.2} stops") } else { String::new() };
         shown = format!("\nwrote {}{exposure}", output.display());
     }
     files.extend(errors.map(|errors| (errors, show.errors(&lit.film))));
@@ -211,12 +278,94 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
         // The picture is there, so Ctrl-C may end the program here.
         let reporter = ProgressReporter::new(&args.messages.progress);
         reporter.step(&format!("path tracing {samples} samples per pixel on the CPU for --judge"));
-        let verdict = verdict(&lit, scene, camera, size, samples);
+        let verdict = verdict(&lit, scene, camera, show.size, samples);
         reporter.finish();
         say_beside(&all, &format!("judge: {verdict}"))?;
     }
     kept?;
     Ok(End::of(&lit))
+}
+
+/// Why a film of all parts has them not apart.
+fn no_parts(lit: &RunResult, asked: &SceneSettings) -> &'static str {
+    match (asked.keeps_parts, lit.plan.keeps_parts()) {
+        (false, _) => "the checkpoint of --resume is of a run without -o FILE.exr",
+        (true, false) => "the picture is too large for the device with them",
+        (true, true) => "it was cut short within its first block of rounds",
+    }
+}
+
+/// The picture's file, and its exposure in words.
+fn file(made: &Made, show: &Show, format: Format, scene: &Scene, camera: &Camera) -> (Vec<u8>, String) {
+    let metadata = |stops: f32| made.metadata(units(format, stops, show.tone), format);
+    let film = &made.lit.film;
+    if format == Format::Png {
+        let (content, stops) = show.png(film, metadata);
+        return (content, format!(" at {stops:+.2} stops"));
+    }
+    let surface = |seen: FirstSurface| Surface { albedo: seen.albedo.as_vec3(), normal: seen.normal.as_vec3(), depth: seen.depth as f32 };
+    let surfaces: Vec<Surface> = if show.layers.iter().any(|layer| layer.is_of_surface()) {
+        let scene = scene.without(&made.lit.plan.settings.without);
+        first_surfaces(&scene, camera, show.size).into_iter().map(surface).collect()
+    } else {
+        Vec::new()
+    };
+    (show.exr(film, &surfaces, Some(&metadata(0.0))), String::new())
+}
+
+/// A picture that is made again.
+pub(super) struct Again<'a> {
+    pub(super) path: &'a Path,
+    pub(super) format: Format,
+    pub(super) made: &'a Metadata,
+    pub(super) chosen: &'a Chosen,
+    pub(super) typed: &'a Typed,
+    /// Whether the user has said where the scene is now.
+    pub(super) has_moved: bool,
+}
+
+/// The file that comes out, and the devices that made it.
+pub(super) struct Repeated {
+    pub(super) content: Vec<u8>,
+    pub(super) devices: Vec<String>,
+}
+
+pub(super) fn again(args: &RenderArgs, again: &Again, cancelled: &AtomicBool) -> Result<Repeated> {
+    let &Again { path, format, made, chosen, typed, has_moved } = again;
+    let refuse = |reason: String| Error::Picture { path: path.to_owned(), reason };
+    if args.picture.lacks_scene() && !has_moved {
+        let scene = args.picture.scene_path().display();
+        let remedy = "run it from the same folder, or say with --scene where the scene is now";
+        return Err(refuse(format!("is of the scene {scene}, which is not there; {remedy}")));
+    }
+    let map = args.picture.transport.map()?;
+    let mut settings = args.settings(map.as_ref(), Some(chosen));
+    settings.validate()?;
+    settings.keeps_parts = args.shows_parts(Some(format));
+    let reporter = ProgressReporter::new(&args.messages.progress);
+    let subject = args.picture.open(&settings, &reporter)?;
+    let hash = scene_hash(&subject.geometry);
+    if let Some(before) = made.scene_hash.as_ref().filter(|before| **before != hash) {
+        let scene = args.picture.scene_path().display();
+        let remedy = "restore the scene as it was, or name another file with --scene";
+        return Err(refuse(format!("is of another scene than {scene} is now (SHA-256 {before}, not {hash}); {remedy}")));
+    }
+    let mut gpus = args.device.open(&reporter)?;
+    let here = devices(gpus.iter().map(Gpu::facts));
+    if settings.math != Math::Strict && here != made.devices {
+        let (before, now) = (made.devices.join("; "), here.join("; "));
+        complain(&format!("warning: made on {before}, and repeated on {now}, which may round otherwise"));
+    }
+    let stop = &args.picture.transport.stop;
+    let mut keeper = args.picture.transport.keep.open(stop)?;
+    let job = args.job(&subject, &settings, map.as_ref());
+    let lit = job.run(&mut gpus, stop, &mut keeper, &reporter, cancelled)?.finished()?;
+    reporter.finish();
+    let show = args.show(&subject);
+    let scene = &subject.scene.name;
+    let made = Made { typed, lit: &lit, scene, scene_hash: hash, is_shard: false, blocks_with_gaps: 0 };
+    let (content, _) = file(&made, &show, format, &subject.scene, &subject.camera);
+    Ok(Repeated { content, devices: made.devices() })
 }
 
 /// The path of one photon of the run that these options ask for.

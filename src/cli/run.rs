@@ -7,10 +7,12 @@ use std::time::Instant;
 
 use clap::Args;
 
+use super::how_made::of_room;
 use super::keep::{KeepArgs, Keeper};
 use super::options::{CommonArgs, DevicesOfRunArgs, ReportArgs, Reports};
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::stop::{StopArgs, bias_before, goals, rounds_after, up_to};
+use super::typed::Typed;
 use super::values::{
     BuilderArg, SwitchArg, builder_parser, parse_integer, parse_number, parse_numbers, parse_photon_name, parse_shininess, parse_threads,
     parse_within, value_enum,
@@ -233,7 +235,7 @@ impl RunArgs {
     }
 }
 
-pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
+pub(super) fn run(args: &RunArgs, typed: &Typed, cancelled: &AtomicBool) -> Result<End> {
     let settings = args.settings();
     settings.validate()?;
     let stores_none = settings.reflectance == 0.0 && args.irradiance.is_some();
@@ -290,7 +292,7 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
         let (emitted, total) = (outcome.film.emitted, settings.total_photons());
         complain(&format!("ended after {emitted} of {total} photons; the results are of these"));
     }
-    outputs.write(outcome, &scene)?;
+    outputs.write(outcome, &scene, typed)?;
     keeper.finish()?;
     Ok(end)
 }
@@ -392,13 +394,13 @@ impl Outputs {
         Ok(outputs)
     }
 
-    fn write(self, mut outcome: RunResult, scene: &RoomScene) -> Result<()> {
+    fn write(self, mut outcome: RunResult, scene: &RoomScene, typed: &Typed) -> Result<()> {
         let began = Instant::now();
         let walls = estimate_walls(&outcome.film, scene, &outcome.plan);
         let error = room_report::error(&outcome, scene);
         let (destination, format) = self.picture;
         let picture = destination.path().display().to_string();
-        let mut files = vec![(destination, overview(scene, &walls).encode(format))];
+        let mut files = vec![(destination, overview(scene, &walls).encode(format, Some(&of_room(typed, &outcome, &error, format))))];
         for (folder, quantity) in [(&self.irradiance, Quantity::Irradiance), (&self.radiosity, Quantity::Radiosity)] {
             files.extend(folder.iter().flat_map(|folder| lightmap::files(folder, quantity, scene, &walls)));
         }

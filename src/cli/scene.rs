@@ -23,7 +23,7 @@ use crate::scene::daylight;
 use crate::scene::geometry::Geometry;
 use crate::scene::light::{Light, LightKind};
 use crate::scene::sky::Sky;
-use crate::scene::{Camera, Lens, Reading, Scene};
+use crate::scene::{Camera, Lens, Reading, Scene, built_in};
 use crate::settings::scene::{Effect, Filter, Illumination, Kernel, MAX_ROUNDS, Part, SceneSettings, Stop};
 use crate::settings::{Builder, Math};
 use crate::text::counted;
@@ -447,6 +447,20 @@ impl PictureArgs {
     /// Files that are read.
     pub(super) fn inputs(&self) -> impl Iterator<Item = &Path> {
         self.transport.inputs().chain([self.scene.path()])
+    }
+
+    /// Takes the scene from somewhere else.
+    pub(super) fn set_scene(&mut self, scene: String) {
+        self.scene.scene = scene;
+    }
+
+    pub(super) fn scene_path(&self) -> &Path {
+        self.scene.path()
+    }
+
+    /// Whether there is nothing of this name, neither a file nor a built-in scene.
+    pub(super) fn lacks_scene(&self) -> bool {
+        !self.scene.path().exists() && !built_in::names().contains(&self.scene.scene.as_str())
     }
 
     pub(super) fn settings(&self, map: Option<&MapFile>, chosen: Option<&Chosen>) -> SceneSettings {

@@ -25,13 +25,19 @@ pub struct Identity {
 }
 
 /// Settings that change no bit of a block.
-const WITHOUT_EFFECT: [&str; 8] = ["rounds", "stop", "builder", "chunk", "group_size", "paranoid", "counters", "threads"];
+const WITHOUT_EFFECT: [&str; 9] = ["rounds", "stop", "keeps_parts", "builder", "chunk", "group_size", "paranoid", "counters", "threads"];
+
+/// Settings of either world that change bits of a block.
+pub fn settings_with_effect(settings: &impl Serialize) -> Map<String, Value> {
+    let Ok(Value::Object(mut settings)) = serde_json::to_value(settings) else { unreachable!("settings are an object") };
+    WITHOUT_EFFECT.iter().for_each(|name| drop(settings.remove(*name)));
+    settings
+}
 
 impl Identity {
     /// `settings` are those of either world.
     pub fn new(scene: &str, content: Hash, settings: &impl Serialize, plan: Hash, device: Option<&DeviceFacts>, math: Math) -> Identity {
-        let Ok(Value::Object(mut settings)) = serde_json::to_value(settings) else { unreachable!("settings are an object") };
-        WITHOUT_EFFECT.iter().for_each(|name| drop(settings.remove(*name)));
+        let settings = settings_with_effect(settings);
         let device = match (math, device) {
             (Math::Strict, _) => None,
             (Math::Fast, Some(facts)) => Some(format!("{}, {}", facts.name, facts.driver)),

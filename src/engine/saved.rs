@@ -10,6 +10,7 @@ use super::identity::Identity;
 use super::room::film::RoomFilm;
 use super::scene::film::SceneFilm;
 use crate::ledger::Fates;
+use crate::plan::buffers::PART_VALUES;
 use crate::plan::differences::difference_count;
 use crate::plan::film::{BiasPlan, FilmPlan};
 use crate::plan::sensor::Sensor;
@@ -81,6 +82,11 @@ impl SavedRun {
         Ok(())
     }
 
+    /// Whether the parts of each pixel's light are kept apart.
+    pub fn has_parts(&self) -> bool {
+        matches!(&self.film, SavedFilm::Scene(film) if film.parts.is_some())
+    }
+
     /// Photons of its blocks, of all maps.
     pub fn emitted(&self) -> u64 {
         self.fates.iter().map(|fates| fates.emitted).sum()
@@ -98,6 +104,8 @@ const MAGIC: &[u8; 16] = b"photonmill run\r\n";
 const FORMAT: u32 = 2;
 /// Of the photons of a run, by any count: a year of the fastest device is a millionth of it.
 const MOST_COUNTED: u64 = 1 << 60;
+/// Name of an array that not every film has.
+const PARTS: &str = "parts";
 /// Of the checksum at the end.
 const CHECKSUM_BYTES: usize = 32;
 
@@ -176,6 +184,11 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
+    /// Whether these come next.
+    fn has(&self, name: &str) -> bool {
+        self.list.as_slice().first().is_some_and(|(found, ..)| found == name)
+    }
+
     fn next<T: Element>(&mut self, name: &str) -> Result<Vec<T>, String> {
         let (_, _, count) = self
             .list
@@ -214,6 +227,7 @@ impl SavedRun {
                 arrays.add("part totals", &film.part_totals);
                 arrays.add("class counts", &film.class_counts);
                 arrays.add("differences", &film.differences.0);
+                film.parts.iter().for_each(|parts| arrays.add(PARTS, parts));
                 FilmHeader::Scene { plan: film.plan.clone(), anomalies: film.anomalies.to_vec(), stored: film.stored.to_vec() }
             }
         };
@@ -319,10 +333,14 @@ impl SavedRun {
                     anomalies: anomalies.try_into().or(Err("holds other counts than this program knows"))?,
                     class_counts: reader.next("class counts")?,
                     differences: Differences(reader.next("differences")?),
+                    parts: if reader.has(PARTS) { Some(reader.next(PARTS)?) } else { None },
                     stored: stored.try_into().or(Err("holds other counts than this program knows"))?,
                 };
                 if film.one_hits.len() != film.pixels() * crate::constants::HIT_KINDS as usize {
                     return wrong("what one hit would add");
+                }
+                if film.parts.as_ref().is_some_and(|parts| parts.len() != film.pixels() * (PART_VALUES as usize - 3)) {
+                    return wrong("its parts of light");
                 }
                 let measured = if film.plan.bias == BiasPlan::Blocks { difference_count(film.pixels()) } else { 0 };
                 if film.differences.0.len() != measured {

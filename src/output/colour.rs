@@ -4,10 +4,10 @@ use std::io::Cursor;
 use std::path::Path;
 
 use glam::Vec3;
-use image::codecs::openexr::OpenExrEncoder;
-use image::codecs::png::PngEncoder;
-use image::{ExtendedColorType, ImageEncoder};
+use png::ColorType;
 
+use super::exr_file::{self, channels};
+use super::metadata::Metadata;
 use crate::error::{Error, Result};
 use crate::scene::Texture;
 use crate::scene::texture::Texels;
@@ -75,10 +75,15 @@ pub struct ColourPicture {
 
 impl ColourPicture {
     /// `stops` doubles the brightness of a PNG so many times, before the tone curve; an EXR holds the values untouched.
-    pub fn encode(&self, format: Format, stops: f32, tone: Tone) -> Vec<u8> {
+    pub fn encode(&self, format: Format, stops: f32, tone: Tone, metadata: Option<&Metadata>) -> Vec<u8> {
         match format {
-            Format::Exr => exr(self.width, self.height, &self.pixels),
-            Format::Png => png(self.width, self.height, self.pixels.iter().map(|pixel| tone.of(*pixel * stops.exp2()))),
+            Format::Exr => {
+                exr_file::encode((self.width, self.height), channels("", ["R", "G", "B"], self.pixels.iter().copied()), metadata)
+            }
+            Format::Png => {
+                let codes: Vec<u8> = srgb_codes(self.pixels.iter().map(|pixel| tone.of(*pixel * stops.exp2())));
+                eight_bits(self.width, self.height, ColorType::Rgb, &codes, metadata)
+            }
         }
     }
 
@@ -100,12 +105,7 @@ impl ColourPicture {
 
 /// Three 32-bit float channels, values untouched, row by row.
 pub fn exr(width: u32, height: u32, values: &[Vec3]) -> Vec<u8> {
-    let bytes: Vec<u8> = values.iter().flat_map(Vec3::to_array).flat_map(f32::to_ne_bytes).collect();
-    let mut file = Cursor::new(Vec::new());
-    OpenExrEncoder::new(&mut file)
-        .write_image(&bytes, width, height, ExtendedColorType::Rgb32F)
-        .expect("a picture in memory can be encoded");
-    file.into_inner()
+    exr_file::encode((width, height), channels("", ["R", "G", "B"], values.iter().copied()), None)
 }
 
 /// A texture, with its own codes where it has some; without alpha where that is 1.
@@ -113,11 +113,11 @@ pub fn texture_png(texture: &Texture) -> Vec<u8> {
     let (width, height) = (texture.width, texture.height);
     match &texture.texels {
         Texels::Srgb(codes) | Texels::Linear(codes) if codes.iter().any(|code| code[3] < 255) => {
-            eight_bits(width, height, ExtendedColorType::Rgba8, codes.as_flattened())
+            eight_bits(width, height, ColorType::Rgba, codes.as_flattened(), None)
         }
         Texels::Srgb(codes) | Texels::Linear(codes) => {
             let codes: Vec<u8> = codes.iter().flat_map(|[red, green, blue, _]| [*red, *green, *blue]).collect();
-            eight_bits(width, height, ExtendedColorType::Rgb8, &codes)
+            eight_bits(width, height, ColorType::Rgb, &codes, None)
         }
         texels => png(width, height, (0..texels.count()).map(|place| texels.at(place).truncate())),
     }
@@ -125,26 +125,64 @@ pub fn texture_png(texture: &Texture) -> Vec<u8> {
 
 /// Linear values as 8-bit sRGB, clamped to 0 to 1.
 pub fn png(width: u32, height: u32, values: impl Iterator<Item = Vec3>) -> Vec<u8> {
-    let codes: Vec<u8> = values.flat_map(|value| value.to_array().map(srgb_code)).collect();
-    eight_bits(width, height, ExtendedColorType::Rgb8, &codes)
+    let codes = srgb_codes(values);
+    eight_bits(width, height, ColorType::Rgb, &codes, None)
 }
 
 /// Linear values as they are in 8 bits, clamped to 0 to 1.
 pub fn linear_png(width: u32, height: u32, values: impl Iterator<Item = Vec3>) -> Vec<u8> {
     let codes: Vec<u8> = values.flat_map(|value| value.to_array().map(|channel| (channel.clamp(0.0, 1.0) * 255.0).round() as u8)).collect();
-    eight_bits(width, height, ExtendedColorType::Rgb8, &codes)
+    eight_bits(width, height, ColorType::Rgb, &codes, None)
 }
 
 /// Codes as they are.
 pub fn png_of_codes(width: u32, height: u32, codes: &[[u8; 3]]) -> Vec<u8> {
-    eight_bits(width, height, ExtendedColorType::Rgb8, codes.as_flattened())
+    eight_bits(width, height, ColorType::Rgb, codes.as_flattened(), None)
 }
 
-/// A PNG of codes, row by row.
-pub(super) fn eight_bits(width: u32, height: u32, kind: ExtendedColorType, codes: &[u8]) -> Vec<u8> {
+fn srgb_codes(values: impl Iterator<Item = Vec3>) -> Vec<u8> {
+    values.flat_map(|value| value.to_array().map(srgb_code)).collect()
+}
+
+/// A PNG of codes of 8 bits, row by row.
+pub(super) fn eight_bits(width: u32, height: u32, kind: ColorType, codes: &[u8], metadata: Option<&Metadata>) -> Vec<u8> {
     let mut file = Vec::new();
-    PngEncoder::new(&mut file).write_image(codes, width, height, kind).expect("a picture in memory can be encoded");
+    write_png(&mut file, (width, height), kind, codes, metadata).expect("a picture in memory can be encoded");
     file
+}
+
+fn write_png(
+    file: &mut Vec<u8>,
+    (width, height): (u32, u32),
+    kind: ColorType,
+    codes: &[u8],
+    metadata: Option<&Metadata>,
+) -> std::result::Result<(), png::EncodingError> {
+    let mut encoder = png::Encoder::new(file, width, height);
+    encoder.set_color(kind);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::Fast);
+    encoder.set_filter(png::Filter::Adaptive);
+    for (keyword, text) in metadata.into_iter().flat_map(Metadata::texts) {
+        match text.is_ascii() {
+            true => encoder.add_text_chunk(keyword.to_owned(), text)?,
+            false => encoder.add_itxt_chunk(keyword.to_owned(), text)?,
+        }
+    }
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(codes)?;
+    writer.finish()
+}
+
+/// The codes of a PNG of 8 bits.
+pub fn png_codes(content: &[u8]) -> std::result::Result<Vec<u8>, String> {
+    let unreadable = |error: png::DecodingError| format!("cannot be read as PNG ({error})");
+    let mut reader = png::Decoder::new(Cursor::new(content)).read_info().map_err(unreadable)?;
+    let size = reader.output_buffer_size().ok_or("is too large to be read")?;
+    let mut codes = vec![0; size];
+    let size = reader.next_frame(&mut codes).map_err(unreadable)?.buffer_size();
+    codes.truncate(size);
+    Ok(codes)
 }
 
 /// Relative luminance of linear sRGB.
@@ -203,7 +241,7 @@ mod tests {
     fn exr_values_come_back_untouched() {
         let pixels = vec![Vec3::new(0.0, 1e-6, 12345.678), Vec3::splat(3.0)];
         let picture = ColourPicture { width: 2, height: 1, pixels: pixels.clone() };
-        let read = image::load_from_memory(&picture.encode(Format::Exr, 5.0, Tone::Neutral)).unwrap().into_rgb32f();
+        let read = image::load_from_memory(&picture.encode(Format::Exr, 5.0, Tone::Neutral, None)).unwrap().into_rgb32f();
         let values: Vec<f32> = pixels.iter().flat_map(Vec3::to_array).collect();
         assert_eq!(read.into_raw(), values);
     }

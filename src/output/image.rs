@@ -1,9 +1,11 @@
 //! The box as a picture, like the paper's figures: the walls unfolded, and seen from several angles.
 
 use glam::{DVec3, Vec3};
-use image::ExtendedColorType;
+use png::ColorType;
 
-use super::colour::{Format, eight_bits, exr};
+use super::colour::{Format, eight_bits};
+use super::exr_file::{self, channels};
+use super::metadata::Metadata;
 use crate::engine::room::film::WallEstimate;
 use crate::scene::Camera;
 use crate::scene::rectangle::Rectangle;
@@ -193,15 +195,18 @@ impl Picture {
     }
 
     /// The file's bytes.
-    pub fn encode(&self, format: Format) -> Vec<u8> {
+    pub fn encode(&self, format: Format, metadata: Option<&Metadata>) -> Vec<u8> {
         let (width, height) = (self.width as u32, self.height as u32);
         match format {
             Format::Png => {
                 let code = |value: &f64| (value.clamp(0.0, 1.0) * 255.0).round() as u8;
-                eight_bits(width, height, ExtendedColorType::L8, &self.values.iter().map(code).collect::<Vec<u8>>())
+                eight_bits(width, height, ColorType::Grayscale, &self.values.iter().map(code).collect::<Vec<u8>>(), metadata)
             }
             // Grey as three equal channels, which every reader of EXR shows.
-            Format::Exr => exr(width, height, &self.values.iter().map(|value| Vec3::splat(*value as f32)).collect::<Vec<Vec3>>()),
+            Format::Exr => {
+                let values = self.values.iter().map(|value| Vec3::splat(*value as f32));
+                exr_file::encode((width, height), channels("", ["R", "G", "B"], values), metadata)
+            }
         }
     }
 }
@@ -243,7 +248,8 @@ mod tests {
     #[test]
     fn an_exr_holds_the_values_untouched() {
         let picture = Picture { width: 2, height: 1, values: vec![0.125, 7.5] };
-        let read = image::load_from_memory_with_format(&picture.encode(Format::Exr), image::ImageFormat::OpenExr).unwrap().into_rgb32f();
+        let read =
+            image::load_from_memory_with_format(&picture.encode(Format::Exr, None), image::ImageFormat::OpenExr).unwrap().into_rgb32f();
         assert_eq!(read.into_raw(), [0.125, 0.125, 0.125, 7.5, 7.5, 7.5]);
     }
 }

@@ -58,7 +58,7 @@ pub fn files(folder: &Folder, quantity: Quantity, scene: &RoomScene, walls: &[Wa
             Quantity::Radiosity => (&wall.radiosity, &wall.radiosity_error),
         };
         let mesh = values.len().isqrt();
-        let picture = |values: Vec<f64>| Picture { width: mesh, height: mesh, values }.encode(Format::Exr);
+        let picture = |values: Vec<f64>| Picture { width: mesh, height: mesh, values }.encode(Format::Exr, None);
         let [file, error_file] = names(wall.name);
         files.push((folder.file(&file), picture(values.clone())));
         files.push((folder.file(&error_file), picture(errors.clone())));

@@ -1,9 +1,67 @@
 //! A scene's film as a picture: radiance, and its standard error.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use super::colour::{ColourPicture, Format, Tone};
+use super::exr_file::{self, Channel, channels};
+use super::metadata::Metadata;
+use crate::constants::PART_COUNT;
 use crate::engine::scene::SceneFilm;
+
+const RGB: [&str; 3] = ["R", "G", "B"];
+/// Parts of the light, by their numbers.
+const PARTS: [Layer; PART_COUNT as usize] = [Layer::Direct, Layer::Specular, Layer::Caustic, Layer::Indirect];
+
+/// Of an EXR, beside the light.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Layer {
+    Direct,
+    Specular,
+    Caustic,
+    Indirect,
+    StandardError,
+    Albedo,
+    Normal,
+    Depth,
+}
+
+impl Layer {
+    pub const ALL: [Layer; 8] =
+        [Layer::Direct, Layer::Specular, Layer::Caustic, Layer::Indirect, Layer::StandardError, Layer::Albedo, Layer::Normal, Layer::Depth];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Layer::Direct => "direct",
+            Layer::Specular => "specular",
+            Layer::Caustic => "caustic",
+            Layer::Indirect => "indirect",
+            Layer::StandardError => "standard_error",
+            Layer::Albedo => "albedo",
+            Layer::Normal => "normal",
+            Layer::Depth => "depth",
+        }
+    }
+
+    /// A part of the light.
+    pub fn is_part(self) -> bool {
+        PARTS.contains(&self)
+    }
+
+    /// Of what is seen first.
+    pub fn is_of_surface(self) -> bool {
+        [Layer::Albedo, Layer::Normal, Layer::Depth].contains(&self)
+    }
+}
+
+/// What a pixel sees first.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Surface {
+    pub albedo: Vec3,
+    /// In the scene's axes.
+    pub normal: Vec3,
+    /// Metres along the ray; infinite where there is nothing.
+    pub depth: f32,
+}
 
 /// How a film is shown.
 pub struct Show {
@@ -11,19 +69,62 @@ pub struct Show {
     /// In stops; `None`: what makes the mean middle grey.
     pub exposure: Option<f32>,
     pub tone: Tone,
+    /// Of an EXR.
+    pub layers: Vec<Layer>,
 }
 
 impl Show {
-    /// The picture, and its exposure in stops.
-    pub fn picture(&self, film: &SceneFilm, format: Format) -> (Vec<u8>, f32) {
-        let image = self.of(film, |pixel| film.mean(pixel));
-        let stops = self.exposure.unwrap_or_else(|| image.usual_exposure());
-        (image.encode(format, stops, self.tone), stops)
+    /// The picture alone, as one is shown while the run goes on.
+    pub fn so_far(&self, film: &SceneFilm, format: Format) -> Vec<u8> {
+        let image = self.image(film);
+        image.encode(format, self.stops(&image), self.tone, None)
+    }
+
+    /// A PNG, and its exposure in stops; what its file says of it follows from these.
+    pub fn png(&self, film: &SceneFilm, metadata: impl FnOnce(f32) -> Metadata) -> (Vec<u8>, f32) {
+        let image = self.image(film);
+        let stops = self.stops(&image);
+        (image.encode(Format::Png, stops, self.tone, Some(&metadata(stops))), stops)
+    }
+
+    /// An EXR: the light, and the layers that are asked for: parts where the film has them, and what is seen first where `surfaces` are
+    /// given.
+    pub fn exr(&self, film: &SceneFilm, surfaces: &[Surface], metadata: Option<&Metadata>) -> Vec<u8> {
+        let light = channels("", RGB, (0..film.pixels()).map(|pixel| film.mean(pixel).as_vec3()));
+        let layers = self.layers.iter().flat_map(|layer| self.layer(*layer, film, surfaces));
+        exr_file::encode(self.size, light.into_iter().chain(layers).collect(), metadata)
+    }
+
+    fn layer(&self, layer: Layer, film: &SceneFilm, surfaces: &[Surface]) -> Vec<Channel> {
+        let name = layer.name();
+        let pixels = || 0..film.pixels();
+        match layer {
+            Layer::StandardError => channels(name, RGB, pixels().map(film.stated_errors()).map(DVec3::as_vec3)),
+            Layer::Albedo | Layer::Normal | Layer::Depth if surfaces.is_empty() => Vec::new(),
+            Layer::Albedo => channels(name, RGB, surfaces.iter().map(|surface| surface.albedo)),
+            Layer::Normal => channels(name, ["X", "Y", "Z"], surfaces.iter().map(|surface| surface.normal)),
+            Layer::Depth => {
+                vec![Channel { name: format!("{name}.Z"), values: surfaces.iter().map(|surface| surface.depth).collect() }]
+            }
+            Layer::Direct | Layer::Specular | Layer::Caustic | Layer::Indirect => {
+                let part = PARTS.iter().position(|part| *part == layer).expect("it is a part");
+                let values: Option<Vec<Vec3>> = pixels().map(|pixel| Some(film.mean_of_part(part, pixel)?.as_vec3())).collect();
+                values.map_or_else(Vec::new, |values| channels(name, RGB, values.into_iter()))
+            }
+        }
+    }
+
+    fn image(&self, film: &SceneFilm) -> ColourPicture {
+        self.of(film, |pixel| film.mean(pixel))
+    }
+
+    fn stops(&self, image: &ColourPicture) -> f32 {
+        self.exposure.unwrap_or_else(|| image.usual_exposure())
     }
 
     /// Standard errors, infinite where they are not known.
     pub fn errors(&self, film: &SceneFilm) -> Vec<u8> {
-        self.of(film, film.stated_errors()).encode(Format::Exr, 0.0, Tone::Linear)
+        self.of(film, film.stated_errors()).encode(Format::Exr, 0.0, Tone::Linear, None)
     }
 
     fn of(&self, film: &SceneFilm, value: impl Fn(usize) -> DVec3) -> ColourPicture {

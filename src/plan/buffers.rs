@@ -193,6 +193,16 @@ impl ScenePlan {
         3 * u64::from(self.visible_points()) * maps
     }
 
+    /// Values of all pixels' parts of light: three channels of each but direct light. 0 where they are not kept apart.
+    pub fn part_sums(&self) -> u64 {
+        if self.keeps_parts() { (PART_VALUES - 3) * u64::from(self.sensor.pixels()) } else { 0 }
+    }
+
+    /// Totals of all pixels, values of kept ones, and values of all.
+    fn part_totals(&self) -> u64 {
+        u64::from(PART_COUNT) + PART_VALUES * kept_count(self.sensor.pixels() as usize) as u64 + self.part_sums()
+    }
+
     /// Every buffer of a run, with one set of receivers where points are asked.
     pub fn buffers(&self, geometry: &Geometry) -> Vec<PlannedBuffer> {
         [self.scene_buffers(geometry), self.sensor_buffers(), self.photon_buffers(), self.count_buffers()].concat()
@@ -249,6 +259,12 @@ impl ScenePlan {
             buffer::<u64>("surface block sums", 3 * seen, "the same of light that surfaces scatter"),
             buffer::<u64>("surface sums", 3 * seen, "sums of all blocks of it"),
             buffer::<u64>("surface squares", 6 * seen, "sums of their squares"),
+            buffer::<u64>(
+                "part totals",
+                self.part_totals(),
+                "light of each part of a path: in all, in some pixels, and where asked in each",
+            ),
+            buffer::<u64>("part sums", self.part_sums(), "sums of all blocks of parts of each pixel's light"),
             buffer::<f32>("latest blocks", PART_VALUES * kept_values(pixels as usize) as u64, "some pixels of the latest blocks"),
             buffer::<u32>("one hits", u64::from(HIT_KINDS) * pixels, "what one hit would add where none has"),
             buffer::<u32>("one hits of blocks", u64::from(HIT_KINDS) * pixels, "the same as the latest whole block left it"),
@@ -320,10 +336,8 @@ impl ScenePlan {
 
     /// What kernels count, whatever the sizes.
     fn count_buffers(&self) -> Vec<PlannedBuffer> {
-        let kept = PART_VALUES * kept_count(self.sensor.pixels() as usize) as u64;
         vec![
             buffer::<u32>("camera path counts", 1, "how many camera paths a dispatch leaves"),
-            buffer::<u64>("part totals", u64::from(PART_COUNT) + kept, "light of each part of a path, and in some pixels"),
             buffer::<u64>("part totals of blocks", u64::from(PART_COUNT), "the same as the latest whole block left it"),
             buffer::<u32>("anomalies", ANOMALY_WORDS as u64, "clamped values, lost camera paths, and what these cost"),
             buffer::<u32>("anomalies of blocks", ANOMALY_WORDS as u64, "the same as the latest whole block left them"),

@@ -49,6 +49,24 @@ impl ScenePlan {
         limits: &Limits,
         trial: Option<Trial>,
     ) -> Result<ScenePlan> {
+        let plan = ScenePlan::fitting(scene, geometry, settings, sensor, limits, trial.clone());
+        if plan.is_ok() || !settings.keeps_parts {
+            return plan;
+        }
+        // A picture that is too large with its parts may fit without them.
+        let without = SceneSettings { keeps_parts: false, ..settings.clone() };
+        ScenePlan::fitting(scene, geometry, &without, sensor, limits, trial)
+    }
+
+    /// In as large pieces as fit on the device.
+    fn fitting(
+        scene: &Scene,
+        geometry: &Geometry,
+        settings: &SceneSettings,
+        sensor: Sensor,
+        limits: &Limits,
+        trial: Option<Trial>,
+    ) -> Result<ScenePlan> {
         // Where the scene and the picture leave little room, photons are traced in smaller chunks.
         let mut for_maps = *limits;
         loop {
@@ -160,6 +178,7 @@ impl ScenePlan {
             planned_in: Duration::ZERO,
         };
         plan.set_film(geometry, &facts);
+        plan.constants.push(("HAS_PARTS", u32::from(plan.keeps_parts())));
         plan.constants.push(("HAS_DIFFERENCES", u32::from(plan.film.bias == BiasPlan::Blocks)));
         plan.check_sizes(geometry, limits)?;
         plan.decisions = plan.decisions.iter().map(|decision| plan.given(decision, geometry)).collect();

@@ -15,7 +15,7 @@ use crate::constants::*;
 use crate::records::*;
 use crate::scene::geometry::Geometry;
 use crate::settings::Builder;
-use crate::settings::scene::{Effect, SceneSettings};
+use crate::settings::scene::{Effect, Part, SceneSettings};
 
 /// A photon map of each round.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -167,6 +167,11 @@ const TOO_WIDE: f64 = 0.1;
 impl ScenePlan {
     pub fn keeps(&self, effect: Effect) -> bool {
         self.decisions.iter().any(|decision| decision.effect == effect && decision.kept)
+    }
+
+    /// Whether the parts of each pixel's light are kept apart.
+    pub fn keeps_parts(&self) -> bool {
+        self.settings.keeps_parts && matches!(self.sensor, Sensor::Picture { .. }) && self.settings.part == Part::All
     }
 
     /// Whether many points of the trial lie in something narrower than the radius.

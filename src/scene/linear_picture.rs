@@ -2,6 +2,7 @@
 
 use std::io::Cursor;
 
+use exr::meta::MetaData;
 use glam::Vec3;
 use image::codecs::hdr::HdrDecoder;
 use image::codecs::openexr::OpenExrDecoder;
@@ -36,6 +37,7 @@ impl LinearPicture {
     /// An error says what is wrong with the file, and what to do.
     pub fn decode(mut content: Vec<u8>) -> Result<LinearPicture, String> {
         if !content.starts_with(RADIANCE_MAGIC) {
+            check_layers(&content, MAX_TEXELS)?;
             let decoder = OpenExrDecoder::with_alpha_preference(Cursor::new(&content), Some(false)).map_err(undecodable)?;
             let has_alpha = decoder.original_color_type() == ExtendedColorType::Rgba32F;
             let (width, height, colours) = decoded(decoder)?;
@@ -128,6 +130,17 @@ pub fn undecodable(error: image::ImageError) -> String {
 pub fn check_size(width: u32, height: u32) -> Result<(), String> {
     let is_allowed = width > 0 && height > 0 && u64::from(width) * u64::from(height) <= MAX_TEXELS;
     if is_allowed { Ok(()) } else { Err(format!("is {width} x {height}; allowed are 1 to {MAX_TEXELS} pixels")) }
+}
+
+/// Refuses an OpenEXR of which some layer has more pixels, whatever size the picture claims: memory is taken for what a layer claims.
+pub fn check_layers(content: &[u8], most: u64) -> Result<(), String> {
+    // What is wrong with another file, its decoder says.
+    let Ok(metadata) = MetaData::read_from_buffered(content, false) else { return Ok(()) };
+    let sizes = metadata.headers.iter().map(|header| (header.layer_size.0 as u64, header.layer_size.1 as u64));
+    match sizes.into_iter().find(|(width, height)| width.saturating_mul(*height) > most) {
+        Some((width, height)) => Err(format!("has a layer of {width} x {height}; allowed are 1 to {most} pixels")),
+        None => Ok(()),
+    }
 }
 
 /// Width, height and pixels.

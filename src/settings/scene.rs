@@ -143,6 +143,8 @@ pub struct SceneSettings {
     pub aim: bool,
     pub illumination: Illumination,
     pub part: Part,
+    /// Keep the parts of each pixel's light apart beside the whole: of a picture of all parts.
+    pub keeps_parts: bool,
     pub filter: Filter,
     /// `None`: persistent; ballot where lanes do not vote right in loops, and with strict arithmetic, which needs so many registers
     /// that few photons would be under way.
@@ -186,6 +188,7 @@ impl Default for SceneSettings {
             aim: true,
             illumination: Illumination::Split,
             part: Part::All,
+            keeps_parts: false,
             filter: Filter::Box,
             builder: None,
             math: Math::Fast,

@@ -51,6 +51,8 @@ layout(constant_id = 21) const bool HAS_SHADOW_RAYS = true;
 layout(constant_id = 72) const bool HAS_SEEN_LIGHT = false;
 // Whether photons are also counted within a smaller radius, which tells the bias (film/differences.glsl).
 layout(constant_id = 73) const bool HAS_DIFFERENCES = false;
+// Whether a picture keeps the parts of each pixel's light apart (film/kept_parts.glsl).
+layout(constant_id = 74) const bool HAS_PARTS = false;
 
 // Where the sums of a sample stand among those of all: three channels of what surfaces scatter, then of what is seen straight.
 uint place_of_sums(uint sample_place)

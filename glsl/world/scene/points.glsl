@@ -42,8 +42,8 @@ void write_pass_sum(uint place, uint index, uint pixel_count, vec3 light[3], vec
             uvec2 units = to_film_units(light[part][channel], scale, limit, chance);
             sum = add64(sum, units);
             totals[part] = add64(totals[part], units);
-            if (kept != NONE && units != uvec2(0)) {
-                add_to_kept(kept, part == 2 ? 3 : part, channel, units);
+            if (units != uvec2(0)) {
+                add_to_parts(kept, index, pixel_count, part == 2 ? 3 : part, channel, units);
             }
         }
         pass_sums[first + channel] = sum;

@@ -161,7 +161,7 @@ pub fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u32; 2])
 pub fn resolve(commands: &mut Commands, round: Round, ends_block: bool) -> Result<()> {
     let Round { resources, plan, .. } = round;
     let SceneResources { extra_samples, pass_sums, estimates, sums_of_block, film_sums, film_squares, .. } = resources;
-    let SceneResources { surface_sums_of_block, surface_sums, surface_squares, part_totals, latest_blocks, .. } = resources;
+    let SceneResources { surface_sums_of_block, surface_sums, surface_squares, part_totals, part_sums, latest_blocks, .. } = resources;
     let pixel_count = plan.sensor.pixels();
     let points_per_path = if resources.photons.is_some() { plan.points_per_path } else { 0 };
     let block = round.number / plan.film.rounds_per_block;
@@ -188,6 +188,7 @@ pub fn resolve(commands: &mut Commands, round: Round, ends_block: bool) -> Resul
             surface_sums,
             surface_squares,
             part_totals,
+            part_sums,
             latest_blocks,
         };
         commands.dispatch(kernel, &push, Extent::Items(u64::from(end_pixel - first_pixel)))

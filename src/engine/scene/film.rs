@@ -45,6 +45,9 @@ pub struct SceneFilm {
     pub one_hits: Vec<u32>,
     /// Light of each part (direct, specular, caustic, indirect) over all pixels and channels, film units.
     pub part_totals: Vec<u64>,
+    /// Specular, caustic and indirect light of each pixel, three channels each, film units; direct light is the rest. `None` where
+    /// they were not kept apart.
+    pub parts: Option<Vec<u64>>,
     /// Values that were no number, values clamped to the film's largest, estimates on a mesh too dense for the area within the
     /// radius to be found, camera paths that were cut off; then, 64 bits each, what was clamped, what was cut off, and samples that
     /// met a surface.
@@ -81,6 +84,10 @@ impl SceneFilm {
         // The most that one hit would have added, and what has hit is more than any.
         self.one_hits.iter_mut().zip(&other.one_hits).for_each(|(most, other)| *most = (*most).max(*other));
         self.part_totals.iter_mut().zip(&other.part_totals).for_each(|(total, other)| *total += other);
+        self.parts = self.parts.take().zip(other.parts.as_ref()).map(|(mut parts, others)| {
+            parts.iter_mut().zip(others).for_each(|(sum, others)| *sum += others);
+            parts
+        });
         self.stored.iter_mut().zip(&other.stored).for_each(|(stored, other)| *stored += other);
         for word in 0..4 {
             self.anomalies[word] = self.anomalies[word].saturating_add(other.anomalies[word]);
@@ -103,6 +110,27 @@ impl SceneFilm {
     fn mean_of(&self, light: &BlockSums, pixel: usize) -> DVec3 {
         let unit = self.plan.scale * f64::from(self.rounds.max(1));
         DVec3::from_array([0, 1, 2].map(|channel| light.sums[3 * pixel + channel] as f64 / unit))
+    }
+
+    /// Radiance of a part of a pixel's light, by its number among all parts; `None` where parts were not kept apart. The sums of all
+    /// parts are that of the pixel, to the bit.
+    pub fn mean_of_part(&self, part: usize, pixel: usize) -> Option<DVec3> {
+        let unit = self.plan.scale * f64::from(self.rounds.max(1));
+        Some(DVec3::from_array(self.sum_of_part(part, pixel)?.map(|sum| sum as f64 / unit)))
+    }
+
+    /// The same in film units.
+    pub fn sum_of_part(&self, part: usize, pixel: usize) -> Option<[u64; 3]> {
+        const OTHERS: usize = PART_COUNT as usize - 1;
+        let others: &[[u64; 3]] = self.parts.as_ref()?.as_chunks().0;
+        let others = &others[OTHERS * pixel..][..OTHERS];
+        Some(match part {
+            // A file may hold anything.
+            0 => {
+                [0, 1, 2].map(|channel| others.iter().fold(self.sums[3 * pixel + channel], |rest, part| rest.saturating_sub(part[channel])))
+            }
+            part => others[part - 1],
+        })
     }
 
     /// Light that errors refer to: what surfaces scatter, sums and squares.

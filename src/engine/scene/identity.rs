@@ -7,7 +7,7 @@ use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::scene::geometry::Geometry;
 
 /// Specialization constants that change no bit of a block.
-const WITHOUT_EFFECT: [&str; 3] = ["HAS_SLOTS", "CHAIN_STEPS", "PARANOID"];
+const WITHOUT_EFFECT: [&str; 4] = ["HAS_SLOTS", "HAS_PARTS", "CHAIN_STEPS", "PARANOID"];
 
 pub fn identity(scene: &str, view: &View, plan: &ScenePlan, map: Option<&str>, facts: &DeviceFacts) -> Identity {
     Identity::new(scene, content(view, plan, map), &plan.settings, found(plan), Some(facts), plan.settings.math)

@@ -85,6 +85,8 @@ struct SceneOnGpu<'a> {
     stored: Option<StoredPhotons<'a>>,
     /// Photons that a chunk of the global and of the caustic map may have where time may be up.
     timed_chunks: [u32; 2],
+    /// A round was cut short, of which parts of light may have come to that of the block under way.
+    is_cut: bool,
     cancelled: &'a AtomicBool,
 }
 
@@ -140,6 +142,7 @@ pub fn light_from(gpu: &Gpu, view: &View, plan: ScenePlan, map: Option<&MapFile>
         grids: None,
         stored,
         timed_chunks: [FIRST_TIMED_CHUNK; 2],
+        is_cut: false,
         cancelled: control.cancelled,
     };
     if !plan.has_classes() {
@@ -165,6 +168,7 @@ impl<'a> World for SceneOnGpu<'a> {
         commands.set_interrupt(Some(Interrupt { cancelled: self.cancelled, deadline: deadline.filter(|_| !is_first) }));
         let traced = self.one_round(commands, deadline.filter(|_| is_first), state);
         commands.set_interrupt(None);
+        self.is_cut = traced.is_err();
         traced
     }
 
@@ -221,7 +225,8 @@ impl<'a> World for SceneOnGpu<'a> {
     }
 
     fn film(&mut self, commands: &mut Commands<'a>, state: &RunState) -> Result<Later<SceneFilm>> {
-        let SceneResources { film_sums, film_squares, surface_sums, surface_squares, latest_blocks, class_counts, .. } = &self.resources;
+        let SceneResources { film_sums, film_squares, surface_sums, surface_squares, latest_blocks, class_counts, part_sums, .. } =
+            &self.resources;
         let SceneResources { differences, sums_of_block, surface_sums_of_block, one_hits, part_totals, anomalies, of_blocks, .. } =
             &self.resources;
         let plan = &self.plan.film;
@@ -229,6 +234,16 @@ impl<'a> World for SceneOnGpu<'a> {
         // Where a block is whole, nothing counts of the one under way.
         let is_whole = state.blocks() > 0;
         let (sums, of_surfaces) = if is_whole { (film_sums, surface_sums) } else { (sums_of_block, surface_sums_of_block) };
+        // Those of the block under way stand behind all else of their buffer.
+        let parts = match (self.plan.part_sums() as usize, is_whole) {
+            (0, _) => None,
+            (count, true) => Some((commands.copy_out(part_sums, count)?, 0)),
+            (_, false) if self.is_cut => None,
+            (count, false) => {
+                let all = part_totals.count() as usize;
+                Some((commands.copy_out(part_totals, all)?, all - count))
+            }
+        };
         let (one_hits, part_totals, anomalies) =
             if is_whole { (&of_blocks.one_hits, &of_blocks.part_totals, &of_blocks.anomalies) } else { (one_hits, part_totals, anomalies) };
         let seen = if plan.sees_light { pixels } else { 0 };
@@ -272,6 +287,7 @@ impl<'a> World for SceneOnGpu<'a> {
                 differences: Differences(differences.take()),
                 one_hits: one_hits.take(),
                 part_totals: part_totals.take(),
+                parts: parts.map(|(values, first)| values.take().split_off(first)),
                 anomalies: anomalies.take().try_into().expect("so many words were read"),
                 class_counts: class_counts.take(),
                 stored,
@@ -329,6 +345,9 @@ impl SceneOnGpu<'_> {
         commands.upload(latest_blocks, &values)?;
         for one_hits in [one_hits, &of_blocks.one_hits] {
             commands.upload(one_hits, &film.one_hits)?;
+        }
+        if let Some(parts) = &film.parts {
+            commands.upload(&self.resources.part_sums, parts)?;
         }
         for part_totals in [part_totals, &of_blocks.part_totals] {
             commands.upload(part_totals, &film.part_totals)?;

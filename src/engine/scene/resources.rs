@@ -80,6 +80,7 @@ buffers! {
         /// What is known of pixels that some kind of light has not reached; see `glsl/world/scene/one_hit.glsl`.
         one_hits: Buffer<u32> = planned.zeroed(commands, "one hits")?,
         part_totals: Buffer<u64> = planned.zeroed(commands, "part totals")?,
+        part_sums: Buffer<u64> = planned.zeroed(commands, "part sums")?,
         anomalies: Buffer<u32> = planned.zeroed(commands, "anomalies")?,
         /// What the latest whole block left of the last three.
         of_blocks: CountsOfBlocks = CountsOfBlocks::made(planned)?,

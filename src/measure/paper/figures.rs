@@ -153,9 +153,12 @@ fn panels(frames: &[Frame]) -> Vec<Panel> {
         let scene = open_box(&only.settings);
         let seen = VIEWS.iter().enumerate().map(|(number, (name, _))| ((*name).to_owned(), view(&scene, &only.walls, number, SMALL_SIDE)));
         let walls = std::iter::once(("walls unfolded around the back wall".to_owned(), unfolded(&scene, &only.walls)));
-        return walls.chain(seen).map(|(label, picture)| Panel { label, side: picture.width, png: picture.encode(Format::Png) }).collect();
+        return walls
+            .chain(seen)
+            .map(|(label, picture)| Panel { label, side: picture.width, png: picture.encode(Format::Png, None) })
+            .collect();
     }
     let side = if frames.len() == 2 { LARGE_SIDE } else { SMALL_SIDE };
-    let picture = |frame: &Frame| view(&open_box(&frame.settings), &frame.walls, VIEW, side).encode(Format::Png);
+    let picture = |frame: &Frame| view(&open_box(&frame.settings), &frame.walls, VIEW, side).encode(Format::Png, None);
     frames.iter().map(|frame| Panel { label: frame.label.clone(), side, png: picture(frame) }).collect()
 }

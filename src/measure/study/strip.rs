@@ -117,7 +117,7 @@ pub fn strip(gpu: &Gpu, subject: &Subject, part: &Part, request: &Request, cance
     }
     let Some((_, loosest, _)) = found.first() else { return Ok(None) };
     let scale = round_up(2.0 * loosest.error().value);
-    let png = |picture: &ColourPicture| picture.encode(Format::Png, stops, Tone::default());
+    let png = |picture: &ColourPicture| picture.encode(Format::Png, stops, Tone::default(), None);
     let frame = |(asked, point, values): (f64, &Point, Vec<f64>)| {
         let of = |place: usize| if reference.counts[place] { (values[place] - reference.values[place]) / mean } else { f64::NAN };
         let differences: Vec<f64> = (0..values.len()).map(of).collect();
@@ -129,7 +129,7 @@ pub fn strip(gpu: &Gpu, subject: &Subject, part: &Part, request: &Request, cance
             ms: point.ms().value,
             error: point.error().value,
             picture: png(&subject.picture(&values)),
-            difference: ColourPicture { pixels: colours, ..shown }.encode(Format::Png, 0.0, Tone::Linear),
+            difference: ColourPicture { pixels: colours, ..shown }.encode(Format::Png, 0.0, Tone::Linear, None),
             size: (right.width, right.height),
         }
     };

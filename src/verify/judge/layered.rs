@@ -60,6 +60,13 @@ impl<'a> Geometry<'a> {
         towards_eye(if is_front { turned } else { -turned }, wo)
     }
 
+    /// The shading normal of a surface with its normal map.
+    pub fn mapped_normal(&self, hit: &Hit, vertex: &Vertex) -> DVec3 {
+        let triangle = &self.triangles[hit.triangle];
+        let seen = (vertex.wo, vertex.is_front);
+        self.mapped(triangle.material.normal_map, &triangle.mesh.tangents, (triangle, hit.weights), vertex.ns, seen)
+    }
+
     /// Where an anisotropic base is rougher, about the normal `n`, and how much; `front` is the front's normal by the mesh.
     fn stretch(&self, (triangle, weights): (&Triangle, DVec3), front: DVec3, n: DVec3, alpha: f64) -> (DVec3, f64) {
         let layers = &triangle.material.layers;
@@ -94,9 +101,8 @@ impl<'a> Geometry<'a> {
             Wall::Thin
         };
         let place = (triangle, hit.weights);
-        let seen = (wo, vertex.is_front);
-        let mut n = self.mapped(material.normal_map, &triangle.mesh.tangents, place, vertex.ns, seen);
-        let coat_n = self.mapped(layers.coat_normal_map, &triangle.mesh.coat_tangents, place, vertex.ns, seen);
+        let mut n = self.mapped_normal(hit, vertex);
+        let coat_n = self.mapped(layers.coat_normal_map, &triangle.mesh.coat_tangents, place, vertex.ns, (wo, vertex.is_front));
         // Total reflection by a shading normal alone has an end: glass would keep light that its triangles let out.
         if let Wall::Solid { from, to } = wall
             && depth >= SMOOTH_TOTAL_REFLECTIONS

@@ -10,6 +10,7 @@
 //! to shining triangles that meet other surfaces, where 1 / distance^2 has no bound.
 
 mod albedo;
+mod first_surface;
 mod geometry;
 mod layered;
 mod light;
@@ -31,6 +32,7 @@ use rayon::prelude::*;
 
 use crate::scene::{Camera, Scene};
 pub use crate::settings::scene::Part;
+pub use first_surface::{FirstSurface, first_surfaces};
 use geometry::Geometry;
 use light::Emitters;
 pub use material::fresnel;

@@ -1,0 +1,91 @@
+//! The arguments of a command that decide its picture, as the user typed them: what the picture's file says of them, and
+//! what `photonmill repeat` reads back.
+
+use clap::parser::ValueSource;
+use clap::{Arg, ArgMatches, Command};
+
+/// Headings of options that change no pixel: where results go, how they are made and watched, and when the run ends, of which the
+/// rounds that it had say enough.
+const WITHOUT_EFFECT: [&str; 6] = ["Output", "Messages", "Checks", "Device", "When to stop", "Implementation"];
+/// Options under them that do change the file.
+const WITH_EFFECT: [&str; 8] = ["exposure", "tone", "layers", "measure", "confidence", "math", "sums", "gather"];
+/// The option under another heading in whose place the metadata has what came of it.
+const ROUNDS: &str = "rounds";
+/// The same of scenes.
+const REPLACED: [&str; 8] =
+    ["settings", "save_settings", "samples", "shadow_rays", "photons", "caustic_photons", "neighbours", "caustic_neighbours"];
+
+#[derive(Debug, Clone, PartialEq)]
+struct Argument {
+    /// With its dashes; `None` where it is known by its place.
+    option: Option<String>,
+    /// `None` of a switch.
+    value: Option<String>,
+}
+
+/// Of one command.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Typed {
+    /// Empty for the paper's box.
+    pub(super) command: String,
+    arguments: Vec<Argument>,
+}
+
+fn is_kept(argument: &Arg, is_of_box: bool) -> bool {
+    let id = argument.get_id().as_str();
+    let is_under = argument.get_help_heading().is_some_and(|heading| WITHOUT_EFFECT.contains(&heading));
+    (!is_under || WITH_EFFECT.contains(&id)) && id != ROUNDS && (is_of_box || !REPLACED.contains(&id))
+}
+
+impl Typed {
+    pub(super) fn of(matches: &ArgMatches, command: &Command) -> Typed {
+        let (name, matches, command) = match matches.subcommand() {
+            Some((name, inner)) => (name, inner, command.find_subcommand(name).unwrap_or(command)),
+            None => ("", matches, command),
+        };
+        let was_typed = |argument: &&Arg| matches.value_source(argument.get_id().as_str()) == Some(ValueSource::CommandLine);
+        let of_argument = |argument: &Arg| -> Vec<Argument> {
+            let values = matches.get_raw(argument.get_id().as_str()).into_iter().flatten();
+            let values: Vec<String> = values.map(|value| value.to_string_lossy().into_owned()).collect();
+            match argument.get_long() {
+                Some(long) => {
+                    let value = argument.get_action().takes_values().then(|| values.join(","));
+                    vec![Argument { option: Some(format!("--{long}")), value }]
+                }
+                None => values.into_iter().map(|value| Argument { option: None, value: Some(value) }).collect(),
+            }
+        };
+        let known = command.get_arguments().filter(|argument| is_kept(argument, name.is_empty())).filter(was_typed);
+        let mut arguments: Vec<Argument> = known.flat_map(of_argument).collect();
+        // The scene first.
+        arguments.sort_by_key(|argument| argument.option.is_some());
+        Typed { command: name.to_owned(), arguments }
+    }
+
+    /// Whether it has this option, of those that decide pixels.
+    pub(super) fn has(&self, option: &str) -> bool {
+        self.arguments.iter().any(|argument| argument.option.as_deref() == Some(option))
+    }
+
+    /// As clap takes them.
+    pub(super) fn words(&self) -> Vec<String> {
+        let word = |Argument { option, value }: &Argument| match (option, value) {
+            (Some(option), Some(value)) => format!("{option}={value}"),
+            (option, value) => option.as_ref().or(value.as_ref()).cloned().unwrap_or_default(),
+        };
+        self.arguments.iter().map(word).collect()
+    }
+
+    /// The command line for a shell, with options behind it.
+    pub(super) fn line(&self, more: &[(&str, String)]) -> String {
+        let own = self.arguments.iter().flat_map(|argument| [&argument.option, &argument.value]).flatten().cloned();
+        let more = more.iter().flat_map(|(option, value)| [(*option).to_owned(), value.clone()]);
+        let words = ["photonmill".to_owned(), self.command.clone()].into_iter().filter(|word| !word.is_empty()).chain(own).chain(more);
+        words.map(quoted).collect::<Vec<String>>().join(" ")
+    }
+}
+
+fn quoted(word: String) -> String {
+    let is_plain = |letter: char| letter.is_alphanumeric() || "_-./:,=+%@".contains(letter);
+    if !word.is_empty() && word.chars().all(is_plain) { word } else { format!("'{}'", word.replace('\'', r"'\''")) }
+}
