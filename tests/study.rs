@@ -135,7 +135,7 @@ fn the_open_box_is_studied_against_radiosity_and_goes_on_where_it_ended() {
     assert!(page.contains("GPU in 2008") && page.contains("data:image/png;base64,"));
     let strip = first.parts[0].strip.as_ref().unwrap();
     assert!(!strip.frames.is_empty() && strip.frames.iter().all(|frame| frame.error <= frame.asked && frame.size == (240, 240)));
-    assert!(first.parts[1].default.as_ref().is_some_and(|curve| curve.points.len() == 2) && first.parts[0].default.is_none());
+    assert!(first.parts[2].default.as_ref().is_some_and(|curve| curve.points.len() == 2) && first.parts[0].default.is_none());
     let count = first.parts.iter().flat_map(Part::points).count();
     assert_eq!(folder.text("points.csv").lines().count(), 1 + count);
     assert_eq!(folder.text("points.jsonl").lines().count(), 1 + count);

@@ -73,12 +73,10 @@ impl Part {
 
     /// The choice that saves most time for the same error, by as much as is certain.
     pub fn best_choice(&self) -> Option<(Axis, &Curve)> {
-        let gain = |choice: &Choice| match choice.effect {
-            Effect::Differs(_, longer) if longer.value < 1.0 => Some(longer.high),
-            _ => None,
-        };
-        let faster = self.choices().into_iter().filter_map(|choice| Some((gain(&choice)?, choice.axis, choice.curve.label.clone())));
-        let (_, axis, label) = faster.min_by(|one, other| one.0.total_cmp(&other.0))?;
+        let choices = self.choices();
+        let faster = choices.iter().filter_map(|choice| Some((choice.effect.certain_gain()?, choice)));
+        let best = faster.min_by(|one, other| one.0.total_cmp(&other.0))?.1;
+        let (axis, label) = (best.axis, best.curve.label.as_str());
         let comparison = self.comparisons.iter().find(|comparison| comparison.axis == axis)?;
         comparison.curves.iter().find(|curve| curve.label == label).map(|curve| (axis, curve))
     }
@@ -149,7 +147,7 @@ fn steps(least: f64) -> impl Iterator<Item = f64> + Clone {
 }
 
 /// The smallest error that all runs of two curves reach on their way, else that their means do.
-fn common_error(one: &Curve, other: &Curve, least: f64) -> Option<f64> {
+pub fn common_error(one: &Curve, other: &Curve, least: f64) -> Option<f64> {
     let by_means = |error: &f64| one.time_to(*error).is_some() && other.time_to(*error).is_some();
     steps(least).find(|error| one.crosses(*error) && other.crosses(*error)).or_else(|| steps(least).find(by_means))
 }
@@ -167,6 +165,29 @@ pub enum Effect {
     Apart([(f64, f64); 2]),
     /// The budget allowed one point, which compares nothing.
     SinglePoint,
+}
+
+impl Effect {
+    /// Time to the same error over the base's, at most, where that is less; where the two have no error in common, as the noise of both would
+    /// fall with the root of the time.
+    fn certain_gain(self) -> Option<f64> {
+        match self {
+            Effect::Differs(_, longer) if longer.value < 1.0 => Some(longer.high),
+            Effect::Apart([own, base]) if own.0 < base.0 => Some((own.0 / base.0).powi(2) * own.1 / base.1),
+            _ => None,
+        }
+    }
+
+    /// From what buys most to what noise hides.
+    pub fn rank(self) -> (u32, f64) {
+        match self {
+            Effect::Apart([own, base]) if own.0 < base.0 => (0, own.0 / base.0),
+            Effect::Differs(_, longer) => (1, longer.value),
+            Effect::Apart([own, base]) => (2, own.0 / base.0),
+            Effect::Undecided(_, longer) => (3, longer.value),
+            Effect::SinglePoint => (4, 0.0),
+        }
+    }
 }
 
 /// A choice and its effect.

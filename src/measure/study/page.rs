@@ -129,13 +129,7 @@ fn choices(part: &Part) -> Markup {
     let Some(base) = part.base() else { return html! {} };
     let (single, mut choices): (Vec<Choice>, Vec<Choice>) =
         part.choices().into_iter().partition(|choice| choice.effect == Effect::SinglePoint);
-    let rank = |choice: &Choice| match choice.effect {
-        Effect::Differs(_, longer) => (0, longer.value),
-        Effect::Apart([own, base]) => (1, own.0 / base.0),
-        Effect::Undecided(_, longer) => (2, longer.value),
-        Effect::SinglePoint => unreachable!("taken out above"),
-    };
-    choices.sort_by(|one, other| rank(one).partial_cmp(&rank(other)).expect("no effect is NaN"));
+    choices.sort_by(|one, other| one.effect.rank().partial_cmp(&other.effect.rank()).expect("no effect is NaN"));
     let head = html! { tr { th.name { "What each choice buys" } th { "time to the same error" } th { "interval" } th { "faster · slower" } th { "at error" } } };
     let left_out = part.not_measured();
     html! {

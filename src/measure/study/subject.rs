@@ -99,8 +99,13 @@ impl Subject {
             let receivers: Vec<_> = wall_points(size).into_iter().map(|(wall, point)| (point, inward(wall))).collect();
             return Ok(vec![
                 subject("Irradiance of the walls: the paper's box", &reference, axes::of_paper(size, photons), (None, Vec::new())),
-                subject("Irradiance of the walls: the box as triangles", &reference, of_scene(false)?, (None, receivers.clone())),
-                subject("The paper's experiment: rounds of 5000 photons", &reference, axes::of_the_papers_rounds(size), (None, receivers)),
+                subject(
+                    "The paper's experiment: rounds of 5000 photons",
+                    &reference,
+                    axes::of_the_papers_rounds(size),
+                    (None, receivers.clone()),
+                ),
+                subject("Irradiance of the walls: the box as triangles", &reference, of_scene(false)?, (None, receivers)),
             ]);
         }
         if let Some((receivers, reference)) = Reference::floor(&name, size) {

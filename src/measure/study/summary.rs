@@ -1,6 +1,6 @@
 //! Three sentences for whoever has a minute: what an error costs, what to change first, and what not to trust.
 
-use super::findings::{Effect, between, named, percent, ratio};
+use super::findings::{Effect, between, common_error, named, percent, ratio};
 use super::point::Curve;
 use super::{Part, Study};
 use crate::output::words::{duration, times};
@@ -44,9 +44,9 @@ fn first_change(part: &Part) -> String {
             || part.base().map(|base| ("the base settings".to_owned(), base)),
             |(axis, curve)| Some((named(axis, &curve.label), curve)),
         );
-        let errors = default.points.iter().rev().map(|point| point.error().value * 1.001);
         let compared = against.and_then(|(name, curve)| {
-            errors.clone().find_map(|error| Some((name.clone(), error, default.time_to(error)?.value, curve.time_to(error)?.value)))
+            let error = common_error(default, curve, part.least_error)?;
+            Some((name, error, default.time_to(error)?.value, curve.time_to(error)?.value))
         });
         return match compared {
             Some((name, error, own, other)) if own <= other => format!(
@@ -72,6 +72,14 @@ fn first_change(part: &Part) -> String {
                     percent(error),
                     ratio(longer.value),
                     between(longer, ratio)
+                ),
+                Some(Effect::Apart([own, base])) => format!(
+                    "Change this first: {}. It reaches {} in {}, where the base has {} after {}.",
+                    named(axis, &curve.label),
+                    percent(own.0),
+                    duration(own.1),
+                    percent(base.0),
+                    duration(base.1)
                 ),
                 _ => String::new(),
             }
