@@ -98,17 +98,18 @@ fn rust_type(glsl: &str) -> &str {
 }
 
 /// Charts and pictures of the guide.
-const CHARTS: [&str; 10] = [
-    "tools/study/open-box-overview.svg",
+const CHARTS: [&str; 11] = [
+    "tools/study/open-box-main.svg",
     "tools/study/open-box-radius.svg",
     "tools/study/open-box-paper.svg",
-    "tools/study/cornell-spheres-overview.svg",
+    "tools/study/cornell-spheres-main.svg",
     "tools/bench/compaction-lavapipe.svg",
     "tools/bench/peers.svg",
     "tools/bench/h200/compaction.svg",
     "tools/bench/h200-scale/scale-photons.svg",
     "tools/bench/h200-scale/scale-triangles.svg",
     "src/guide/sunlit-room.png",
+    "src/guide/dispersion.png",
 ];
 
 /// Markdown that defines a link for each chart, named as its file. The link is the chart itself, as rustdoc keeps no files
