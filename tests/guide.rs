@@ -63,7 +63,8 @@ const NOT_RUN: [(&str, &str); 13] = [
 ];
 
 /// Commands of which only the options are checked, and why.
-const PARSED: [(&str, &str); 3] = [
+const PARSED: [(&str, &str); 4] = [
+    ("photonmill gallery ", "makes pipelines for every picture; `tests/gallery.rs` runs it"),
     ("photonmill paper ", "takes a minute at any size; `tests/bench.rs` and `tests/cli.rs` run its parts"),
     ("photonmill study ", "compiles pipelines for every choice; `tests/study.rs` runs small studies"),
     ("photonmill bench", "takes a minute at any size; `tests/bench.rs` runs all of it"),

@@ -161,7 +161,7 @@ fn write_png(
     let mut encoder = png::Encoder::new(file, width, height);
     encoder.set_color(kind);
     encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_compression(png::Compression::Fast);
+    encoder.set_compression(png::Compression::Balanced);
     encoder.set_filter(png::Filter::Adaptive);
     for (keyword, text) in metadata.into_iter().flat_map(Metadata::texts) {
         match text.is_ascii() {

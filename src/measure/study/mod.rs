@@ -67,6 +67,8 @@ pub struct Request {
 #[derive(Debug, Serialize)]
 pub struct Study {
     pub photonmill: &'static str,
+    /// The scene's own name.
+    pub title: String,
     pub request: Request,
     pub device: String,
     pub driver: String,
@@ -115,6 +117,7 @@ pub fn run(
     let mut store = Store::open(folder, scene, &request, gpu.facts())?;
     let mut study = Study {
         photonmill: env!("CARGO_PKG_VERSION"),
+        title: scene.name.clone(),
         device: gpu.facts().name.clone(),
         driver: gpu.facts().driver.clone(),
         is_cpu: gpu.facts().kind == "cpu",
@@ -247,9 +250,9 @@ impl Measuring<'_> {
                 let began = Instant::now();
                 let (rounds, seed) = if turn == 0 { (1, request.seed) } else { (rounds, request.seed + turn - 1) };
                 match subject.run(gpu, &group.configurations[which], rounds, seed, cancelled) {
-                    Ok(_) if turn == 0 => {
-                        if began.elapsed() > PATIENCE.max(2 * share) {
-                            let seconds = began.elapsed().as_secs_f64();
+                    Ok(shot) if turn == 0 => {
+                        let seconds = 1e-3 * shot.wall_ms;
+                        if seconds > PATIENCE.max(2 * share).as_secs_f64() {
                             curves[which].left_out = Some(format!("one round takes {seconds:.1} s, too long for the budget"));
                         }
                     }
@@ -275,8 +278,7 @@ const GROWTH: u32 = 4;
 /// A card that idled while references were made takes longer to come to its clock than each run gives it.
 const FIRST_WARM_UP: Duration = Duration::from_secs(3);
 
-/// How long the first round of a configuration may take, pipelines and all, before it is left out; or twice its share of
-/// time, where that is longer.
+/// How long the first round of a configuration may take before it is left out; or twice its share of time, where that is longer.
 const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Of the budget, for runs with default settings, for the map of builders, and most photons in it.
@@ -295,7 +297,7 @@ pub fn write(folder: &Folder, study: &Study) -> Result<()> {
         (folder.file("points.csv"), findings::csv(study)),
     ];
     for (number, part) in study.parts.iter().enumerate() {
-        for (name, drawn) in chart::all(part) {
+        for (name, drawn) in chart::all(study, part) {
             files.push((folder.file(&format!("{}-{name}.svg", number + 1)), drawn.as_file()));
         }
     }

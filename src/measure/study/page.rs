@@ -4,7 +4,6 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, PreEscaped, html};
 
-use super::axes::Axis;
 use super::findings::{Choice, Effect, between, percent, ratio};
 use super::point::Estimate;
 use super::strip::{Frame, Strip};
@@ -14,14 +13,14 @@ use crate::output::words::duration;
 use crate::text::counted;
 
 pub fn html(study: &Study) -> String {
-    let title = format!("What accuracy costs in time: {}", study.request.scene);
+    let title = format!("What accuracy costs in time: {}", study.title);
     let (main, others) = study.parts.split_first().map_or((None, &[][..]), |(main, others)| (Some(main), others));
     let content = html! {
         (head(study, &title))
         @if let Some(part) = main {
-            @if let Some(strip) = &part.strip { (pictures(strip)) }
+            @if let Some(strip) = &part.strip { (pictures(strip, part.least_error)) }
             @for sentence in summary::sentences(study, part) { p.lead { (sentence) } }
-            (chart(main_chart(study, part), "Error against time on logarithmic scales. Bands are 95 % confidence intervals; a line is drawn only where they are narrow."))
+            (chart(charts::main(study, part), "Error against time on logarithmic scales. Bands are 95 % confidence intervals; a line is drawn only where they are narrow. Errors that the reference cannot judge are left out."))
             (choices(part))
         }
         @for part in others {
@@ -51,33 +50,31 @@ fn head(study: &Study, title: &str) -> Markup {
     }
 }
 
-/// Of a study of the paper's box, with the paper's own points.
-fn main_chart(study: &Study, part: &Part) -> Option<crate::output::svg::Chart> {
-    let papers = study.parts.iter().flat_map(|part| &part.comparisons).find(|comparison| comparison.axis == Axis::Paper);
-    let paper = papers.and_then(|comparison| comparison.base()).map(charts::of_the_paper).unwrap_or_default();
-    charts::main(part, &paper, &study.request.peers)
-}
-
-fn pictures(strip: &Strip) -> Markup {
+fn pictures(strip: &Strip, least: f64) -> Markup {
     let full = percent(strip.scale);
     html! {
         div.strip {
-            @for frame in &strip.frames { (self::frame(frame)) }
+            @for frame in &strip.frames { (self::frame(frame, least)) }
         }
         p.scale { "darker, -" (full) span style="background:linear-gradient(90deg,#0072b2,#fff,#d55e00)" {} "brighter, +" (full) " of the mean" }
         @if !strip.frames.is_empty() { (slider(strip)) }
     }
 }
 
-fn frame(frame: &Frame) -> Markup {
+fn frame(frame: &Frame, least: f64) -> Markup {
     html! {
         div {
-            (image(&frame.picture, frame.size, &format!("The picture at an error of {}", percent(frame.error))))
+            (image(&frame.picture, frame.size, &format!("The picture at an error of {}", known_error(frame.error, least))))
             (image(&frame.difference, frame.size, "Its difference from the reference in false colours"))
             strong { (asked(frame)) } " in " strong { (duration(frame.ms)) }
-            div.soft { "true error " (percent(frame.error)) ", " (counted(frame.rounds as usize, "round")) }
+            div.soft { "true error " (known_error(frame.error, least)) ", " (counted(frame.rounds as usize, "round")) }
         }
     }
+}
+
+/// Smaller ones say more of the reference.
+fn known_error(error: f64, least: f64) -> String {
+    if error < least { format!("below {}", percent(least)) } else { percent(error) }
 }
 
 /// A round number.

@@ -19,10 +19,16 @@ fn cost(study: &Study, part: &Part) -> String {
     let device = &study.device;
     let Some((curve, how)) = usual(part) else { return format!("Nothing was measured on {device}.") };
     let mut points: Vec<(f64, f64)> = curve.points.iter().map(|point| (point.ms().value, point.error().value)).collect();
+    points.retain(|point| point.1 >= part.least_error);
     points.dedup_by(|next, before| next.1 >= before.1);
     let reach = |&(ms, error): &(f64, f64)| format!("an error of {} takes {}", percent(error), duration(ms));
     let told: Vec<String> = match points.as_slice() {
-        [] => return format!("Nothing was measured on {device}."),
+        [] => {
+            return format!(
+                "On {device}, {how}, every error measured is below {}, the least that can be judged here.",
+                percent(part.least_error)
+            );
+        }
         [first, .., last] => vec![reach(first), reach(last)],
         [only] => vec![reach(only)],
     };
