@@ -24,8 +24,9 @@ pub fn html(study: &Study) -> String {
             (choices(part))
         }
         @for part in others {
-            section {
-                h2 { (part.quantity) }
+            details {
+                summary { h2 { "What each choice buys: " (part.quantity) } }
+                (chart(charts::main(study, part), ""))
                 (choices(part))
             }
         }
