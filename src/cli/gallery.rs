@@ -10,6 +10,7 @@ use super::progress::{ProgressArgs, ProgressReporter};
 use super::values::{parse_integer, parse_percent, parse_seconds};
 use super::{DeviceArgs, End, complain, say};
 use crate::error::{Result, require, within};
+use crate::gpu::Gpu;
 use crate::measure::gallery::{self, Request};
 use crate::output::destination::Folder;
 
@@ -36,8 +37,7 @@ pub(super) struct GalleryArgs {
 pub(super) fn run(args: &GalleryArgs, cancelled: &AtomicBool) -> Result<End> {
     let folder = Folder::open("-o", &args.output)?;
     let reporter = ProgressReporter::new(&args.progress);
-    let kind = args.device.steady();
-    let gpu = crate::gpu::Gpu::open(&kind)?;
+    let gpu = Gpu::open(&args.device.options())?;
     reporter.device(Some(&gpu));
     let is_cpu = gpu.facts().kind == "cpu";
     // The commands open it for themselves.
@@ -46,7 +46,7 @@ pub(super) fn run(args: &GalleryArgs, cancelled: &AtomicBool) -> Result<End> {
         width: args.size.unwrap_or(if is_cpu { 160 } else { 640 }),
         error: 100.0 * args.error.unwrap_or(if is_cpu { 0.05 } else { 0.01 }),
         seconds: args.time.unwrap_or(if is_cpu { 30.0 } else { 5.0 }),
-        device: args.device.device.clone(),
+        device: device_arguments(&args.device),
     };
     within("--size", u64::from(request.width), 1..=u64::from(MAX_SIDE), "pixels")?;
     require((0.001..=1e6).contains(&request.seconds), "--time", request.seconds, "must be from 1ms to 1000000s")?;
@@ -57,4 +57,14 @@ pub(super) fn run(args: &GalleryArgs, cancelled: &AtomicBool) -> Result<End> {
     }
     say(&format!("wrote {}", folder.path().join("index.html").display()))?;
     Ok(if complete { End::Finished } else { End::Cancelled })
+}
+
+/// As the commands take them.
+fn device_arguments(args: &DeviceArgs) -> Vec<String> {
+    let DeviceArgs { device, memory, validate } = args;
+    let mut all = Vec::new();
+    all.extend(device.iter().flat_map(|device| ["--device".to_owned(), device.clone()]));
+    all.extend(memory.iter().flat_map(|bytes| ["--memory".to_owned(), bytes.to_string()]));
+    all.extend(validate.then(|| "--validate".to_owned()));
+    all
 }

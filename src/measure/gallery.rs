@@ -27,8 +27,8 @@ pub struct Request {
     /// In percent.
     pub error: f64,
     pub seconds: f64,
-    /// `--device`, as it was given.
-    pub device: Option<String>,
+    /// Options that name the device and what it may take.
+    pub device: Vec<String>,
 }
 
 /// A picture of the gallery, before it is made.
@@ -154,13 +154,12 @@ fn show(folder: &Path, request: &Request, exhibit: &'static Exhibit) -> Result<S
     let picture = format!("{}.png", exhibit.name);
     let report = place(&format!("{}.json", exhibit.name));
     let end = format!("--error {error}% --time {seconds}s");
-    let device: Vec<String> = request.device.iter().flat_map(|device| ["--device".to_owned(), device.clone()]).collect();
     // As the page shows it, and with the places of files; no folder's name is cut at its spaces.
     let run = |words: &str, outputs: &[(&str, String)]| {
         let mut arguments: Vec<String> = words.split(' ').map(str::to_owned).collect();
         arguments.extend(outputs.iter().flat_map(|(option, value)| [(*option).to_owned(), value.clone()]));
         arguments.extend(["--json".to_owned(), report.clone(), "--quiet".to_owned()]);
-        program(exhibit.name, &[arguments, device.clone()].concat())
+        program(exhibit.name, &[arguments, request.device.clone()].concat())
     };
     let (command, made) = match exhibit.kind {
         Kind::Render(scene) => {
