@@ -207,7 +207,9 @@ fn files_say_how_they_were_made() {
     assert_eq!(made.command, "photonmill --reflectance 0.5 --photons 500 --mesh 8 --rounds 3 -o picture.png");
     place.succeed(&format!("{} -q", made.command.strip_prefix("photonmill ").unwrap()));
     assert!(place.content("picture.png") == place.content("box.png"));
-    place.assert_refused([("repeat box.png", ["box.png: is of the paper's box", "command line"])]);
+    let (said, _) = place.succeed("repeat box.png -o again.png -q");
+    assert!(said.contains("box.png: repeated, all ") && place.content("again.png") == place.content("box.png"), "{said}");
+    place.assert_refused([("repeat box.png --scene a.glb -q", ["--scene", "a.glb", "the paper's box"])]);
     // Nothing of where it was made.
     let folder = place.path().display().to_string();
     assert!(!texts.values().any(|text| text.contains(&folder)) && !format!("{:?}", exr.settings).contains(&folder));

@@ -62,9 +62,18 @@ pub(super) fn of_room(typed: &Typed, outcome: &RoomResult, error: &FilmError, fo
         },
         command: typed.line(&builder.into_iter().chain(options).collect::<Vec<_>>()),
         settings: settings_with_effect(settings),
-        repeat: Repeat::Not(
-            "is of the paper's box, and only pictures of render are repeated; run the command line in it instead".to_owned(),
-        ),
+        repeat: match outcome.end {
+            End::Rounds | End::Error | End::Photons => Repeat::With {
+                command: typed.command.clone(),
+                arguments: typed.words(),
+                division: Division::of(&SceneSettings::default()),
+                tiles: None,
+            },
+            // A round may be cut short then.
+            End::Time | End::Cancelled => {
+                Repeat::Not("was ended early, at a moment that no other run meets; run it with --rounds instead".to_owned())
+            }
+        },
     }
 }
 

@@ -9,7 +9,7 @@ use clap::{Args, CommandFactory, FromArgMatches};
 use super::chosen::Chosen;
 use super::options::DevicesOfRunArgs;
 use super::progress::ProgressArgs;
-use super::render::Again;
+use super::render::{Again, Repeated};
 use super::typed::Typed;
 use super::{Cli, Command, End, optional_file, say, usage};
 use crate::error::{Error, Result};
@@ -21,7 +21,7 @@ use crate::scene::file;
 
 #[derive(Args)]
 pub(super) struct RepeatArgs {
-    /// Picture of `render`, a .png or .exr
+    /// Picture of `render` or of the paper's box, a .png or .exr
     #[arg(value_name = "FILE")]
     pub(super) file: PathBuf,
     /// Write the picture that comes out, in the format of FILE
@@ -56,12 +56,29 @@ pub(super) fn run(args: RepeatArgs, cancelled: &AtomicBool) -> Result<End> {
     };
     let damaged = |reason: &dyn std::fmt::Display| refuse(format!("says otherwise than photonmill does how it was made ({reason})"));
     let chosen = Chosen::of_picture(&made, division, tiles).map_err(|error| damaged(&error))?;
-    let (cli, typed) = parsed(command, arguments, &chosen).map_err(|reason| damaged(&reason))?;
-    let Some(Command::Render(mut render)) = cli.command else { return Err(damaged(&"it is of no scene")) };
-    let has_moved = args.scene.is_some();
-    render.set(args.scene, args.progress, args.device);
-    let again = Again { chosen: &chosen, made: &made, path: &path, has_moved, typed: &typed, format };
-    let repeated = super::render::again(&render, &again, cancelled)?;
+    let (mut cli, typed) = parsed(command, arguments, &chosen).map_err(|reason| damaged(&reason))?;
+    let repeated = match cli.command {
+        Some(Command::Render(mut render)) => {
+            let has_moved = args.scene.is_some();
+            render.set(args.scene, args.progress, args.device);
+            let again = Again { chosen: &chosen, made: &made, path: &path, has_moved, typed: &typed, format };
+            super::render::again(&render, &again, cancelled)?
+        }
+        None => {
+            let elsewhere = "is for pictures of a scene's file, and this one is of the paper's box; leave it out";
+            args.scene.map_or(Ok(()), |scene| Err(Error::setting("--scene", scene, elsewhere)))?;
+            let folder = tempfile::tempdir().map_err(|error| refuse(format!("cannot be repeated: {}", error.kind())))?;
+            let place = folder.path().join(if format == Format::Png { "repeated.png" } else { "repeated.exr" });
+            cli.run.set(place.clone(), args.progress, args.device);
+            if matches!(super::run::run(&cli.run, &typed, cancelled)?, End::Cancelled) {
+                return Ok(End::Cancelled);
+            }
+            let content = file::read(&place).map_err(refuse)?;
+            let devices = Metadata::read(&content).map_err(refuse)?.devices;
+            Repeated { content, devices }
+        }
+        Some(_) => return Err(damaged(&"it is of no picture")),
+    };
     let differing = differing(&content, &repeated.content, format).map_err(refuse)?;
     if let Some(output) = output {
         write_all([(output, repeated.content)])?;

@@ -195,6 +195,11 @@ value_enum!(EmissionArg => EmissionLaw { Uniform, Cosine });
 value_enum!(PhongDirectionArg => PhongDirection { Mirror, Sampled });
 
 impl RunArgs {
+    /// Where the picture goes, how it is watched, and what makes it.
+    pub(super) fn set(&mut self, output: PathBuf, progress: ProgressArgs, device: DevicesOfRunArgs) {
+        (self.output, self.progress, self.device) = (output, progress, device);
+    }
+
     pub(super) fn settings(&self) -> RoomSettings {
         let preset = RoomSettings::preset(self.preset.map_or(Preset::Modified, Preset::from));
         let photons = self.photons.unwrap_or(preset.photons);
