@@ -48,7 +48,7 @@ enum Kind {
     Lightmaps(&'static str, &'static [&'static str]),
 }
 
-/// `cornell-spheres` with and without an effect, at one exposure.
+/// In the order of the page; pictures of `cornell-spheres` share an exposure, so that they can be compared.
 const EXHIBITS: [Exhibit; 11] = [
     Exhibit {
         name: "caustic",

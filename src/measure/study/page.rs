@@ -21,6 +21,9 @@ pub fn html(study: &Study) -> String {
             @if let Some(strip) = &part.strip { (pictures(strip, part.least_error)) }
             @for sentence in summary::sentences(study, part) { p.lead { (sentence) } }
             (chart(charts::main(study, part), "Error against time on logarithmic scales. Bands are 95 % confidence intervals; a line is drawn only where they are narrow. Errors that the reference cannot judge are left out."))
+            @if !study.request.peers.is_empty() {
+                p.soft { "Other programs' times are of the machine that their file was made on, and on the open box of lamps by the cosine law." }
+            }
             (choices(part))
         }
         @for part in others {

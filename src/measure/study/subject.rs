@@ -313,12 +313,14 @@ fn own_reference(
     let (film, error) = (&lit.film, lit.error());
     let all = |value: &dyn Fn(usize) -> DVec3| (0..film.pixels()).flat_map(|pixel| value(pixel).to_array()).collect::<Vec<f64>>();
     let surfaces = film.surface_means().collect::<Vec<_>>();
+    let errors = all(&|pixel| film.standard_error(pixel));
     let is_lamp = |pixel: usize| film.mean(pixel) != surfaces[pixel];
     let reference = Reference {
         method: "a long run of photonmill itself with other random numbers: path tracing cannot find the caustics of lights without a surface. What such runs have in common, as a bias, is not in the errors here".to_owned(),
         values: all(&|pixel| film.mean(pixel)),
-        standard_errors: all(&|pixel| film.standard_error(pixel)).into_iter().map(|error| if error.is_finite() { error } else { 0.0 }).collect(),
-        counts: (0..3 * film.pixels()).map(|place| !is_lamp(place / 3)).collect(),
+        // Places whose error is not known judge nothing.
+        counts: errors.iter().enumerate().map(|(place, error)| error.is_finite() && !is_lamp(place / 3)).collect(),
+        standard_errors: errors,
         relative_error: 0.0,
     }
     .with_own_error();

@@ -1,7 +1,7 @@
 //! Three sentences for whoever has a minute: what an error costs, what to change first, and what not to trust.
 
 use super::findings::{Effect, between, common_error, named, percent, ratio};
-use super::point::Curve;
+use super::point::{CONFIDENCE, Curve};
 use super::{Part, Study};
 use crate::output::words::{duration, times};
 
@@ -52,17 +52,27 @@ fn first_change(part: &Part) -> String {
         );
         let compared = against.and_then(|(name, curve)| {
             let error = common_error(default, curve, part.least_error)?;
-            Some((name, error, default.time_to(error)?.value, curve.time_to(error)?.value))
+            Some((name, error, curve.times_longer(default, error, CONFIDENCE)?))
         });
         return match compared {
-            Some((name, error, own, other)) if own <= other => format!(
-                "Leave the settings alone: to {} the defaults are {} as fast as the best single change that was tried ({name}).",
+            Some((name, error, longer)) if longer.low > 1.0 => format!(
+                "Leave the settings alone: to {} the best single change that was tried ({name}) takes {} as long as the defaults ({}).",
                 percent(error),
-                ratio(other / own)
+                ratio(longer.value),
+                between(longer, ratio)
             ),
-            Some((name, error, own, other)) => {
-                format!("Change this first: {name}. It reaches {} in {} of the defaults' time.", percent(error), ratio(other / own))
-            }
+            Some((name, error, longer)) if longer.high < 1.0 => format!(
+                "Change this first: {name}. It reaches {} in {} of the defaults' time ({}).",
+                percent(error),
+                ratio(longer.value),
+                between(longer, ratio)
+            ),
+            Some((name, error, longer)) => format!(
+                "To {} the defaults and the best single change that was tried ({name}, {} of their time, {}) could not be told apart.",
+                percent(error),
+                ratio(longer.value),
+                between(longer, ratio)
+            ),
             None => "The defaults and the other choices reached no error in common within this budget, so this study cannot tell which is faster."
                 .to_owned(),
         };
