@@ -955,6 +955,78 @@ struct UnpackedScene {
     uint child_nodes;
 };
 
+// What a window shows of a scene's film; see `glsl/kernels/show_scene.comp`.
+struct ShowScenePush {
+    uint pixel_count;
+    // SHOW_...
+    uint shows;
+    uint rounds;
+    // Whole blocks, and the rounds of these.
+    uint blocks;
+    uint rounds_of_blocks;
+    // W/m2/sr of a film unit.
+    float unit;
+    // Mean radiance of the picture, of which errors are relative.
+    float mean;
+};
+
+// The same of the paper's box; see `glsl/kernels/show_room.comp`.
+struct ShowRoomPush {
+    uint width;
+    uint height;
+    vec3 eye;
+    vec3 forward;
+    vec3 right;
+    vec3 up;
+    uint shows;
+    uint channel_count;
+    // Texels along each side of a wall, and walls, each with its texels one behind the other.
+    uint mesh;
+    uint wall_count;
+    // Of the box.
+    vec3 middle;
+    uint rounds;
+    // Illumination that a film unit is worth after these rounds, and the mean of what is shown, of which errors are relative.
+    float unit;
+    float mean;
+};
+
+// What is shown, as pixels of a window; see `glsl/kernels/display.comp`.
+struct DisplayPush {
+    // Of the window, and of what is shown.
+    uint width;
+    uint height;
+    uint shown_width;
+    uint shown_height;
+    // Pixels of the window along each side of one that is shown.
+    uint zoom;
+    // Stops by which values are made brighter.
+    float stops;
+    // 1: values are errors, for false colours.
+    uint is_error;
+    // 1: values are radiance; 0: the paper's display values.
+    uint is_light;
+    // 1: the window wants blue first.
+    uint blue_first;
+};
+
+// Photons of a map as dots; see `glsl/kernels/show_photons.comp`.
+struct ShowPhotonsPush {
+    uint photon_count;
+    uint width;
+    uint height;
+    uint shown_width;
+    uint shown_height;
+    uint zoom;
+    vec3 eye;
+    vec3 forward;
+    // To the picture's right and upper edge, as camera rays have them.
+    vec3 right;
+    vec3 up;
+    uint is_orthographic;
+    uint colour;
+};
+
 // A measurement of a device's limits; see `glsl/kernels/measure_...`.
 struct MeasurePush {
     uint item_count;

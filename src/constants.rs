@@ -134,6 +134,13 @@ constants! {
     PART_CAUSTIC = 4;
     PART_INDIRECT = 8;
     PART_COUNT = 4;
+    /// What a window shows: all light, one of its parts, or the standard error over the mean of the picture.
+    SHOW_ALL = 0;
+    SHOW_DIRECT = 1;
+    SHOW_SPECULAR = 2;
+    SHOW_CAUSTIC = 3;
+    SHOW_INDIRECT = 4;
+    SHOW_ERROR = 5;
     /// Kinds of chances by which light may reach a pixel.
     HIT_SHADOW_RAY = 0;
     HIT_CAUSTIC_PHOTON = 1;

@@ -69,6 +69,10 @@ pub enum Error {
     )]
     DeviceWrong { device: String, what: String },
 
+    /// There is no window, or nothing that shows pictures in it.
+    #[error("no window: {reason}; `photonmill render` makes pictures without one, and `render --display` shows them on another machine")]
+    NoWindow { reason: String },
+
     /// A measurement of a device's limits came out wrong.
     #[error(
         "{device}: computes {what} wrongly, so its measurements are not valid; update its driver, or choose another device with --device"

@@ -34,7 +34,7 @@
 //!
 //! ```text
 //! constants, error, text, records, rng, ledger, timings < settings, path, photon < scene < plan < cpu, gpu < engine < output
-//! output < bake < measure < cli;  scene < verify::judge;  engine < verify::selfcheck;  output < verify::compare < cli
+//! output < bake < measure < cli;  output < view < cli;  scene < verify::judge;  engine < verify::selfcheck;  output < verify::compare < cli
 //! ```
 //!
 //! `tests/architecture.rs` checks it.
@@ -62,3 +62,4 @@ pub mod settings;
 pub mod text;
 pub mod timings;
 pub mod verify;
+pub mod view;

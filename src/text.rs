@@ -47,6 +47,12 @@ pub fn refusal(error: &io::Error) -> String {
     }
 }
 
+/// A word as a shell takes it.
+pub fn quoted(word: String) -> String {
+    let is_plain = |letter: char| letter.is_alphanumeric() || "_-./:,=+%@".contains(letter);
+    if !word.is_empty() && word.chars().all(is_plain) { word } else { format!("'{}'", word.replace('\'', r"'\''")) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -41,6 +41,15 @@ Examples:
   photonmill render scene.glb -o picture.png --camera Camera.001 --time 1m --error-image error.exr
       Another camera, one minute, and the standard error of each pixel";
 
+pub(super) const VIEW: &str = "\
+Examples:
+  photonmill view scene.glb
+      A window: drag to look around, wheel to come nearer, W A S D to fly
+  photonmill view cornell-spheres --size 640x480 --photons 65536
+      A built-in scene, with a picture of this size
+  photonmill view box
+      The paper's box, round by round";
+
 pub(super) const REPEAT: &str = "\
 Examples:
   photonmill repeat picture.exr

@@ -5,11 +5,12 @@ use std::sync::atomic::AtomicBool;
 
 use clap::{ArgMatches, Args, Command, FromArgMatches, Subcommand};
 
+use super::camera::named;
 use super::interrupt::interruptible;
 use super::options::{CommonArgs, TimedDeviceArgs};
 use super::picture_size::PictureSize;
 use super::progress::{ProgressArgs, ProgressReporter};
-use super::scene::{PhotonArgs, SceneArgs, camera, geometry};
+use super::scene::{PhotonArgs, SceneArgs, geometry};
 use super::values::{parse_integer, value_enum};
 use super::{End, JsonOrStdoutArg, complain, device_failed, optional_file, say};
 use crate::engine;
@@ -142,7 +143,7 @@ fn make(args: &MakeArgs, cancelled: &AtomicBool) -> Result<End> {
     check_not_read(std::slice::from_ref(&output), [args.scene.path()])?;
     let reporter = ProgressReporter::new(&args.progress);
     let scene = args.scene.open(&reporter)?;
-    let camera = camera(&scene, args.camera.as_deref())?;
+    let camera = named(&scene, args.camera.as_deref())?;
     let (width, height) = PictureSize::resolve(None, &camera, &reporter)?;
     let camera = if scene.cameras.is_empty() { scene.camera_around(f64::from(width) / f64::from(height)) } else { camera };
     let geometry = geometry(&scene, &settings, &reporter)?;

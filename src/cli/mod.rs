@@ -2,6 +2,7 @@
 
 mod bake;
 mod bench;
+mod camera;
 mod chosen;
 mod compare;
 mod devices;
@@ -30,6 +31,7 @@ mod study;
 mod typed;
 mod usage;
 mod values;
+mod view;
 
 use std::ffi::OsString;
 use std::io::{ErrorKind, Write};
@@ -66,6 +68,9 @@ enum Command {
     /// Render a picture of a scene
     #[command(after_help = help::RENDER)]
     Render(render::RenderArgs),
+    /// Look at a scene, or at the paper's box, while its picture is refined, and fly through it
+    #[command(after_help = help::VIEW)]
+    View(view::ViewArgs),
     /// Bake the irradiance of all surfaces of a scene into lightmaps
     #[command(after_help = help::BAKE)]
     Bake(bake::BakeArgs),
@@ -228,6 +233,7 @@ pub fn main() -> u8 {
         None => interruptible(|| run::run(&cli.run, &Typed::of(&matches, &command), &cancelled)),
         Some(Command::Devices(args)) => devices::run(&args).map(|()| End::Finished),
         Some(Command::Render(args)) => render::run(&args, &Typed::of(&matches, &command), &cancelled),
+        Some(Command::View(args)) => view::run(&args, &Typed::of(&matches, &command), &cancelled),
         Some(Command::Repeat(args)) => repeat::run(args, &cancelled),
         Some(Command::Bake(args)) => bake::run(&args, &cancelled),
         Some(Command::Probe(args)) => probe::run(&args, &cancelled),

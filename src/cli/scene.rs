@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::Args;
-use glam::{DVec2, Vec3};
+use glam::Vec3;
 
+use super::camera::CameraArgs;
 use super::chosen::{Chosen, ChosenArgs};
 use super::keep::KeepArgs;
 use super::options::CommonArgs;
-use super::picture_size::{PictureSize, parse_size};
 use super::progress::ProgressReporter;
 use super::stop::StopArgs;
 use super::values::{BuilderArg, SwitchArg, builder_parser, effect_parser, parse_colour, parse_integer, parse_number, value_enum};
@@ -23,7 +23,7 @@ use crate::scene::daylight;
 use crate::scene::geometry::Geometry;
 use crate::scene::light::{Light, LightKind};
 use crate::scene::sky::Sky;
-use crate::scene::{Camera, Lens, Reading, Scene, built_in};
+use crate::scene::{Camera, Reading, Scene, built_in};
 use crate::settings::scene::{Effect, Filter, Illumination, Kernel, MAX_ROUNDS, Part, SceneSettings, Stop};
 use crate::settings::{Builder, Math};
 use crate::text::counted;
@@ -179,19 +179,8 @@ pub(super) struct TransportArgs {
 pub(super) struct PictureArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Camera by name [default: the first one; one that sees the whole scene if it has none]
-    #[arg(long, value_name = "NAME", help_heading = "Scene")]
-    camera: Option<String>,
-    /// Size of the picture in pixels; a width alone takes its height from the camera's aspect ratio [default: about 307200
-    /// pixels in the camera's aspect ratio, 640x480 if it has none]
-    #[arg(long, value_name = "WIDTH[xHEIGHT]", value_parser = parse_size, allow_hyphen_values = true, help_heading = "Scene")]
-    size: Option<PictureSize>,
-    /// Diameter of the camera's lens, metres: what is not in focus is blurred [default: 0, a pinhole]
-    #[arg(long, value_name = "METRES", value_parser = parse_number::<f64>, allow_hyphen_values = true, help_heading = "Scene")]
-    aperture: Option<f64>,
-    /// Distance of the plane in focus, metres [default: that of what the middle of the picture shows]
-    #[arg(long, value_name = "METRES", value_parser = parse_number::<f64>, allow_hyphen_values = true, requires = "aperture", help_heading = "Scene")]
-    focus: Option<f64>,
+    #[command(flatten)]
+    camera: CameraArgs,
     #[command(flatten)]
     pub(super) transport: TransportArgs,
     /// Compute only this part of the light; the four parts sum to `all` exactly
@@ -243,9 +232,6 @@ value_enum!(PartArg => Part {
     Indirect,
 });
 
-/// Metres. Rays through a lens are computed in 24 bits.
-const MOST_APERTURE: f64 = 1e6;
-const MOST_FOCUS: f64 = 1e12;
 /// W/m2/sr. The power of a large scene under more is no number.
 const MOST_RADIANCE: f32 = 1e30;
 
@@ -469,43 +455,11 @@ impl PictureArgs {
     }
 
     pub(super) fn open(&self, settings: &SceneSettings, reporter: &ProgressReporter) -> Result<Subject> {
-        self.check_lens()?;
+        self.camera.check()?;
         let scene = self.scene.open(reporter)?;
-        let mut camera = camera(&scene, self.camera.as_deref())?;
-        let (width, height) = PictureSize::resolve(self.size, &camera, reporter)?;
-        if scene.cameras.is_empty() {
-            camera = scene.camera_around(f64::from(width) / f64::from(height));
-        }
-        camera.lens = self.lens(&scene, &camera, reporter)?;
+        let (camera, [width, height]) = self.camera.resolve(&scene, reporter)?;
         let geometry = geometry(&scene, settings, reporter)?;
         Ok(Subject { scene, camera, width, height, geometry })
-    }
-}
-
-impl PictureArgs {
-    /// Before a scene is read, which may take long.
-    fn check_lens(&self) -> Result<()> {
-        if let Some(aperture) = self.aperture {
-            require((0.0..=MOST_APERTURE).contains(&aperture), "--aperture", aperture, format!("must be 0 to {MOST_APERTURE:e} metres"))?;
-        }
-        if let Some(focus) = self.focus {
-            let allowed = || format!("must be above 0 and at most {MOST_FOCUS:e} metres, which is as good as infinity");
-            require(focus > 0.0 && focus <= MOST_FOCUS, "--focus", focus, allowed())?;
-        }
-        Ok(())
-    }
-
-    fn lens(&self, scene: &Scene, camera: &Camera, reporter: &ProgressReporter) -> Result<Option<Lens>> {
-        let Some(aperture) = self.aperture.filter(|aperture| *aperture > 0.0) else { return Ok(None) };
-        let in_the_middle = || {
-            let (origin, direction) = camera.ray(0.0, 0.0, 1.0, DVec2::ZERO);
-            let focus = scene.distance_along(origin, direction).ok_or_else(|| {
-                Error::setting("--aperture", aperture, "needs --focus: the middle of the picture shows nothing to focus on")
-            })?;
-            reporter.status(&format!("focus at {focus:.4} m, on what the middle of the picture shows"));
-            Ok(focus)
-        };
-        Ok(Some(Lens { radius: 0.5 * aperture, focus: self.focus.map_or_else(in_the_middle, Ok)? }))
     }
 }
 
@@ -535,21 +489,5 @@ pub(super) fn stages<'a>(what: &'a str, reporter: &'a ProgressReporter) -> impl 
         if reported.replace(step) != Some(step) {
             reporter.status(&format!("{what}: {stage}, {} %", 10 * step.1));
         }
-    }
-}
-
-/// The camera by name, else the scene's first, else one that sees all of it.
-pub(super) fn camera(scene: &Scene, name: Option<&str>) -> Result<Camera> {
-    match name {
-        Some(name) => scene.cameras.iter().find(|camera| camera.name == name).cloned().ok_or_else(|| {
-            let names: Vec<&str> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
-            let there = if names.is_empty() {
-                "no such camera: the scene has none; leave --camera out".to_owned()
-            } else {
-                format!("must be one of {}", names.join(", "))
-            };
-            Error::setting("--camera", name, there)
-        }),
-        None => Ok(scene.first_camera()),
     }
 }

@@ -4,6 +4,8 @@
 use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Command};
 
+use crate::text::quoted;
+
 /// Headings of options that change no pixel: where results go, how they are made and watched, and when the run ends, of which the
 /// rounds that it had say enough.
 const WITHOUT_EFFECT: [&str; 6] = ["Output", "Messages", "Checks", "Device", "When to stop", "Implementation"];
@@ -83,9 +85,4 @@ impl Typed {
         let words = ["photonmill".to_owned(), self.command.clone()].into_iter().filter(|word| !word.is_empty()).chain(own).chain(more);
         words.map(quoted).collect::<Vec<String>>().join(" ")
     }
-}
-
-fn quoted(word: String) -> String {
-    let is_plain = |letter: char| letter.is_alphanumeric() || "_-./:,=+%@".contains(letter);
-    if !word.is_empty() && word.chars().all(is_plain) { word } else { format!("'{}'", word.replace('\'', r"'\''")) }
 }

@@ -163,70 +163,120 @@ pub struct RunState<'a> {
     end: Option<End>,
 }
 
-/// Runs a world that is set up to its end.
-pub fn run<W: World, Plan: Clone>(
-    mut world: W,
-    mut recorder: W::Recorder,
-    plan: &Plan,
-    task: Task,
-    control: &mut Control,
-) -> Result<RunResult<Plan, W::Film>> {
-    let mut state = RunState::new(task, &recorder, control)?;
-    // What was saved may be enough, or have to be handed over.
-    if state.end.is_none() && (state.hands_over || state.watch.may_end(state.blocks(), state.emitted)) {
-        state.pause(&mut world, &mut recorder, control)?;
+/// A run under way: a world that is set up, what its rounds are recorded with, and how far it has come.
+pub struct Run<'a, W: World> {
+    pub world: W,
+    pub recorder: W::Recorder,
+    pub state: RunState<'a>,
+}
+
+impl<'a, W: World> Run<'a, W> {
+    /// Goes on with what was saved, if anything was.
+    pub fn new(world: W, recorder: W::Recorder, task: Task<'a>, control: &mut Control) -> Result<Run<'a, W>> {
+        let state = RunState::new(task, &recorder, control)?;
+        let mut run = Run { world, recorder, state };
+        // What was saved may be enough, or have to be handed over.
+        let state = &run.state;
+        if state.end.is_none() && (state.hands_over || state.watch.may_end(state.blocks(), state.emitted)) {
+            run.state.pause(&mut run.world, &mut run.recorder, control)?;
+        }
+        Ok(run)
     }
-    while state.end.is_none() {
+
+    pub fn has_ended(&self) -> bool {
+        self.state.end.is_some()
+    }
+
+    /// One more round, of a run that has not ended.
+    pub fn round(&mut self, control: &mut Control) -> Result<()> {
+        let Run { world, recorder, state } = self;
         let mut is_cut = false;
         let round = recorder.round(|recorder| {
             for part in 0..state.task.parts_per_round {
-                if part > 0 && state.pause(&mut world, recorder, control)? {
+                if part > 0 && state.pause(world, recorder, control)? {
                     is_cut = true;
                     return Ok(());
                 }
-                world.trace(recorder, &mut state, part)?;
+                world.trace(recorder, state, part)?;
             }
-            state.end_round(&mut world, recorder)
+            state.end_round(world, recorder)
         });
         match round {
             // A round cut short is no part of the film; without a first round there is none.
             Err(Error::Interrupted) if state.rounds() > 0 => {
-                state.collect(&mut world, &mut recorder, true)?;
+                state.collect(world, recorder, true)?;
                 state.end = Some(if control.cancelled.load(Ordering::Relaxed) { End::Cancelled } else { End::Time });
             }
             Err(error) => return Err(error),
-            Ok(()) if is_cut => break,
+            Ok(()) if is_cut => {}
             Ok(()) => {
-                state.pause(&mut world, &mut recorder, control)?;
+                state.pause(world, recorder, control)?;
             }
         }
+        Ok(())
     }
-    let film = world.film(&mut recorder, &state)?();
-    if let Some(save) = control.keep.save.as_mut().filter(|_| !state.done.is_empty()) {
-        save.save(&Arc::new(state.to_be_saved()(film.clone().into())), true)?;
+
+    /// Runs what is recorded and counts the fates of its photons, as one must who looks at a run between two of its rounds.
+    pub fn collect(&mut self) -> Result<()> {
+        self.state.collect(&mut self.world, &mut self.recorder, false)
     }
-    let nonfinite_values = world.nonfinite_values(&mut recorder)?;
-    let device = state.task.device;
-    if let Some((gpu, _)) = device {
-        gpu.check_validation()?;
+
+    /// What all whole blocks have left.
+    pub fn film(&mut self) -> Result<W::Film> {
+        Ok(self.world.film(&mut self.recorder, &self.state)?())
     }
-    let [dispatches, submissions] = recorder.counts();
-    Ok(RunResult {
-        losses: world.losses(&film, state.fates()),
-        film,
-        left_out: if state.blocks() > 0 { state.emitted - state.emitted_of_blocks } else { 0 },
-        fates: state.fates().to_vec(),
-        device: device.map(|(gpu, _)| gpu.facts().clone()),
-        more_devices: Vec::new(),
-        end: state.end.expect("the run has ended"),
-        bias: None,
-        dispatches,
-        submissions,
-        pipelines: device.map_or(0, |(gpu, before)| gpu.pipeline_count() - before),
-        nonfinite_values,
-        timings: recorder.finish(),
-        plan: plan.clone(),
-    })
+
+    /// Begins anew from round 0, with a world that knows nothing of the rounds before.
+    pub fn begin_anew(&mut self, task: Task<'a>, control: &mut Control) -> Result<()> {
+        self.state = RunState::new(task, &self.recorder, control)?;
+        Ok(())
+    }
+
+    /// What a run that has ended leaves behind.
+    fn result<Plan: Clone>(self, plan: &Plan, control: &mut Control) -> Result<RunResult<Plan, W::Film>> {
+        let Run { mut world, mut recorder, state } = self;
+        let film = world.film(&mut recorder, &state)?();
+        if let Some(save) = control.keep.save.as_mut().filter(|_| !state.done.is_empty()) {
+            save.save(&Arc::new(state.to_be_saved()(film.clone().into())), true)?;
+        }
+        let nonfinite_values = world.nonfinite_values(&mut recorder)?;
+        let device = state.task.device;
+        if let Some((gpu, _)) = device {
+            gpu.check_validation()?;
+        }
+        let [dispatches, submissions] = recorder.counts();
+        Ok(RunResult {
+            losses: world.losses(&film, state.fates()),
+            film,
+            left_out: if state.blocks() > 0 { state.emitted - state.emitted_of_blocks } else { 0 },
+            fates: state.fates().to_vec(),
+            device: device.map(|(gpu, _)| gpu.facts().clone()),
+            more_devices: Vec::new(),
+            end: state.end.expect("the run has ended"),
+            bias: None,
+            dispatches,
+            submissions,
+            pipelines: device.map_or(0, |(gpu, before)| gpu.pipeline_count() - before),
+            nonfinite_values,
+            timings: recorder.finish(),
+            plan: plan.clone(),
+        })
+    }
+}
+
+/// Runs a world that is set up to its end.
+pub fn run<W: World, Plan: Clone>(
+    world: W,
+    recorder: W::Recorder,
+    plan: &Plan,
+    task: Task,
+    control: &mut Control,
+) -> Result<RunResult<Plan, W::Film>> {
+    let mut run = Run::new(world, recorder, task, control)?;
+    while !run.has_ended() {
+        run.round(control)?;
+    }
+    run.result(plan, control)
 }
 
 /// Refuses arithmetic that the device does not do.
@@ -376,6 +426,11 @@ impl<'a> RunState<'a> {
         if self.blocks() > 0 { &self.fates_of_blocks } else { &self.fates_of_rest }
     }
 
+    /// Of all photons that were counted, those under way among them.
+    pub fn ledger(&self) -> Ledger {
+        sum_of(&self.fates_of_blocks).plus(&sum_of(&self.fates_of_rest))
+    }
+
     /// Photons that the film is of.
     pub fn emitted(&self) -> u64 {
         if self.blocks() > 0 { self.emitted_of_blocks } else { self.emitted }
@@ -486,8 +541,7 @@ impl<'a> RunState<'a> {
         let most_rounds = if self.share.of > 1 { self.share.count(self.wanted()) * rounds_per_block } else { self.task.rounds };
         let rounds =
             if self.is_whole() || self.is_short() { f64::from(self.rounds()) } else { self.emitted as f64 / photons_per_round as f64 };
-        let progress =
-            self.watch.progress(rounds, most_rounds, photons_per_round, sum_of(&self.fates_of_blocks).plus(&sum_of(&self.fates_of_rest)));
+        let progress = self.watch.progress(rounds, most_rounds, photons_per_round, self.ledger());
         if counts_photons {
             Progress { done: self.emitted, total: photons_per_round * u64::from(most_rounds), ..progress }
         } else {

@@ -1,11 +1,14 @@
 //! Instance, choice of a physical device, and the logical device with its one queue.
 
 use std::ffi::CStr;
+use std::sync::Arc;
 
 use ash::vk;
 use serde::Serialize;
+use winit::window::Window;
 
 use super::kernels::MAX_BUFFERS;
+use super::window::instance_extensions;
 use super::{call, validation::Messages};
 use crate::error::{Error, Result};
 
@@ -69,14 +72,14 @@ impl DeviceFacts {
 }
 
 /// Loads the Vulkan loader at run time and makes an instance.
-pub(super) fn instance(validate: bool) -> Result<(ash::Entry, ash::Instance, Option<Messages>)> {
+pub(super) fn instance(validate: bool, window: Option<&Arc<Window>>) -> Result<(ash::Entry, ash::Instance, Option<Messages>)> {
     let no_vulkan = |reason: String| Error::NoVulkan { reason };
     // SAFETY: the loader is the system's own library; its initialisers are trusted.
     let entry = unsafe { ash::Entry::load() }.map_err(|_| no_vulkan("the Vulkan loader (libvulkan) is not installed".into()))?;
     let app = vk::ApplicationInfo::default().application_name(c"photonmill").api_version(vk::API_VERSION_1_3);
 
     let mut layers = Vec::new();
-    let mut extensions = Vec::new();
+    let mut extensions = window.map_or(Ok(&[][..]), |window| instance_extensions(window))?.to_vec();
     if validate {
         // SAFETY: plain enumeration.
         let present = call("vkEnumerateInstanceLayerProperties", || unsafe { entry.enumerate_instance_layer_properties() })?;
@@ -95,7 +98,12 @@ pub(super) fn instance(validate: bool) -> Result<(ash::Entry, ash::Instance, Opt
         info = info.push_next(&mut features);
     }
     // SAFETY: all pointers in `info` are alive.
-    let instance = unsafe { entry.create_instance(&info, None) }.map_err(|code| no_vulkan(format!("vkCreateInstance says {code}")))?;
+    let instance = unsafe { entry.create_instance(&info, None) }.map_err(|code| match (code, window) {
+        (vk::Result::ERROR_EXTENSION_NOT_PRESENT, Some(_)) => {
+            Error::NoWindow { reason: "this Vulkan loader cannot show pictures in windows".into() }
+        }
+        _ => no_vulkan(format!("vkCreateInstance says {code}")),
+    })?;
     let messages = if validate { Some(Messages::listen(&entry, &instance)?) } else { None };
     Ok((entry, instance, messages))
 }
@@ -261,18 +269,26 @@ fn facts(instance: &ash::Instance, device: vk::PhysicalDevice, index: usize) -> 
 }
 
 /// The logical device with the features that the kernels use, and its queue.
-pub(super) fn create(instance: &ash::Instance, physical: vk::PhysicalDevice, facts: &DeviceFacts) -> Result<(ash::Device, vk::Queue)> {
+pub(super) fn create(
+    instance: &ash::Instance,
+    physical: vk::PhysicalDevice,
+    facts: &DeviceFacts,
+    presents: bool,
+) -> Result<(ash::Device, vk::Queue)> {
     let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(facts.queue_family).queue_priorities(&[1.0])];
     let features = vk::PhysicalDeviceFeatures::default().shader_int64(facts.int64_atomics);
     let mut v12 = vk::PhysicalDeviceVulkan12Features::default().scalar_block_layout(true).shader_buffer_int64_atomics(facts.int64_atomics);
-    let mut v13 = vk::PhysicalDeviceVulkan13Features::default().synchronization2(true).maintenance4(true);
+    let mut v13 = vk::PhysicalDeviceVulkan13Features::default().synchronization2(true).maintenance4(true).dynamic_rendering(presents);
     let mut maximal = vk::PhysicalDeviceShaderMaximalReconvergenceFeaturesKHR::default().shader_maximal_reconvergence(true);
     let mut uniform = vk::PhysicalDeviceShaderSubgroupUniformControlFlowFeaturesKHR::default().shader_subgroup_uniform_control_flow(true);
-    let extensions = match facts.reconvergence {
+    let mut extensions = match facts.reconvergence {
         Reconvergence::Maximal => vec![ash::khr::shader_maximal_reconvergence::NAME.as_ptr()],
         Reconvergence::UniformControlFlow => vec![ash::khr::shader_subgroup_uniform_control_flow::NAME.as_ptr()],
         Reconvergence::None => Vec::new(),
     };
+    if presents {
+        extensions.push(ash::khr::swapchain::NAME.as_ptr());
+    }
     let mut info = vk::DeviceCreateInfo::default()
         .queue_create_infos(&queues)
         .enabled_features(&features)

@@ -14,6 +14,7 @@ mod reconvergence;
 mod specialize;
 pub mod timestamps;
 mod validation;
+pub mod window;
 
 use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
@@ -32,6 +33,7 @@ pub use mapped_file::MappedFile;
 use crate::error::{Error, Result};
 use clock::Idleness;
 use validation::Messages;
+use window::Surface;
 
 /// The kernels that `build.rs` found, one struct each.
 pub mod kernels {
@@ -61,6 +63,8 @@ pub struct Options {
     pub without_timestamps: bool,
     /// Behave as on a device without 64-bit atomics.
     pub without_int64_atomics: bool,
+    /// A window that the device is to show pictures in.
+    pub window: Option<Arc<winit::window::Window>>,
     /// SPIR-V in place of a kernel's own, by the kernel's name: how tests plant faults.
     pub replaced: Vec<(String, Vec<u32>)>,
 }
@@ -85,6 +89,9 @@ pub(crate) struct Context {
     /// Names for tools and messages; only with the validation layer.
     debug: Option<ash::ext::debug_utils::Device>,
     messages: Option<Messages>,
+    /// Of the window, if there is one.
+    surface: Option<Surface>,
+    physical_device: vk::PhysicalDevice,
     instance: ash::Instance,
     _entry: ash::Entry,
 }
@@ -107,6 +114,7 @@ impl Drop for Context {
         unsafe {
             self.allocator().take();
             self.device.destroy_device(None);
+            self.surface.take().into_iter().for_each(Surface::destroy);
             if let Some(messages) = self.messages.take() {
                 messages.destroy();
             }
@@ -132,19 +140,34 @@ impl Gpu {
     /// Opens a device and runs the start-up check on it.
     pub fn open(options: &Options) -> Result<Gpu> {
         faults::check()?;
-        let (entry, instance, messages) = device::instance(options.validate).map_err(|error| match (error, &options.device) {
-            (Error::NoVulkan { reason }, Some(wanted)) => {
-                Error::DeviceAbsent { wanted: wanted.clone(), present: format!("none ({reason})") }
+        let (entry, instance, messages) =
+            device::instance(options.validate, options.window.as_ref()).map_err(|error| match (error, &options.device) {
+                (Error::NoVulkan { reason }, Some(wanted)) => {
+                    Error::DeviceAbsent { wanted: wanted.clone(), present: format!("none ({reason})") }
+                }
+                (error, _) => error,
+            })?;
+        let surface = options.window.as_ref().map(|window| Surface::new(&entry, &instance, window)).transpose();
+        let opened = surface.and_then(|surface| {
+            let opened = device::choose(&instance, options.device.as_deref()).and_then(|(physical, mut facts)| {
+                if let Some(surface) = &surface {
+                    facts.queue_family = surface.queue_family(&instance, physical, &facts)?;
+                }
+                let (device, queue) = device::create(&instance, physical, &facts, surface.is_some())?;
+                Ok((physical, facts, device, queue))
+            });
+            match (opened, surface) {
+                (Ok(opened), surface) => Ok((opened, surface)),
+                (Err(error), surface) => {
+                    surface.into_iter().for_each(Surface::destroy);
+                    Err(error)
+                }
             }
-            (error, _) => error,
-        })?;
-        let opened = device::choose(&instance, options.device.as_deref()).and_then(|(physical, facts)| {
-            device::create(&instance, physical, &facts).map(|(device, queue)| (physical, facts, device, queue))
         });
-        let (physical_device, mut facts, device, queue) = match opened {
+        let ((physical_device, mut facts, device, queue), surface) = match opened {
             Ok(opened) => opened,
             Err(error) => {
-                // SAFETY: nothing else was made from this instance.
+                // SAFETY: nothing else is left that was made from this instance.
                 unsafe {
                     if let Some(messages) = messages {
                         messages.destroy();
@@ -175,6 +198,8 @@ impl Gpu {
             device,
             debug,
             messages,
+            surface,
+            physical_device,
             instance,
             _entry: entry,
         });
@@ -198,7 +223,7 @@ impl Gpu {
 
     /// Devices that the loader lists, in its order.
     pub fn list() -> Result<Vec<DeviceFacts>> {
-        let (_entry, instance, _) = device::instance(false)?;
+        let (_entry, instance, _) = device::instance(false, None)?;
         let facts = device::all(&instance).map(|devices| devices.into_iter().map(|(_, facts)| facts).collect());
         // SAFETY: nothing else was made from this instance.
         unsafe { instance.destroy_instance(None) };

@@ -5,6 +5,7 @@ mod bias;
 pub mod estimate;
 pub mod film;
 pub mod index;
+pub mod live;
 mod on_cpu;
 pub(super) mod on_gpu;
 mod replay;

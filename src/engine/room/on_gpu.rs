@@ -24,7 +24,7 @@ use crate::plan::{RoomPlan, photons_of};
 use crate::scene::room::RoomScene;
 use crate::settings::RoomSettings;
 
-struct RoomOnGpu<'a> {
+pub(super) struct RoomOnGpu<'a> {
     scene: &'a RoomScene,
     plan: &'a RoomPlan,
     resources: RoomResources,
@@ -45,8 +45,18 @@ pub fn on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings, control: &m
         let SavedFilm::Room(film) = &saved.film else { unreachable!("identities of two worlds differ") };
         restore(&mut commands, &resources, &plan, film)?;
     }
-    let world = RoomOnGpu { scene, plan: &plan, resources, weights: OnceCell::new() };
+    let world = RoomOnGpu::new(scene, &plan, resources);
     run::run(world, commands, &plan, super::task(&plan, Some((gpu, pipelines_before)), identity), control)
+}
+
+impl<'a> RoomOnGpu<'a> {
+    pub(super) fn new(scene: &'a RoomScene, plan: &'a RoomPlan, resources: RoomResources) -> RoomOnGpu<'a> {
+        RoomOnGpu { scene, plan, resources, weights: OnceCell::new() }
+    }
+
+    pub(super) fn resources(&self) -> &RoomResources {
+        &self.resources
+    }
 }
 
 impl<'a> World for RoomOnGpu<'a> {

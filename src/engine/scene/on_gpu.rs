@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::film::SceneFilm;
 use super::identity::identity;
+use super::kept_maps::KeptMaps;
 use super::losses::losses;
 use super::map_file::MapFile;
 use super::resources::{PhotonBuffers, SceneResources};
@@ -32,6 +33,8 @@ use crate::plan::latest_blocks::kept_count;
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
 use crate::records::CellPush;
+use crate::scene::Camera;
+use crate::scene::geometry::Geometry;
 use crate::timings::{Clock, Span};
 
 /// Kernels that the plan needs, and no others. `go_on` is not among them: few camera paths outlast a dispatch, so its pipeline is
@@ -74,15 +77,19 @@ pub fn constants(plan: &ScenePlan) -> Constants {
 const TIMESTAMPS_PER_ROUND: u32 = 64;
 const TIMESTAMPS_PER_GRID: u32 = 32;
 
-struct SceneOnGpu<'a> {
-    view: &'a View<'a>,
+pub(super) struct SceneOnGpu<'a> {
+    geometry: &'a Geometry,
+    /// Of a picture.
+    camera: Option<Camera>,
     plan: &'a ScenePlan,
-    resources: SceneResources,
+    pub(super) resources: SceneResources,
     /// Grids that the points of the global and of the caustic map need, each by the classes of radii that it serves.
     /// `None` until they are known.
     grids: Option<[Vec<Range<u32>>; 2]>,
     /// Photons that are not traced but read; `None` where they are traced.
     stored: Option<StoredPhotons<'a>>,
+    /// Maps of this run that are kept to be looked at again; `None` where nobody does.
+    pub(super) kept: Option<KeptMaps<'a>>,
     /// Photons that a chunk of the global and of the caustic map may have where time may be up.
     timed_chunks: [u32; 2],
     /// A round was cut short, of which parts of light may have come to that of the block under way.
@@ -116,10 +123,26 @@ pub fn light_from(gpu: &Gpu, view: &View, plan: ScenePlan, map: Option<&MapFile>
     commands.warm_up()?;
     commands.submit()?;
     let identity = control.keep.identity(|name| identity(name, view, &plan, map.map(|map| map.hash.as_str()), gpu.facts()))?;
+    let task = Task { identity, ..task(&plan, (gpu, pipelines_before)) };
+    let none = || [Fates::of_scene(plan.settings.bounces), Fates::of_scene(plan.settings.bounces)];
+    let stored = map.map(|file| StoredPhotons { file, open: none(), open_of_blocks: none() });
+    let mut world = SceneOnGpu { stored, ..SceneOnGpu::new(view.geometry, view.camera.cloned(), &plan, resources, control.cancelled) };
+    if plan.has_classes() && control.keep.begins_later() {
+        world.find_radii(&mut commands)?;
+    }
+    if let Some((_, saved)) = &control.keep.resume {
+        let SavedFilm::Scene(film) = &saved.film else { unreachable!("identities of two worlds differ") };
+        world.restore(&mut commands, film)?;
+    }
+    run::run(world, commands, &plan, task, control)
+}
+
+/// What a run of a plan is to do, on a device with its pipelines before the run.
+pub(super) fn task<'a>(plan: &ScenePlan, device: (&'a Gpu, usize)) -> Task<'a> {
     let photons_per_round = plan.traced_maps().map(|map| u64::from(map.photons)).sum();
-    let task = Task {
-        device: Some((gpu, pipelines_before)),
-        identity,
+    Task {
+        device: Some(device),
+        identity: None,
         sensor: Some(plan.sensor),
         stop: plan.settings.stop,
         alpha: plan.settings.alpha,
@@ -132,29 +155,7 @@ pub fn light_from(gpu: &Gpu, view: &View, plan: ScenePlan, map: Option<&MapFile>
         counts_photons: false,
         // Of the global map and of the caustic map.
         fates: vec![Fates::of_scene(plan.settings.bounces); 2],
-    };
-    let none = || [Fates::of_scene(plan.settings.bounces), Fates::of_scene(plan.settings.bounces)];
-    let stored = map.map(|file| StoredPhotons { file, open: none(), open_of_blocks: none() });
-    let mut world = SceneOnGpu {
-        view,
-        plan: &plan,
-        resources,
-        grids: None,
-        stored,
-        timed_chunks: [FIRST_TIMED_CHUNK; 2],
-        is_cut: false,
-        cancelled: control.cancelled,
-    };
-    if !plan.has_classes() {
-        world.grids = Some([radius_class::one_grid(), radius_class::one_grid()]);
-    } else if control.keep.begins_later() {
-        world.find_radii(&mut commands)?;
     }
-    if let Some((_, saved)) = &control.keep.resume {
-        let SavedFilm::Scene(film) = &saved.film else { unreachable!("identities of two worlds differ") };
-        world.restore(&mut commands, film)?;
-    }
-    run::run(world, commands, &plan, task, control)
 }
 
 impl<'a> World for SceneOnGpu<'a> {
@@ -219,6 +220,11 @@ impl<'a> World for SceneOnGpu<'a> {
             .map(|(tallies, totals)| Fates::counted(&tallies::sums(&tallies.take()), Some(totals::sum(&totals.take()))));
         for which in self.plan.maps().map(|map| usize::from(map.caustic_only)) {
             let (all, of_blocks) = (counted.next().expect("each map is read"), counted.next().expect("each map is read twice"));
+            let counted = [all, of_blocks];
+            let [all, of_blocks] = match &mut self.kept {
+                Some(kept) => kept.fates(which, counted),
+                None => counted,
+            };
             state.count(which, all, of_blocks);
         }
         Ok(())
@@ -300,7 +306,7 @@ impl<'a> World for SceneOnGpu<'a> {
     }
 
     fn losses(&self, film: &SceneFilm, fates: &[Fates]) -> Losses {
-        losses(self.view.geometry, self.plan, fates, film)
+        losses(self.geometry, self.plan, fates, film)
     }
 
     fn nonfinite_values(&mut self, commands: &mut Commands<'a>) -> Result<Option<NonfiniteValues>> {
@@ -308,15 +314,53 @@ impl<'a> World for SceneOnGpu<'a> {
     }
 }
 
-impl SceneOnGpu<'_> {
+impl<'a> SceneOnGpu<'a> {
+    /// That traces its photons and keeps none of them.
+    pub(super) fn new(
+        geometry: &'a Geometry,
+        camera: Option<Camera>,
+        plan: &'a ScenePlan,
+        resources: SceneResources,
+        cancelled: &'a AtomicBool,
+    ) -> SceneOnGpu<'a> {
+        let grids = (!plan.has_classes()).then(|| [radius_class::one_grid(), radius_class::one_grid()]);
+        let timed_chunks = [FIRST_TIMED_CHUNK; 2];
+        SceneOnGpu { geometry, camera, plan, resources, grids, stored: None, kept: None, timed_chunks, is_cut: false, cancelled }
+    }
+
+    pub(super) fn resources(&self) -> &SceneResources {
+        &self.resources
+    }
+
+    /// Looks from somewhere else, at the light of round 0 first: the film is empty, and the photons that are kept stay.
+    pub(super) fn look_from(&mut self, commands: &mut Commands, camera: Camera) -> Result<()> {
+        self.camera = Some(camera);
+        self.grids = self.grids.take().filter(|_| !self.plan.has_classes());
+        let SceneResources { sums_of_block, surface_sums_of_block, film_sums, film_squares, surface_sums, surface_squares, .. } =
+            &self.resources;
+        let SceneResources { differences, part_totals, part_sums, .. } = &self.resources;
+        for sums in [sums_of_block, surface_sums_of_block, film_sums, film_squares, surface_sums, surface_squares] {
+            commands.clear(sums);
+        }
+        for sums in [differences, part_totals, part_sums] {
+            commands.clear(sums);
+        }
+        let SceneResources { latest_blocks, one_hits, anomalies, class_counts, .. } = &self.resources;
+        commands.clear(latest_blocks);
+        for counts in [one_hits, anomalies, class_counts] {
+            commands.clear(counts);
+        }
+        Ok(())
+    }
+
     /// Finds the radii of visible points, which those of round 0 decide, where that round is not the first to be done.
     fn find_radii(&mut self, commands: &mut Commands) -> Result<()> {
-        let SceneOnGpu { view, plan, resources, grids, .. } = self;
+        let SceneOnGpu { geometry, camera, plan, resources, grids, .. } = self;
         let Some(photons) = &resources.photons else { return Ok(()) };
-        let round = Round { resources, geometry: view.geometry, plan, number: 0 };
+        let round = Round { resources, geometry, plan, number: 0 };
         *grids = Some(commands.scope("radii", |commands| {
-            points::see(commands, round, view.camera)?;
-            radius_class::find(commands, round, photons, view)
+            points::see(commands, round, camera.as_ref())?;
+            radius_class::find(commands, round, photons, camera.as_ref())
         })?);
         // Nothing of what was seen counts.
         commands.clear(&resources.one_hits);
@@ -360,9 +404,10 @@ impl SceneOnGpu<'_> {
 
     /// One round. When its time is up, it takes no further chunk of photons.
     fn one_round(&mut self, commands: &mut Commands, deadline: Option<Instant>, state: &mut RunState) -> Result<()> {
-        let SceneOnGpu { view, plan, resources, grids, stored, timed_chunks, .. } = self;
-        let round = Round { resources, geometry: view.geometry, plan, number: state.round() };
-        commands.scope("visible points", |commands| points::see(commands, round, view.camera))?;
+        let SceneOnGpu { geometry, camera, plan, resources, grids, stored, kept, timed_chunks, .. } = self;
+        let camera = camera.as_ref();
+        let round = Round { resources, geometry, plan, number: state.round() };
+        commands.scope("visible points", |commands| points::see(commands, round, camera))?;
         if resources.photons.is_some() {
             let sums = 3 * u64::from(plan.visible_points()) * u64::from(plan.arrival_sets);
             commands.fill(&resources.estimates, 0, sums, 0);
@@ -373,14 +418,19 @@ impl SceneOnGpu<'_> {
             }
             let grids = match grids {
                 Some(grids) => grids,
-                None => grids.insert(commands.scope("radii", |commands| radius_class::find(commands, round, photons, view))?),
+                None => grids.insert(commands.scope("radii", |commands| radius_class::find(commands, round, photons, camera))?),
             };
             let mut traced = [0; 2];
             for map in plan.traced_maps() {
                 let in_round = MapInRound { photons, map, grids: &grids[usize::from(map.caustic_only)] };
-                let of_map = commands.scope(map.name, |commands| match stored {
-                    Some(stored) => one_stored_map(commands, round, &in_round, stored, state),
-                    None => one_map(commands, round, &in_round, deadline, &mut timed_chunks[usize::from(map.caustic_only)], state),
+                let is_kept = kept.as_mut().is_some_and(|kept| kept.begin(round.number, map));
+                let of_map = commands.scope(map.name, |commands| match (&mut *stored, &mut *kept) {
+                    (Some(stored), _) => one_stored_map(commands, round, &in_round, stored, state),
+                    (_, Some(kept)) if is_kept => one_kept_map(commands, round, &in_round, kept, state),
+                    (_, kept) => {
+                        let timed_chunk = &mut timed_chunks[usize::from(map.caustic_only)];
+                        one_map(commands, round, &in_round, deadline, timed_chunk, kept.as_mut(), state)
+                    }
                 })?;
                 traced[usize::from(map.caustic_only)] = of_map;
             }
@@ -444,6 +494,7 @@ fn one_map(
     in_round: &MapInRound,
     deadline: Option<Instant>,
     timed_chunk: &mut u32,
+    mut kept: Option<&mut KeptMaps>,
     state: &mut RunState,
 ) -> Result<u32> {
     let map = in_round.map;
@@ -459,7 +510,10 @@ fn one_map(
         let most = if deadline.is_some() { *timed_chunk } else { map.chunk_photons };
         let count = most.min(map.chunk_photons).min(map.photons - traced);
         state.hand_out(usize::from(map.caustic_only), count);
-        one_chunk(commands, round, in_round, (traced, count))?;
+        trace::trace(commands, round, in_round.photons, map, (traced, count), &mut |commands| {
+            kept.as_mut().map_or(Ok(()), |kept| kept.keep(commands, in_round.photons, map))?;
+            gather_in_grids(commands, round, in_round)
+        })?;
         traced += count;
         if deadline.is_some() {
             commands.submit()?;
@@ -470,12 +524,23 @@ fn one_map(
     Ok(traced)
 }
 
-/// Points of radii that differ much look photons up in grids of their own.
-fn one_chunk(commands: &mut Commands, round: Round, map: &MapInRound, chunk: (u32, u32)) -> Result<()> {
-    trace::trace(commands, round, map.photons, map.map, chunk, &mut |commands| gather_in_grids(commands, round, map))
+/// The photons of a map that was kept; says how many were emitted for them.
+fn one_kept_map(commands: &mut Commands, round: Round, in_round: &MapInRound, kept: &KeptMaps, state: &mut RunState) -> Result<u32> {
+    let MapInRound { photons, map, .. } = in_round;
+    if round.plan.cuts_discs() {
+        commands.scope("cuts", |commands| estimate::cut_discs(commands, round, map))?;
+    }
+    state.hand_out(usize::from(map.caustic_only), map.photons);
+    for part in kept.parts(map) {
+        commands.copy(part, &photons.map, part.count());
+        commands.fill(&photons.counters, 0, 1, part.count() as u32);
+        gather_in_grids(commands, round, in_round)?;
+    }
+    Ok(map.photons)
 }
 
-/// Adds the photons that are in the map to the estimates of all points.
+/// Adds the photons that are in the map to the estimates of all points. Points of radii that differ much look photons up in grids of
+/// their own.
 fn gather_in_grids(commands: &mut Commands, round: Round, map: &MapInRound) -> Result<()> {
     let MapInRound { photons, map, grids } = *map;
     for (grid, classes) in grids.iter().enumerate() {

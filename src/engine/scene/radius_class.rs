@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use super::points::in_pieces;
 use super::resources::{PhotonBuffers, SceneResources};
-use super::{Round, View, index};
+use super::{Round, index};
 use crate::constants::{CLASSES_OF_GRID, NO_CLASS, RADIUS_CLASSES};
 use crate::engine::scene::trial;
 use crate::error::Result;
@@ -16,7 +16,7 @@ use crate::plan::radius::{RADIUS_RANGE, TrialPhotons};
 use crate::plan::scene::{MapPlan, TESTS_PER_POINT};
 use crate::plan::sensor::Sensor;
 use crate::records::{CellPush, ClearancePush, RadiusClassPush};
-use crate::scene::Projection;
+use crate::scene::{Camera, Projection};
 
 /// Of the 8 directions in which it is looked how much is clear around a point, all but the farthest: a corner of a room is as
 /// clear as its middle, and what is nearly closed is not.
@@ -44,7 +44,7 @@ pub fn radius_of_class(widest: f64, class: u32) -> f32 {
 
 /// Finds the radii of the visible points of a round. Says of each map, the global and the caustic one, which grids its points need,
 /// each by the classes that it serves.
-pub fn find(commands: &mut Commands, round: Round, photons: &PhotonBuffers, view: &View) -> Result<[Vec<Range<u32>>; 2]> {
+pub fn find(commands: &mut Commands, round: Round, photons: &PhotonBuffers, camera: Option<&Camera>) -> Result<[Vec<Range<u32>>; 2]> {
     let Round { resources, plan, .. } = round;
     let SceneResources { scene, visible_points, radius_classes, clearances, class_counts, .. } = resources;
     let point_count = plan.visible_points();
@@ -56,7 +56,7 @@ pub fn find(commands: &mut Commands, round: Round, photons: &PhotonBuffers, view
         commands.dispatch(Clearance { scene, visible_points, clearances }, &push, Extent::Items(u64::from(end_point - first_point)))
     })?;
     for map in plan.maps() {
-        of_map(commands, round, photons, map, view)?;
+        of_map(commands, round, photons, map, camera)?;
     }
     let counts = commands.read(class_counts, 2 * RADIUS_CLASSES as usize)?;
     let (global, caustic) = counts.split_at(RADIUS_CLASSES as usize);
@@ -91,7 +91,7 @@ fn grids(counts: &[u32], usual: u32) -> Vec<Range<u32>> {
 const FAR: f64 = 16_384.0;
 
 /// From the finest grid to the widest, each for the points that had too few photons in the one before.
-fn of_map(commands: &mut Commands, round: Round, buffers: &PhotonBuffers, map: &MapPlan, view: &View) -> Result<()> {
+fn of_map(commands: &mut Commands, round: Round, buffers: &PhotonBuffers, map: &MapPlan, camera: Option<&Camera>) -> Result<()> {
     let Round { resources, plan, geometry, .. } = round;
     let Some(classes) = map.classes else { return Ok(()) };
     let trial = plan.trial.as_ref().expect("classes come from a trial");
@@ -100,7 +100,7 @@ fn of_map(commands: &mut Commands, round: Round, buffers: &PhotonBuffers, map: &
     commands.fill(&buffers.counters, 0, 1, kept.len() as u32);
     // The trial's radii, whatever the run makes of them.
     let widest = map.radius / trial.factor.unwrap_or(1.0) * classes.widest();
-    let (eye, pixel_share) = match (plan.sensor, view.camera) {
+    let (eye, pixel_share) = match (plan.sensor, camera) {
         (Sensor::Picture { height, .. }, Some(camera)) => {
             // Parallel rays are those of an eye far behind.
             let distance = match camera.projection {

@@ -1,0 +1,74 @@
+//! `photonmill view`: a window.
+
+use std::sync::atomic::AtomicBool;
+
+use clap::Args;
+
+use super::camera::CameraArgs;
+use super::options::CommonArgs;
+use super::progress::{ProgressArgs, ProgressReporter};
+use super::scene::{PhotonArgs, SceneArgs};
+use super::typed::Typed;
+use super::values::{BuilderArg, builder_parser};
+use super::{DeviceArgs, End};
+use crate::error::Result;
+use crate::settings::scene::SceneSettings;
+use crate::settings::{Builder, RoomSettings};
+use crate::view::{self, Request, Subject};
+
+#[derive(Args)]
+pub(super) struct ViewArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    #[command(flatten)]
+    camera: CameraArgs,
+    #[command(flatten)]
+    light: PhotonArgs,
+    /// Builder of the photon maps; all give bit-identical results [default: auto]
+    #[arg(long, value_name = "BUILDER", help_heading = "Implementation", value_parser = builder_parser(Builder::ON_GPU, "what is usual"))]
+    variant: Option<BuilderArg>,
+    #[command(flatten)]
+    common: CommonArgs,
+    #[command(flatten)]
+    progress: ProgressArgs,
+    #[command(flatten)]
+    device: DeviceArgs,
+}
+
+/// In place of a scene.
+const BOX: &str = "box";
+/// What the window says anew in the command that makes its picture.
+const SAID_ANEW: [&str; 11] =
+    ["--camera", "--eye", "--look-at", "--up", "--fov", "--orthographic", "--size", "--aperture", "--focus", "--without", "--variant"];
+
+pub(super) fn run(args: &ViewArgs, typed: &Typed, cancelled: &AtomicBool) -> Result<End> {
+    let reporter = ProgressReporter::new(&args.progress);
+    let is_box = args.scene.scene == BOX;
+    let builder = args.variant.flatten();
+    let mut size = None;
+    let subject = if is_box {
+        let usual = RoomSettings::default();
+        let settings = RoomSettings {
+            builder: builder.unwrap_or(usual.builder),
+            photons: args.light.photons.unwrap_or(usual.photons),
+            seed: args.common.seed.unwrap_or(usual.seed),
+            ..usual
+        };
+        Subject::Box(Box::new(settings))
+    } else {
+        let chosen = args.light.chosen.open()?;
+        let settings = SceneSettings { builder, ..args.light.settings(&args.common, chosen.as_ref()) };
+        settings.validate()?;
+        args.camera.check()?;
+        let scene = args.scene.open(&reporter)?;
+        let (camera, resolved) = args.camera.resolve(&scene, &reporter)?;
+        size = args.camera.size.map(|_| resolved);
+        Subject::Scene { scene: Box::new(scene), camera, settings: Box::new(settings) }
+    };
+    reporter.finish();
+    let is_kept = |word: &String| !SAID_ANEW.contains(&word.split('=').next().unwrap_or_default());
+    let words = typed.words().into_iter().filter(is_kept).filter(|word| !is_box || word != BOX);
+    let command = if is_box { words.collect() } else { ["render".to_owned()].into_iter().chain(words).collect() };
+    view::run(Request { subject, photons: args.light.photons, size, command, options: args.device.options(), cancelled })?;
+    Ok(End::Finished)
+}

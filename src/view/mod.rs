@@ -1,0 +1,79 @@
+//! `photonmill view`: a window in which a picture is refined while one looks, flies through the scene and changes settings. Rounds
+//! are the engine's own, and what is shown never leaves the device.
+
+mod camera;
+mod choices;
+mod events;
+mod panel;
+mod picture;
+mod session;
+
+use std::sync::atomic::AtomicBool;
+
+use crate::error::{Error, Result};
+use crate::gpu::window::Presenter;
+use crate::gpu::{Gpu, Options};
+use crate::scene::{Camera, Scene};
+use crate::settings::RoomSettings;
+use crate::settings::scene::SceneSettings;
+use choices::{Choices, RunChoices};
+use events::Events;
+
+use session::{Next, Session};
+
+/// What is looked at.
+pub enum Subject {
+    Scene { scene: Box<Scene>, camera: Camera, settings: Box<SceneSettings> },
+    Box(Box<RoomSettings>),
+}
+
+/// What `photonmill view` is asked for.
+pub struct Request<'a> {
+    pub subject: Subject,
+    /// Per round, as typed.
+    pub photons: Option<u32>,
+    /// Of the picture; `None` for what suits the window and the device.
+    pub size: Option<[u32; 2]>,
+    /// The command that makes such a picture in a file, with the options that were typed, up to its camera and its choices.
+    pub command: Vec<String>,
+    pub options: Options,
+    pub cancelled: &'a AtomicBool,
+}
+
+/// Pixels of a window that nobody has given another size.
+const WINDOW: [u32; 2] = [1024, 768];
+/// Along each side of a pixel of the picture, where a CPU computes it.
+const ZOOM_OF_CPU: u32 = 4;
+
+/// Shows a window until it is closed.
+pub fn run(request: Request) -> Result<()> {
+    let interface = egui::Context::default();
+    let name = match &request.subject {
+        Subject::Scene { scene, .. } => scene.name.clone(),
+        Subject::Box(_) => "the paper's box".to_owned(),
+    };
+    let window = request.size.map_or(WINDOW, |size| size.map(|length| length.clamp(160, 4096)));
+    let mut events = Events::open(&format!("{name} - photonmill"), window, &interface)?;
+    let gpu = Gpu::open(&Options { window: Some(events.window().clone()), ..request.options.clone() })?;
+    let zoom = if gpu.facts().kind == "cpu" && request.size.is_none() { ZOOM_OF_CPU } else { 1 };
+    let mut presenter = Presenter::new(&gpu)?;
+    let run = RunChoices::of(&request.subject, request.photons, gpu.facts().kind);
+    let mut choices = Choices { shows: crate::constants::SHOW_ALL, stops: 0.0, has_photons: false, is_open: true, zoom, run };
+    let mut session = Session::new(&gpu, &request, interface, name);
+    // What worked last, where a change does not.
+    let mut last: Option<Choices> = None;
+    loop {
+        match session.show(&mut events, &mut presenter, &mut choices) {
+            Ok(Next::Anew { works }) => last = works.then(|| choices.clone()).or(last),
+            Ok(Next::Close) => return Ok(()),
+            Err(Error::Interrupted) => return Ok(()),
+            Err(error) => match last.take() {
+                Some(before) => {
+                    session.say(error.to_string());
+                    choices = before;
+                }
+                None => return Err(error),
+            },
+        }
+    }
+}
