@@ -1024,7 +1024,9 @@ struct ShowPhotonsPush {
     vec3 right;
     vec3 up;
     uint is_orthographic;
+    // As the window has it, and pixels along each side of a dot.
     uint colour;
+    uint dot_size;
 };
 
 // A measurement of a device's limits; see `glsl/kernels/measure_...`.

@@ -1,7 +1,7 @@
 //! Photon mapping on any Vulkan GPU: GLSL compute kernels on raw Vulkan, results that are the same to the bit however
 //! the work is split, and a ledger of every photon.
 //!
-//! The [`guide`] holds what a user needs: [the paper's box](guide::paper), [scenes](guide::scenes),
+//! The [`guide`] holds what a user needs: [the paper's box](guide::paper), [the window](guide::view), [scenes](guide::scenes),
 //! [materials](guide::materials), [accuracy](guide::accuracy), a [study](guide::study) of what accuracy costs,
 //! [performance](guide::performance), [scale](guide::scale), [hard cases](guide::hard_cases) and [file formats](guide::formats).
 //! [Architecture](guide::architecture) explains how the program is built, why its results repeat, and how it is tested.

@@ -74,4 +74,5 @@ mod transport;
 mod tree;
 mod trial;
 mod unknown;
+mod view;
 mod walls;

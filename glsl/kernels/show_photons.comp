@@ -36,14 +36,17 @@ void main()
         return;
     }
     vec2 on_picture = vec2(0.5 + 0.5 * x, 0.5 - 0.5 * y) * vec2(push.shown_width, push.shown_height);
-    uvec2 pixel = min(uvec2(on_picture), uvec2(push.shown_width - 1, push.shown_height - 1));
-    VisiblePoint point = visible_points[pixel.y * push.shown_width + pixel.x];
+    uvec2 seen = min(uvec2(on_picture), uvec2(push.shown_width - 1, push.shown_height - 1));
+    VisiblePoint point = visible_points[seen.y * push.shown_width + seen.x];
     if (point.arrivals != 0 && norm(from_eye) > TOLERANCE * norm(point.position - push.eye)) {
         return;
     }
     uvec2 window = uvec2(push.width, push.height);
     uvec2 at = corner_of_picture(window, uvec2(push.shown_width, push.shown_height), push.zoom) + uvec2(on_picture * float(push.zoom));
-    if (at.x < window.x && at.y < window.y) {
-        window_pixels[at.y * push.width + at.x] = push.colour;
+    for (uint spot = 0; spot < push.dot_size * push.dot_size; spot++) {
+        uvec2 pixel = at + uvec2(spot % push.dot_size, spot / push.dot_size);
+        if (pixel.x < window.x && pixel.y < window.y) {
+            window_pixels[pixel.y * push.width + pixel.x] = push.colour;
+        }
     }
 }

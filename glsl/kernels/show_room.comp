@@ -37,7 +37,7 @@ void main()
     vec3 direction = push.forward + x * push.right + y * push.up;
     uint texels = push.mesh * push.mesh;
     float nearest = 1e30;
-    float value = 0.0;
+    float value = push.shows == SHOW_ERROR ? -1.0 : 0.0;
     for (uint wall = 0; wall < push.wall_count; wall++) {
         // Rows of texels along u, one behind the other along v, from the corner of the first.
         vec3 first = points[wall * texels].position;

@@ -97,6 +97,12 @@ impl CameraArgs {
         Ok((camera, [width, height]))
     }
 
+    /// Of the paper's box, whose camera is not one of a scene; `None` where nobody has asked for a size.
+    pub(super) fn size_of_box(&self, reporter: &ProgressReporter) -> Result<Option<[u32; 2]>> {
+        let camera = Camera::looking_at("box", DVec3::Z, DVec3::ZERO, DVec3::Y, 1.0);
+        self.size.map(|_| PictureSize::resolve(self.size, &camera, reporter).map(<[u32; 2]>::from)).transpose()
+    }
+
     fn placed(&self, own: Camera) -> Result<Camera> {
         let eye = self.eye.unwrap_or(own.eye);
         let target = self.look_at.unwrap_or(eye + own.forward);

@@ -45,8 +45,7 @@ pub(super) fn run(args: &ViewArgs, typed: &Typed, cancelled: &AtomicBool) -> Res
     let reporter = ProgressReporter::new(&args.progress);
     let is_box = args.scene.scene == BOX;
     let builder = args.variant.flatten();
-    let mut size = None;
-    let subject = if is_box {
+    let (subject, size) = if is_box {
         let usual = RoomSettings::default();
         let settings = RoomSettings {
             builder: builder.unwrap_or(usual.builder),
@@ -54,7 +53,7 @@ pub(super) fn run(args: &ViewArgs, typed: &Typed, cancelled: &AtomicBool) -> Res
             seed: args.common.seed.unwrap_or(usual.seed),
             ..usual
         };
-        Subject::Box(Box::new(settings))
+        (Subject::Box(Box::new(settings)), args.camera.size_of_box(&reporter)?)
     } else {
         let chosen = args.light.chosen.open()?;
         let settings = SceneSettings { builder, ..args.light.settings(&args.common, chosen.as_ref()) };
@@ -62,8 +61,8 @@ pub(super) fn run(args: &ViewArgs, typed: &Typed, cancelled: &AtomicBool) -> Res
         args.camera.check()?;
         let scene = args.scene.open(&reporter)?;
         let (camera, resolved) = args.camera.resolve(&scene, &reporter)?;
-        size = args.camera.size.map(|_| resolved);
-        Subject::Scene { scene: Box::new(scene), camera, settings: Box::new(settings) }
+        let subject = Subject::Scene { scene: Box::new(scene), camera, settings: Box::new(settings) };
+        (subject, args.camera.size.map(|_| resolved))
     };
     reporter.finish();
     let is_kept = |word: &String| !SAID_ANEW.contains(&word.split('=').next().unwrap_or_default());

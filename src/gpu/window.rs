@@ -62,7 +62,11 @@ impl Surface {
         let does = |family: &u32| {
             let wanted = vk::QueueFlags::COMPUTE | vk::QueueFlags::GRAPHICS;
             // SAFETY: device, family and surface belong together.
-            let presents = || unsafe { self.functions.get_physical_device_surface_support(physical, *family, self.raw) };
+            let presents = || {
+                call("vkGetPhysicalDeviceSurfaceSupportKHR", || unsafe {
+                    self.functions.get_physical_device_surface_support(physical, *family, self.raw)
+                })
+            };
             families[*family as usize].queue_flags.contains(wanted) && presents().unwrap_or(false)
         };
         (0..families.len() as u32)

@@ -10,6 +10,11 @@ pub mod paper {}
 
 #[doc = include_str!("links.md")]
 #[doc = include_str!(concat!(env!("OUT_DIR"), "/charts.md"))]
+#[doc = include_str!("view.md")]
+pub mod view {}
+
+#[doc = include_str!("links.md")]
+#[doc = include_str!(concat!(env!("OUT_DIR"), "/charts.md"))]
 #[doc = include_str!("scenes.md")]
 pub mod scenes {}
 

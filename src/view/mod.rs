@@ -5,7 +5,7 @@ mod camera;
 mod choices;
 mod events;
 mod panel;
-mod picture;
+pub mod picture;
 mod session;
 
 use std::sync::atomic::AtomicBool;
@@ -40,8 +40,9 @@ pub struct Request<'a> {
     pub cancelled: &'a AtomicBool,
 }
 
-/// Pixels of a window that nobody has given another size.
-const WINDOW: [u32; 2] = [1024, 768];
+/// Pixels of a window that nobody has given another size, and its width over height where the camera does not say.
+const WINDOW_HEIGHT: u32 = 768;
+const USUAL_ASPECT: f64 = 4.0 / 3.0;
 /// Along each side of a pixel of the picture, where a CPU computes it.
 const ZOOM_OF_CPU: u32 = 4;
 
@@ -52,10 +53,21 @@ pub fn run(request: Request) -> Result<()> {
         Subject::Scene { scene, .. } => scene.name.clone(),
         Subject::Box(_) => "the paper's box".to_owned(),
     };
-    let window = request.size.map_or(WINDOW, |size| size.map(|length| length.clamp(160, 4096)));
+    let aspect = match &request.subject {
+        Subject::Scene { camera, .. } => camera.aspect.unwrap_or(USUAL_ASPECT).clamp(0.5, 2.0),
+        Subject::Box(_) => USUAL_ASPECT,
+    };
+    let usual = [(aspect * f64::from(WINDOW_HEIGHT)) as u32, WINDOW_HEIGHT];
+    // A small picture is shown with large pixels.
+    let window = request.size.map_or(usual, |[width, height]| {
+        let zoom = (WINDOW_HEIGHT / height.max(width)).max(1);
+        [width * zoom, height * zoom]
+    });
     let mut events = Events::open(&format!("{name} - photonmill"), window, &interface)?;
     let gpu = Gpu::open(&Options { window: Some(events.window().clone()), ..request.options.clone() })?;
-    let zoom = if gpu.facts().kind == "cpu" && request.size.is_none() { ZOOM_OF_CPU } else { 1 };
+    // The box costs what its walls do, whoever looks.
+    let is_slow = gpu.facts().kind == "cpu" && matches!(request.subject, Subject::Scene { .. });
+    let zoom = if is_slow && request.size.is_none() { ZOOM_OF_CPU } else { 1 };
     let mut presenter = Presenter::new(&gpu)?;
     let run = RunChoices::of(&request.subject, request.photons, gpu.facts().kind);
     let mut choices = Choices { shows: crate::constants::SHOW_ALL, stops: 0.0, has_photons: false, is_open: true, zoom, run };
@@ -65,7 +77,7 @@ pub fn run(request: Request) -> Result<()> {
     loop {
         match session.show(&mut events, &mut presenter, &mut choices) {
             Ok(Next::Anew { works }) => last = works.then(|| choices.clone()).or(last),
-            Ok(Next::Close) => return Ok(()),
+            Ok(Next::Close) => return gpu.check_validation(),
             Err(Error::Interrupted) => return Ok(()),
             Err(error) => match last.take() {
                 Some(before) => {

@@ -80,7 +80,7 @@ const STOPS_PER_SECOND: f32 = 3.0;
 pub fn show(context: &Context, choices: &mut Choices, status: &Status, pivot: f64) -> Requests {
     let mut requests = Requests::default();
     if choices.is_open {
-        egui::Window::new(&status.title).default_width(270.0).default_pos([12.0, 12.0]).show(context, |ui| {
+        egui::Window::new(&status.title).default_size([270.0, 640.0]).default_pos([12.0, 12.0]).show(context, |ui| {
             egui::ScrollArea::vertical().show(ui, |ui| panel(ui, choices, status, &mut requests));
         });
     }
@@ -102,8 +102,9 @@ fn panel(ui: &mut Ui, choices: &mut Choices, status: &Status, requests: &mut Req
     }
     ui.separator();
     for (key, shows, name) in SHOWN {
-        let is_there = matches!(shows, SHOW_ALL | SHOW_ERROR) || status.has_parts;
-        ui.add_enabled_ui(is_there, |ui| ui.radio_value(&mut choices.shows, shows, format!("{name}  ({})", key.symbol_or_name())));
+        if matches!(shows, SHOW_ALL | SHOW_ERROR) || status.has_parts {
+            ui.radio_value(&mut choices.shows, shows, format!("{name}  ({})", key.symbol_or_name()));
+        }
     }
     if choices.shows == SHOW_ERROR {
         legend(ui);
@@ -112,7 +113,7 @@ fn panel(ui: &mut Ui, choices: &mut Choices, status: &Status, requests: &mut Req
         ui.checkbox(&mut choices.has_photons, "photons of the latest round  (P)");
         if choices.has_photons {
             for (name, colour) in ["global map", "caustic map"].into_iter().zip(PHOTON_COLOURS) {
-                ui.colored_label(Color32::from_rgb(colour[0], colour[1], colour[2]), format!("● {name}"));
+                ui.colored_label(Color32::from_rgb(colour[0], colour[1], colour[2]), format!("dots: {name}"));
             }
         }
     }
@@ -122,7 +123,8 @@ fn panel(ui: &mut Ui, choices: &mut Choices, status: &Status, requests: &mut Req
     settings(ui, &mut choices.run, status);
     ui.add(Slider::new(&mut choices.zoom, 1..=8).text("window pixels per pixel"));
     ui.separator();
-    ui.collapsing("Times of the latest round", |ui| {
+    let section = |title: &str| egui::CollapsingHeader::new(title).default_open(true);
+    section("Times of the latest round").show(ui, |ui| {
         egui::Grid::new("times").striped(true).show(ui, |ui| {
             for (name, depth, ms) in &status.passes {
                 ui.label(format!("{}{name}", "   ".repeat(*depth)));
@@ -131,7 +133,7 @@ fn panel(ui: &mut Ui, choices: &mut Choices, status: &Status, requests: &mut Req
             }
         });
     });
-    ui.collapsing("Photon ledger", |ui| {
+    section("Photon ledger").show(ui, |ui| {
         let Ledger { emitted, absorbed, escaped, cut_off, dropped, stored } = status.ledger;
         egui::Grid::new("ledger").show(ui, |ui| {
             let rows =

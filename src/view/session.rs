@@ -65,6 +65,7 @@ const FRAME: Duration = Duration::from_millis(15);
 const LOOK: Duration = Duration::from_secs(2);
 /// A window keeps its size for so long before the picture takes it.
 const SETTLED: Duration = Duration::from_millis(250);
+const STOPS_OF_PHOTONS: f32 = 2.0;
 const SAID: Duration = Duration::from_secs(8);
 
 impl<'a> Session<'a> {
@@ -228,7 +229,9 @@ impl<'a> Session<'a> {
             }
             let is_light = !self.status.is_box;
             let shows = if self.status.has_parts || choices.shows == crate::constants::SHOW_ERROR { choices.shows } else { 0 };
-            let exposure = Exposure { shows, stops: choices.stops, is_light };
+            // Dots show on a picture that is darker.
+            let stops = choices.stops - if choices.has_photons { STOPS_OF_PHOTONS } else { 0.0 };
+            let exposure = Exposure { shows, stops, is_light };
             match &mut live {
                 Live::Scene(live) => live.show(shows, mean, &picture.shown)?,
                 Live::Room(live) => live.show(shows, mean, &self.camera.camera, picture.size, &picture.shown)?,

@@ -5,9 +5,10 @@ use std::time::Instant;
 
 use glam::Vec4;
 
+use super::film::{RoomFilm, estimate_walls};
 use super::on_gpu::{RoomOnGpu, constants, modules};
 use super::resources::{RoomResources, RoundBuffers};
-use super::{estimate, film, task};
+use super::{estimate, task};
 use crate::engine::run::{self, Run, World};
 use crate::engine::{self, Control};
 use crate::error::Result;
@@ -76,11 +77,16 @@ impl<'a> LiveRoom<'a> {
         &mut self.run.recorder
     }
 
+    /// What all rounds have left.
+    pub fn film(&mut self) -> Result<RoomFilm> {
+        self.run.film()
+    }
+
     /// The error over the mean, as far as it is known, and the mean of the illumination.
     pub fn look(&mut self) -> Result<(f64, f64)> {
-        let found = self.run.film()?;
+        let found = self.film()?;
         let noise = self.run.world.error(&found).noise;
-        let walls = film::estimate_walls(&found, self.scene, self.plan);
+        let walls = estimate_walls(&found, self.scene, self.plan);
         let values: Vec<f64> = walls.iter().flat_map(|wall| wall.illumination.iter().copied()).collect();
         Ok((noise, values.iter().sum::<f64>() / values.len().max(1) as f64))
     }

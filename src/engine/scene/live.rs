@@ -27,6 +27,9 @@ use crate::timings::Timings;
 /// Of the device's memory, for photons that need not be traced again when the camera moves.
 const SHARE_FOR_KEPT_MAPS: u64 = 4;
 
+/// Pixels of the window along each side of a photon's dot.
+const DOT: u32 = 2;
+
 pub struct LiveScene<'a> {
     run: Run<'a, SceneOnGpu<'a>>,
     geometry: &'a Geometry,
@@ -158,6 +161,7 @@ impl<'a> LiveScene<'a> {
                     up: across(half_height, self.camera.up),
                     is_orthographic: u32::from(is_orthographic),
                     colour: colours[usize::from(map.caustic_only)],
+                    dot_size: DOT,
                 };
                 let kernel = ShowPhotons { map: part, visible_points: &world.resources().visible_points, window_pixels };
                 recorder.dispatch(kernel, &push, Extent::Items(part.count()))?;

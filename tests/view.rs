@@ -1,0 +1,365 @@
+//! `photonmill view`: what it shows is what the run holds, and the window does what its user asks of it.
+
+use std::process::{Child, Command, Stdio};
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+use photonmill::constants::{SHOW_ALL, SHOW_DIRECT, SHOW_ERROR};
+use photonmill::engine::room::film::estimate_walls;
+use photonmill::engine::room::live::LiveRoom;
+use photonmill::engine::scene::live::LiveScene;
+use photonmill::engine::scene::{View, trial};
+use photonmill::output::colour::{ColourPicture, Format, Tone, png_codes};
+use photonmill::view::picture::{Exposure, Picture};
+use x11rb::connection::Connection;
+use x11rb::protocol::xproto::{
+    ClientMessageEvent, ConfigureWindowAux, ConnectionExt, EventMask, ImageFormat, InputFocus, KEY_PRESS_EVENT, KEY_RELEASE_EVENT, Window,
+};
+use x11rb::protocol::xtest::ConnectionExt as _;
+use x11rb::rust_connection::RustConnection;
+
+use crate::common::prelude::*;
+
+static NEVER: AtomicBool = AtomicBool::new(false);
+const SIZE: [u32; 2] = [12, 8];
+
+fn settings() -> SceneSettings {
+    SceneSettings { photons: 1 << 10, caustic_photons: 1 << 10, rounds: 1 << 16, keeps_parts: true, ..SceneSettings::default() }
+}
+
+/// A camera that moves sees the photons that are kept, and what it sees is to the bit what a run of its own would.
+#[test]
+fn a_moved_camera_sees_kept_photons_and_the_picture_of_its_own_run() {
+    let Some(gpu) = device() else { return };
+    let scene = Scene::open("cornell-spheres", false).unwrap();
+    let geometry = Geometry::new(&scene).unwrap();
+    let first = scene.first_camera();
+    let view = View { geometry: &geometry, camera: Some(&first), phases: &[] };
+    let sensor = Sensor::Picture { width: SIZE[0], height: SIZE[1] };
+    let plan = trial::plan(&gpu, &scene, &view, &settings(), sensor).unwrap();
+    let moved = Camera { eye: first.eye + 0.3 * first.right + 0.2 * first.forward, ..first.clone() };
+    let rounds = |live: &mut LiveScene, count: u32| (0..count).for_each(|_| live.round().unwrap());
+
+    let mut live = LiveScene::new(&gpu, &geometry, &first, &plan, &NEVER).unwrap();
+    rounds(&mut live, 4);
+    let before = live.look().unwrap().0;
+    live.look_from(&moved).unwrap();
+    // Half of these rounds have kept photons.
+    rounds(&mut live, 8);
+    assert_eq!((live.rounds(), live.kept().0), (8, 8));
+    let after = live.look().unwrap().0;
+    let mut own = LiveScene::new(&gpu, &geometry, &moved, &plan, &NEVER).unwrap();
+    rounds(&mut own, 8);
+    assert!(after == own.look().unwrap().0);
+    assert_eq!(live.ledger(), own.ledger());
+    assert!(live.ledger().closes() && live.ledger().emitted == 8 * 2 << 10);
+    assert!(before.of_blocks.sums != after.of_blocks.sums);
+    // Back again, from kept photons alone.
+    live.look_from(&first).unwrap();
+    rounds(&mut live, 4);
+    assert!(live.look().unwrap().0 == before);
+}
+
+/// What reaches the window is the film: light, its parts, its error, and the codes that a file would have.
+#[test]
+fn the_window_has_the_values_of_the_film_and_the_codes_of_its_file() {
+    let Some(gpu) = device() else { return };
+    let scene = Scene::open("cornell-spheres", false).unwrap();
+    let geometry = Geometry::new(&scene).unwrap();
+    let camera = scene.first_camera();
+    let view = View { geometry: &geometry, camera: Some(&camera), phases: &[] };
+    let sensor = Sensor::Picture { width: SIZE[0], height: SIZE[1] };
+    let plan = trial::plan(&gpu, &scene, &view, &settings(), sensor).unwrap();
+    let mut live = LiveScene::new(&gpu, &geometry, &camera, &plan, &NEVER).unwrap();
+    let picture = Picture::new(&gpu, SIZE, SIZE).unwrap();
+    let pixels = (SIZE[0] * SIZE[1]) as usize;
+    // Before a block is whole, and after several.
+    for rounds in [1, 12] {
+        (live.rounds()..rounds).for_each(|_| live.round().unwrap());
+        let film = live.look().unwrap().0;
+        let mut shown = |shows: u32| {
+            live.show(shows, 2.0, &picture.shown).unwrap();
+            live.commands().read(&picture.shown, pixels).unwrap()
+        };
+        for (pixel, value) in shown(SHOW_ALL).into_iter().enumerate() {
+            let mean = film.mean(pixel);
+            assert!(
+                (value.truncate().as_dvec3() - mean).abs().max_element() <= 1e-6 * (1.0 + mean.max_element()),
+                "{pixel}: {value}, {mean}"
+            );
+        }
+        for part in 0..4 {
+            for (pixel, value) in shown(SHOW_DIRECT + part).into_iter().enumerate() {
+                let Some(mean) = film.mean_of_part(part as usize, pixel) else { panic!("parts are kept") };
+                let least = 1e-5 * (1.0 + film.mean(pixel).max_element());
+                assert!((value.truncate().as_dvec3() - mean).abs().max_element() <= least, "part {part}, {pixel}: {value}, {mean}");
+            }
+        }
+        let mut known_pixels = 0;
+        for (pixel, value) in shown(SHOW_ERROR).into_iter().enumerate() {
+            let variance = |channel: usize| film.of_blocks.variance(3 * pixel + channel);
+            let sum = [0, 1, 2].map(variance).iter().sum::<f64>();
+            let known = sum.is_finite() && sum > 0.0;
+            let expected = if known { (sum / 3.0).sqrt() / (film.plan.scale * f64::from(film.of_blocks.rounds) * 2.0) } else { -1.0 };
+            assert!((f64::from(value.x) - expected).abs() <= 1e-5 * expected.abs(), "{pixel}: {} is {expected}", value.x);
+            known_pixels += usize::from(known);
+        }
+        assert!(if rounds > 1 { known_pixels > pixels / 2 } else { known_pixels == 0 }, "{known_pixels}");
+    }
+    let film = live.look().unwrap().0;
+    let colours = ColourPicture { width: SIZE[0], height: SIZE[1], pixels: film.means().map(|mean| mean.as_vec3()).collect() };
+    let stops = colours.usual_exposure();
+    let of_file = png_codes(&colours.encode(Format::Png, stops, Tone::Neutral, None)).unwrap();
+    for blue_first in [false, true] {
+        live.show(SHOW_ALL, 1.0, &picture.shown).unwrap();
+        let exposure = Exposure { shows: SHOW_ALL, stops, is_light: true };
+        picture.expose(live.commands(), exposure, 1, blue_first).unwrap();
+        let codes = picture.codes(live.commands(), blue_first).unwrap();
+        let farthest = codes.as_flattened().iter().zip(&of_file).map(|(a, b)| a.abs_diff(*b)).max().unwrap();
+        assert!(farthest <= 1, "{farthest}");
+    }
+}
+
+/// The middle of the picture is the texel of the wall that the camera looks at.
+#[test]
+fn the_box_is_seen_with_the_illumination_of_its_walls() {
+    let Some(gpu) = device() else { return };
+    let settings = RoomSettings { rounds: 64, mesh: 16, ..RoomSettings::default() };
+    let room = open_box(&settings);
+    let plan = LiveRoom::plan(&gpu, &room, &settings).unwrap();
+    let mut live = LiveRoom::new(&gpu, &room, &plan, &NEVER).unwrap();
+    (0..5).for_each(|_| live.round().unwrap());
+    let film = live.film().unwrap();
+    let middle = 0.5 * (room.min_corner + room.max_corner);
+    for (place, (face, _)) in room.walls().enumerate() {
+        let rectangle = room.rectangle(face);
+        let (column, row) = (3, 11);
+        let texel = rectangle.origin + (f64::from(column) + 0.5) / 16.0 * rectangle.u + (f64::from(row) + 0.5) / 16.0 * rectangle.v;
+        let camera = Camera::looking_at("test", middle, texel, DVec3::new(0.1, 0.9, 0.2), 0.01);
+        let picture = Picture::new(&gpu, [3, 3], [3, 3]).unwrap();
+        live.show(SHOW_ALL, 1.0, &camera, [3, 3], &picture.shown).unwrap();
+        let seen = f64::from(live.commands().read(&picture.shown, 9).unwrap()[4].x);
+        let expected = estimate_walls(&film, &room, &plan)[place].illumination[(row * 16 + column) as usize];
+        assert!((seen - expected).abs() <= 1e-5 * expected && expected > 0.0, "face {face}: {seen} is {expected}");
+        live.show(SHOW_ERROR, 1.0, &camera, [3, 3], &picture.shown).unwrap();
+        let error = f64::from(live.commands().read(&picture.shown, 9).unwrap()[4].x);
+        assert!(error > 0.0 && error < expected, "face {face}: {error} of {expected}");
+        // From behind a wall is not there.
+        let behind = Camera { eye: texel + (texel - middle), ..camera.clone() };
+        let from_behind = Camera::looking_at("test", behind.eye, middle, DVec3::new(0.1, 0.9, 0.2), 0.01);
+        live.show(SHOW_ALL, 1.0, &from_behind, [3, 3], &picture.shown).unwrap();
+        let seen = f64::from(live.commands().read(&picture.shown, 9).unwrap()[4].x);
+        assert!((seen - expected).abs() > 1e-4 * expected, "face {face} is seen from behind");
+    }
+}
+
+/// A display without a screen, and the program in a window on it.
+struct Desktop {
+    server: Child,
+    name: String,
+    connection: RustConnection,
+    root: Window,
+}
+
+impl Drop for Desktop {
+    fn drop(&mut self) {
+        let _ = self.server.kill();
+        let _ = self.server.wait();
+    }
+}
+
+/// Keys of the server's own keyboard.
+const ESCAPE: u8 = 9;
+const KEY_6: u8 = 15;
+const KEY_R: u8 = 27;
+const KEY_F: u8 = 41;
+const KEY_H: u8 = 43;
+
+/// Of what takes long on a busy machine.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+#[track_caller]
+fn wait_for<T>(what: &str, mut found: impl FnMut() -> Option<T>) -> T {
+    let began = Instant::now();
+    loop {
+        if let Some(found) = found() {
+            return found;
+        }
+        assert!(began.elapsed() < PATIENCE, "{what} does not come");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
+
+impl Desktop {
+    fn new(place: &Place) -> Desktop {
+        let number = place.at("display");
+        let told = std::fs::File::create(&number).unwrap();
+        let server = Command::new("Xvfb")
+            .args(["-displayfd", "1", "-screen", "0", "900x800x24", "-nolisten", "tcp"])
+            .stdout(told)
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("Xvfb starts; tools/setup installs it");
+        let name = wait_for("a display", || std::fs::read_to_string(&number).ok().filter(|text| text.ends_with('\n')));
+        let name = format!(":{}", name.trim());
+        let (connection, screen) = x11rb::connect(Some(&name)).unwrap();
+        let root = connection.setup().roots[screen].root;
+        Desktop { server, name, connection, root }
+    }
+
+    fn start(&self, place: &Place, line: &str) -> Child {
+        let mut command = place.command(line);
+        command.env("DISPLAY", &self.name).env("LP_NUM_THREADS", "0");
+        command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+    }
+
+    /// The window that is on the screen.
+    fn window(&self) -> Window {
+        let window = wait_for("a window", || {
+            let windows = self.connection.query_tree(self.root).unwrap().reply().unwrap().children;
+            windows.into_iter().find(|window| {
+                let attributes = self.connection.get_window_attributes(*window).unwrap().reply();
+                let size = self.connection.get_geometry(*window).unwrap().reply();
+                attributes.is_ok_and(|attributes| u8::from(attributes.map_state) == 2) && size.is_ok_and(|size| size.width > 100)
+            })
+        });
+        self.connection.set_input_focus(InputFocus::PARENT, window, x11rb::CURRENT_TIME).unwrap();
+        self.connection.flush().unwrap();
+        window
+    }
+
+    fn press(&self, key: u8) {
+        for kind in [KEY_PRESS_EVENT, KEY_RELEASE_EVENT] {
+            self.connection.xtest_fake_input(kind, key, x11rb::CURRENT_TIME, self.root, 0, 0, 0).unwrap();
+            self.connection.flush().unwrap();
+            std::thread::sleep(Duration::from_millis(60));
+        }
+    }
+
+    /// Colours on the screen, row by row.
+    fn colours(&self, window: Window) -> Vec<[u8; 3]> {
+        let size = self.connection.get_geometry(window).unwrap().reply().unwrap();
+        let image = self.connection.get_image(ImageFormat::Z_PIXMAP, window, 0, 0, size.width, size.height, !0).unwrap().reply().unwrap();
+        image.data.chunks_exact(4).map(|pixel| [pixel[2], pixel[1], pixel[0]]).collect()
+    }
+}
+
+/// The next screenshot: its size and its codes.
+fn screenshot(desktop: &Desktop, place: &Place, number: u32) -> ([u32; 2], Vec<u8>) {
+    desktop.press(KEY_F);
+    let path = place.at(&format!("photonmill-{number}.png"));
+    wait_for("a screenshot", || {
+        let content = std::fs::read(&path).ok()?;
+        let image = image::load_from_memory(&content).ok()?.into_rgb8();
+        Some(([image.width(), image.height()], image.into_raw()))
+    })
+}
+
+fn mean_difference(a: &[u8], b: &[u8]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    a.iter().zip(b).map(|(a, b)| f64::from(a.abs_diff(*b))).sum::<f64>() / a.len() as f64
+}
+
+#[test]
+fn a_window_opens_resizes_hides_shows_renders_and_closes() {
+    if no_gpu() {
+        return;
+    }
+    let place = Place::new();
+    let desktop = Desktop::new(&place);
+    let mut program = desktop.start(&place, "view cornell --size 40x30 --photons 1024 --validate");
+    let window = desktop.window();
+    let has_picture = |window: Window| desktop.colours(window).into_iter().collect::<HashSet<_>>().len() > 100;
+    wait_for("a picture", || has_picture(window).then_some(()));
+    // Without the panel the window is the picture.
+    desktop.press(KEY_H);
+    std::thread::sleep(Duration::from_millis(500));
+    let (size, light) = screenshot(&desktop, &place, 1);
+    assert_eq!(size, [760, 570]);
+    let on_screen = desktop.colours(window);
+    assert!(mean_difference(&light, on_screen.as_flattened()) < 8.0, "{}", mean_difference(&light, on_screen.as_flattened()));
+
+    desktop.press(KEY_6);
+    let (_, errors) = screenshot(&desktop, &place, 2);
+    assert!(mean_difference(&light, &errors) > 20.0);
+
+    // Another size of the window.
+    desktop.connection.configure_window(window, &ConfigureWindowAux::new().width(210).height(170)).unwrap();
+    desktop.connection.flush().unwrap();
+    std::thread::sleep(Duration::from_millis(500));
+    let mut number = 3;
+    wait_for("the new size", || {
+        let (size, _) = screenshot(&desktop, &place, number);
+        number += 1;
+        (size == [210, 170]).then_some(())
+    });
+
+    // Away and back.
+    desktop.connection.unmap_window(window).unwrap();
+    desktop.connection.flush().unwrap();
+    std::thread::sleep(Duration::from_millis(700));
+    desktop.connection.map_window(window).unwrap();
+    desktop.connection.flush().unwrap();
+    let window = desktop.window();
+    wait_for("the picture again", || has_picture(window).then_some(()));
+    let (size, _) = screenshot(&desktop, &place, number);
+    assert_eq!(size, [210, 170]);
+
+    // The picture as it is seen, by the command that the window names.
+    desktop.press(KEY_R);
+    let rendered = place.at(&format!("photonmill-{}.png", number + 1));
+    let image = wait_for("a rendered picture", || image::open(&rendered).ok());
+    assert_eq!((image.width(), image.height()), (40, 30));
+    let content = std::fs::read(&rendered).unwrap();
+    assert!(content.windows(6).any(|text| text == b"--eye "), "the file says how it was made");
+
+    // As the desktop closes windows.
+    let atom = |name: &str| desktop.connection.intern_atom(false, name.as_bytes()).unwrap().reply().unwrap().atom;
+    let close = [atom("WM_DELETE_WINDOW"), 0, 0, 0, 0];
+    let event = ClientMessageEvent::new(32, window, atom("WM_PROTOCOLS"), close);
+    desktop.connection.send_event(false, window, EventMask::NO_EVENT, event).unwrap();
+    desktop.connection.flush().unwrap();
+    let status = wait_for("the end", || program.try_wait().unwrap());
+    let output = program.wait_with_output().unwrap();
+    assert!(status.success() && output.stdout.is_empty(), "{}", text(&output.stderr));
+}
+
+#[test]
+fn the_box_is_viewed_and_escape_closes_its_window() {
+    if no_gpu() {
+        return;
+    }
+    let place = Place::new();
+    let desktop = Desktop::new(&place);
+    let mut program = desktop.start(&place, "view box --photons 500 --size 60x40 --validate");
+    let window = desktop.window();
+    wait_for("a picture", || (desktop.colours(window).into_iter().collect::<HashSet<_>>().len() > 60).then_some(()));
+    desktop.press(ESCAPE);
+    let status = wait_for("the end", || program.try_wait().unwrap());
+    assert!(status.success(), "{}", text(&program.wait_with_output().unwrap().stderr));
+}
+
+/// One clear line where there is no display, and where the device cannot show anything on it.
+#[test]
+fn a_window_that_cannot_be_is_refused_in_one_line() {
+    if no_gpu() {
+        return;
+    }
+    let place = Place::new();
+    let line = |mut command: Command| {
+        let output = command.output().unwrap();
+        let stderr = text(&output.stderr);
+        assert_eq!((output.status.code(), stderr.trim_end().lines().count()), (Some(1), 1), "{stderr}");
+        stderr
+    };
+    let mut without_display = place.command("view cornell");
+    without_display.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
+    let said = line(without_display);
+    assert!(said.contains("no window: there is no display") && said.contains("DISPLAY"), "{said}");
+
+    let desktop = Desktop::new(&place);
+    let mut without_support = place.command("view cornell");
+    without_support.env("DISPLAY", &desktop.name).env("PHOTONMILL_FAULTS", "vkGetPhysicalDeviceSurfaceSupportKHR@1+=lost");
+    let said = line(without_support);
+    assert!(said.contains("cannot show pictures in a window"), "{said}");
+}
