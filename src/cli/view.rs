@@ -9,7 +9,7 @@ use super::options::CommonArgs;
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::scene::{PhotonArgs, SceneArgs};
 use super::typed::Typed;
-use super::values::{BuilderArg, builder_parser};
+use super::values::{BuilderArg, builder_parser, parse_percent, parse_seconds};
 use super::{DeviceArgs, End};
 use crate::error::Result;
 use crate::settings::scene::SceneSettings;
@@ -27,6 +27,12 @@ pub(super) struct ViewArgs {
     /// Builder of the photon maps; all give bit-identical results [default: auto]
     #[arg(long, value_name = "BUILDER", help_heading = "Implementation", value_parser = builder_parser(Builder::ON_GPU, "what is usual"))]
     variant: Option<BuilderArg>,
+    /// Error at which a picture ends that R renders [default: 2 %, or a time that suits the device]
+    #[arg(long, value_name = "PERCENT", value_parser = parse_percent, allow_hyphen_values = true, help_heading = "When to stop")]
+    error: Option<f64>,
+    /// Time after which it ends: 30s, 5m
+    #[arg(long, value_name = "TIME", value_parser = parse_seconds, allow_hyphen_values = true, help_heading = "When to stop")]
+    time: Option<f64>,
     #[command(flatten)]
     common: CommonArgs,
     #[command(flatten)]
@@ -67,6 +73,9 @@ pub(super) fn run(args: &ViewArgs, typed: &Typed, cancelled: &AtomicBool) -> Res
     reporter.finish();
     let is_kept = |word: &String| !SAID_ANEW.contains(&word.split('=').next().unwrap_or_default());
     let words = typed.words().into_iter().filter(is_kept).filter(|word| !is_box || word != BOX);
+    let error = args.error.map(|error| format!("--error={}%", 100.0 * error));
+    let time = args.time.map(|seconds| format!("--time={seconds}s"));
+    let words = words.chain(error).chain(time);
     let command = if is_box { words.collect() } else { ["render".to_owned()].into_iter().chain(words).collect() };
     view::run(Request { subject, photons: args.light.photons, size, command, options: args.device.options(), cancelled })?;
     Ok(End::Finished)
