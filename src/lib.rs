@@ -34,7 +34,7 @@
 //!
 //! ```text
 //! constants, error, text, records, rng, ledger, timings < settings, path, photon < scene < plan < cpu, gpu < engine < output
-//! output < bake < measure < cli;  scene < verify::judge;  engine < verify::selfcheck;  output < verify::compare < cli
+//! output < bake < measure, render < cli;  scene < verify::judge;  engine < verify::selfcheck;  output < verify::compare < cli
 //! ```
 //!
 //! `tests/architecture.rs` checks it.
@@ -56,6 +56,7 @@ pub mod path;
 pub mod photon;
 pub mod plan;
 pub mod records;
+pub mod render;
 pub mod rng;
 pub mod scene;
 pub mod settings;

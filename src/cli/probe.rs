@@ -7,13 +7,11 @@ use std::sync::atomic::AtomicBool;
 use clap::Args;
 use glam::DVec3;
 
-use super::chosen::Chosen;
 use super::job::{Job, MessageArgs};
 use super::options::{DevicesOfRunArgs, ReportArgs};
 use super::progress::ProgressReporter;
-use super::scene::{SceneArgs, TransportArgs, geometry};
+use super::scene::{SceneArgs, TransportArgs, geometry, settings};
 use super::{End, complain, say_beside};
-use crate::engine::scene::map_file::MapFile;
 use crate::engine::scene::{RunResult, Target};
 use crate::error::{Error, Result};
 use crate::output::destination::{Destination, check_distinct, write_all};
@@ -21,7 +19,7 @@ use crate::output::scene_report;
 use crate::plan::sensor::Sensor;
 use crate::plan::work_division::Free;
 use crate::scene::{Light, Mesh};
-use crate::settings::scene::{Illumination, SceneSettings};
+use crate::settings::scene::Illumination;
 use crate::text::{counted, echo, refusal};
 
 #[derive(Args)]
@@ -45,15 +43,10 @@ pub(super) struct ProbeArgs {
     device: DevicesOfRunArgs,
 }
 
-impl ProbeArgs {
-    pub(super) fn settings(&self, map: Option<&MapFile>, chosen: Option<&Chosen>) -> SceneSettings {
-        self.transport.settings(map, chosen)
-    }
-}
-
 pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
     let map = args.transport.map()?;
-    let settings = args.settings(map.as_ref(), args.transport.light.chosen.open()?.as_ref());
+    let request = args.transport.request();
+    let settings = settings(&request, map.as_ref(), args.transport.light.chosen.open()?.as_ref());
     settings.validate()?;
     let output = Destination::open("-o", &args.output)?;
     let reports = args.report.open()?;
@@ -85,7 +78,7 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
         camera: None,
         phases: &phases,
         map: map.as_ref(),
-        free: Free { samples: false, ..args.transport.free() },
+        free: Free { samples: false, ..args.transport.free(&request) },
         chosen: None,
         save_settings: None,
         explain: args.messages.explain,

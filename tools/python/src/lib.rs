@@ -1,0 +1,3 @@
+use pyo3::prelude::*;
+#[pymodule]
+mod photonmill_python {}
