@@ -18,6 +18,7 @@ use crate::output::destination::{Destination, check_distinct, write_all};
 use crate::output::scene_report;
 use crate::plan::sensor::Sensor;
 use crate::plan::work_division::Free;
+use crate::render::{MAX_POINTS, point_of};
 use crate::scene::{Light, Mesh};
 use crate::settings::scene::Illumination;
 use crate::text::{counted, echo, refusal};
@@ -114,11 +115,6 @@ fn table(lit: &RunResult) -> Vec<u8> {
     table.into_inner().expect("memory takes what is written")
 }
 
-/// Points of one run at most: their numbers are 32-bit.
-const MAX_POINTS: usize = 1 << 28;
-/// Metres: the square of anything larger would leave f32's range once normalised.
-const MAX_COORDINATE: f64 = 1e15;
-
 /// Positions and unit normals; empty lines and lines that begin with # are skipped.
 fn read_points(path: &Path) -> Result<Vec<(DVec3, DVec3)>> {
     let refuse = |reason: String| Error::setting("--points", path.display(), reason);
@@ -144,14 +140,7 @@ fn read_points(path: &Path) -> Result<Vec<(DVec3, DVec3)>> {
             .map(|field| field.parse().map_err(|_| wrong(&format!("'{}' is no number", echo(field)))))
             .collect::<Result<_>>()?;
         let [x, y, z, nx, ny, nz] = fields[..] else { return Err(wrong(&format!("has {} instead of 6", counted(fields.len(), "number")))) };
-        if let Some(value) = fields.iter().find(|value| value.is_nan() || value.abs() > MAX_COORDINATE) {
-            return Err(wrong(&format!("holds {value}; numbers must be from -{MAX_COORDINATE:e} to {MAX_COORDINATE:e}")));
-        }
-        let normal = DVec3::new(nx, ny, nz);
-        if normal == DVec3::ZERO {
-            return Err(wrong("has a normal of length 0"));
-        }
-        points.push((DVec3::new(x, y, z), (normal / normal.abs().max_element()).normalize()));
+        points.push(point_of([x, y, z], [nx, ny, nz]).map_err(|fault| wrong(&fault))?);
     }
     if points.is_empty() {
         return Err(refuse("holds no point; a line is `x y z nx ny nz`".into()));
