@@ -1,41 +1,44 @@
 //! From a scene to a picture, to the light at points or to lightmaps, in a few lines: what the commands `render`, `probe` and `bake` do, with
 //! the same defaults and the same bits, but without their options and messages. The Python module stands on it.
 //!
+//! The crate's page makes a picture. This is the irradiance at a point, to an error of 20 %, whatever rounds that takes:
+//!
 //! ```
+//! use glam::DVec3;
 //! use photonmill::engine::Control;
 //! use photonmill::gpu::{Gpu, Options};
 //! use photonmill::render::{PreparedScene, Request};
-//! use photonmill::scene::picture_size::PictureSize;
-//! # let folder = tempfile::tempdir().unwrap();
-//! # std::env::set_current_dir(folder.path()).unwrap();
+//! use photonmill::settings::stop::Stop;
 //!
 //! let mut gpus = vec![Gpu::open(&Options::default())?];
-//! let scene = PreparedScene::open("cornell-spheres")?;
-//! let request = Request { rounds: Some(8), photons: Some(4096), ..Request::default() };
-//! let size = PictureSize::WidthAndHeight(32, 32);
-//! let picture = scene.render(&mut gpus, None, Some(size), &request, &mut Control::default())?;
-//! picture.save("picture.png".as_ref(), &Default::default())?;
-//! println!("{:.1} %", 100.0 * picture.run.error().noise);
-//! # assert!(picture.run.error().noise < 1.0 && std::path::Path::new("picture.png").is_file());
+//! let scene = PreparedScene::open("cornell")?;
+//! let request = Request { stop: Stop { error: Some(0.2), ..Stop::default() }, photons: Some(4096), ..Request::default() };
+//! let points = [(DVec3::new(0.0, 0.001, 0.0), DVec3::Y)];
+//! let run = scene.probe(&mut gpus, &points, &request, &mut Control::default())?;
+//! println!("{} W/m2, with an error of {}", run.film.mean(0), run.film.stated_error(0));
+//! # assert!(run.film.mean(0).x > 0.0 && run.film.stated_error(0).x < run.film.mean(0).x);
 //! # Ok::<(), photonmill::error::Error>(())
 //! ```
 //!
-//! Points of surfaces, and how to end at an error of 20 %, whatever rounds that takes:
+//! Lightmaps, as values and as the files of `photonmill bake`:
 //!
 //! ```
 //! # use photonmill::engine::Control;
 //! # use photonmill::gpu::{Gpu, Options};
-//! # use photonmill::render::{PreparedScene, Request};
-//! use glam::DVec3;
-//! use photonmill::settings::stop::Stop;
+//! # use photonmill::render::{BakeRequest, PreparedScene, Request};
+//! use photonmill::output::destination::Folder;
+//! # let folder = tempfile::tempdir().unwrap();
+//! # std::env::set_current_dir(folder.path()).unwrap();
 //!
 //! # let mut gpus = vec![Gpu::open(&Options::default())?];
-//! # let scene = PreparedScene::open("cornell")?;
-//! let request = Request { stop: Stop { error: Some(0.2), ..Stop::default() }, photons: Some(4096), ..Request::default() };
-//! let points = [(DVec3::new(0.0, 0.001, 0.0), DVec3::Y)];
-//! let run = scene.probe(&mut gpus, &points, &request, &mut Control::default())?;
-//! let (irradiance, error) = (run.film.mean(0), run.film.stated_error(0));
-//! assert!(irradiance.x > 0.0 && error.x.is_finite());
+//! let scene = PreparedScene::open("cornell")?;
+//! let folder = Some(Folder::open("-o", "baked".as_ref())?);
+//! let bake = BakeRequest { folder, texels_per_metre: Some(2.0), ..BakeRequest::default() };
+//! let request = Request { rounds: Some(8), photons: Some(4096), ..Request::default() };
+//! let lightmaps = scene.bake(&mut gpus, &bake, &request, &mut Control::default())?;
+//! let floor = &lightmaps.maps[0];
+//! println!("{}: {} x {} texels, the first of {} W/m2", floor.name, floor.width, floor.height, floor.irradiance[0]);
+//! # assert!(lightmaps.files.iter().all(|file| std::path::Path::new("baked").join(file).is_file()) && floor.irradiance[0].x > 0.0);
 //! # Ok::<(), photonmill::error::Error>(())
 //! ```
 

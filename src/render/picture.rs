@@ -42,7 +42,8 @@ impl Default for Style {
 
 impl Picture {
     /// Writes a `.png` for the eye, or an `.exr` of linear radiance with layers, as the file's name ends.
-    pub fn save(&self, path: &Path, style: &Style) -> Result<()> {
+    pub fn save(&self, path: impl AsRef<Path>, style: &Style) -> Result<()> {
+        let path = path.as_ref();
         let format = Format::of("-o", path)?;
         let destination = Destination::open("-o", path)?;
         write_all([(destination, self.encode(format, style))])

@@ -19,6 +19,7 @@ import photonmill as pm
 
 QUICK: pm.Settings = {"rounds": 16, "photons": 4096, "seed": 7}
 SIZE = (24, 16)
+SOURCE = Path(os.environ.get("PHOTONMILL_SOURCE", Path(__file__).parents[3]))
 
 
 @pytest.fixture(scope="module")
@@ -209,7 +210,7 @@ def test_a_scene_says_what_it_holds() -> None:
 def test_warnings_are_warnings(tmp_path: Path) -> None:
     scene = tmp_path / "dark.gltf"
     scene.write_text('{"asset": {"version": "2.0"}}')
-    path = Path(__file__).parents[3] / "tests" / "scenes" / "blender.glb"
+    path = SOURCE / "tests" / "scenes" / "blender.glb"
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         read = pm.Scene(path)
@@ -409,3 +410,16 @@ def test_a_study_is_written(tmp_path: Path) -> None:
     found = pm.study("point-over-plane", tmp_path, budget=1, repeats=2, side=8, photons=512, rounds=1, reference_samples=16, progress=lines.append)
     assert found["complete"] is True and found["parts"] and lines
     assert (tmp_path / "index.html").is_file() and (tmp_path / "points.csv").is_file()
+
+
+def test_what_the_guide_shows_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for page in ["src/guide/python.md", "tools/python/README.md"]:
+        blocks = re.findall(r"^```python\n(.*?)^```", (SOURCE / page).read_text(), re.M | re.S)
+        assert blocks, page
+        names: dict[str, Any] = {}
+        for block in blocks:
+            exec(block, names)
+        assert (tmp_path / "picture.exr").is_file()
+        (tmp_path / "picture.exr").unlink()
+    assert any((tmp_path / "baked").iterdir())
