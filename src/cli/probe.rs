@@ -18,9 +18,7 @@ use crate::output::destination::{Destination, check_distinct, write_all};
 use crate::output::scene_report;
 use crate::plan::sensor::Sensor;
 use crate::plan::work_division::Free;
-use crate::render::{MAX_POINTS, point_of};
-use crate::scene::{Light, Mesh};
-use crate::settings::scene::Illumination;
+use crate::render::{MAX_POINTS, lacking_at_points, point_of};
 use crate::text::{counted, echo, refusal};
 
 #[derive(Args)]
@@ -59,15 +57,7 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
 
     let reporter = ProgressReporter::new(&args.messages.progress);
     let scene = args.scene.open(&reporter)?;
-    let kinds = scene.lobe_kinds();
-    let is_specular = |mesh: &Mesh| kinds[mesh.material].is_sharp();
-    let is_point_like = |light: &Light| !light.kind.is_environment();
-    if scene.lights.iter().any(is_point_like) && scene.meshes.iter().any(is_specular) {
-        complain("warning: points that lie on no surface receive no caustics of point, spot, directional and disc lights");
-    }
-    if settings.illumination == Illumination::Photons && !scene.lights.is_empty() {
-        complain("warning: with --illumination photons, points that lie on no surface receive direct light of emissive meshes only");
-    }
+    lacking_at_points(&scene, &settings).iter().for_each(|line| complain(&format!("warning: {line}")));
     let geometry = geometry(&scene, &settings, &reporter)?;
     let phases = Target::Points(&points).phases(&geometry);
     let sensor = Sensor::Receivers { count: points.len() as u32 };

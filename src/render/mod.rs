@@ -13,7 +13,7 @@
 //! let mut gpus = vec![Gpu::open(&Options::default())?];
 //! let scene = PreparedScene::open("cornell")?;
 //! let request = Request { stop: Stop { error: Some(0.2), ..Stop::default() }, photons: Some(4096), ..Request::default() };
-//! let points = [(DVec3::new(0.0, 0.001, 0.0), DVec3::Y)];
+//! let points = [(DVec3::new(0.5, 0.001, 0.5), DVec3::Y)];
 //! let run = scene.probe(&mut gpus, &points, &request, &mut Control::default())?;
 //! println!("{} W/m2, with an error of {}", run.film.mean(0), run.film.stated_error(0));
 //! # assert!(run.film.mean(0).x > 0.0 && run.film.stated_error(0).x < run.film.mean(0).x);
@@ -68,7 +68,7 @@ use crate::scene::picture_size::PictureSize;
 use crate::scene::surroundings::Surroundings;
 use crate::scene::{Camera, Reading, Scene, built_in};
 use crate::settings::request::{GOOD_ERROR, MOST_ROUNDS, longest_seconds};
-use crate::settings::scene::SceneSettings;
+use crate::settings::scene::{Illumination, SceneSettings};
 
 pub use crate::settings::request::Request;
 pub use lightmaps::{BakeRequest, Lightmap, Lightmaps};
@@ -117,6 +117,21 @@ pub fn point_of(position: [f64; 3], normal: [f64; 3]) -> std::result::Result<(DV
         return Err("has a normal of length 0".to_owned());
     }
     Ok((DVec3::from(position), (normal / normal.abs().max_element()).normalize()))
+}
+
+/// Light of a scene that does not reach points which lie on no surface.
+pub fn lacking_at_points(scene: &Scene, settings: &SceneSettings) -> Vec<&'static str> {
+    let kinds = scene.lobe_kinds();
+    let has_caustics = scene.meshes.iter().any(|mesh| kinds[mesh.material].is_sharp());
+    let has_lamps = scene.lights.iter().any(|light| !light.kind.is_environment());
+    let of_photons = settings.illumination == Illumination::Photons && !scene.lights.is_empty();
+    [
+        (has_lamps && has_caustics, "points that lie on no surface receive no caustics of point, spot, directional and disc lights"),
+        (of_photons, "with --illumination photons, points that lie on no surface receive direct light of emissive meshes only"),
+    ]
+    .into_iter()
+    .filter_map(|(lacks, line)| lacks.then_some(line))
+    .collect()
 }
 
 /// What looks at a scene.
@@ -168,7 +183,7 @@ impl PreparedScene {
     ) -> Result<Picture> {
         let scene = &self.scene;
         let mut seen = camera.cloned().unwrap_or_else(|| scene.first_camera());
-        let (width, height, remark) = PictureSize::of(size, &seen)?;
+        let (width, height, _) = PictureSize::of(size, &seen)?;
         if camera.is_none() && scene.cameras.is_empty() {
             seen = scene.camera_around(f64::from(width) / f64::from(height));
         }
@@ -178,9 +193,8 @@ impl PreparedScene {
             settings.stop.seconds = Some(longest_seconds(gpus[0].facts().kind));
             settings.rounds = MOST_ROUNDS;
         }
-        let (own, mut warnings) = self.geometry_of(&settings)?;
+        let (own, warnings) = self.geometry_of(&settings)?;
         let geometry = own.as_ref().unwrap_or(&self.geometry);
-        warnings.extend(remark);
         let view = View { geometry, camera: Some(&seen), phases: &[] };
         let looking = Looking { view, sensor: Sensor::Picture { width, height }, point: "pixel" };
         let run = self.light(gpus, &looking, settings, Free::of(request), warnings, control)?;
@@ -190,8 +204,11 @@ impl PreparedScene {
 
     /// The irradiance at points with the normals of their surfaces, metres.
     pub fn probe(&self, gpus: &mut Vec<Gpu>, points: &[(DVec3, DVec3)], request: &Request, control: &mut Control) -> Result<Run> {
+        let allowed = format!("must be from 1 to {MAX_POINTS}, the number of points");
+        require((1..=MAX_POINTS).contains(&points.len()), "--points", points.len(), allowed)?;
         let settings = request.settings(None);
-        let (own, warnings) = self.geometry_of(&settings)?;
+        let (own, mut warnings) = self.geometry_of(&settings)?;
+        warnings.extend(lacking_at_points(&self.scene, &settings).into_iter().map(str::to_owned));
         let geometry = own.as_ref().unwrap_or(&self.geometry);
         let target = Target::Points(points);
         let phases = target.phases(geometry);

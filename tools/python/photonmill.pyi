@@ -6,13 +6,35 @@ float32 and cannot be written to, as all who ask for one share it: ``array.copy(
 
 from collections.abc import Callable, Sequence
 from os import PathLike
-from typing import Any, Literal, TypedDict, final
+from typing import Any, Literal, TypeAlias, TypedDict, final, type_check_only
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from typing_extensions import Unpack
+from typing_extensions import Unpack, disjoint_base
+
+__all__ = [
+    "Error",
+    "RunWarning",
+    "ArgumentError",
+    "__version__",
+    "DeviceFacts",
+    "Device",
+    "Camera",
+    "Light",
+    "Scene",
+    "Run",
+    "Film",
+    "Irradiance",
+    "Lightmap",
+    "Lightmaps",
+    "devices",
+    "scenes",
+    "study",
+]
 
 __version__: str
+
+_Vector: TypeAlias = Sequence[float] | NDArray[np.floating[Any]]
 
 class Error(Exception):
     """What went wrong, in one line: what, which value, what is allowed."""
@@ -23,6 +45,7 @@ class ArgumentError(Error, ValueError):
 class RunWarning(UserWarning):
     """What the user should know of a scene or a run, in one line."""
 
+@type_check_only
 class Settings(TypedDict, total=False):
     """Settings of a run: the program's options of the same names, with its defaults, which None stands for, too.
 
@@ -94,6 +117,7 @@ class Settings(TypedDict, total=False):
     without: str | Sequence[str] | None
     """Effects to leave out."""
 
+@type_check_only
 class Progress(TypedDict):
     """How far a run has come."""
 
@@ -107,6 +131,7 @@ class Progress(TypedDict):
     photons: int
     """Traced so far."""
 
+@type_check_only
 class Ledger(TypedDict):
     """Fates of photons: emitted = absorbed + escaped + cut_off + dropped, and dropped is 0."""
 
@@ -117,6 +142,7 @@ class Ledger(TypedDict):
     dropped: int
     stored: int
 
+@disjoint_base
 class DeviceFacts:
     """What a Vulkan device is and can."""
 
@@ -176,9 +202,9 @@ class Camera:
 
     def __new__(
         cls,
-        position: Sequence[float],
-        target: Sequence[float],
-        up: Sequence[float] = (0.0, 1.0, 0.0),
+        position: _Vector,
+        target: _Vector,
+        up: _Vector = (0.0, 1.0, 0.0),
         fov: float = 40.0,
         *,
         aspect: float | None = None,
@@ -244,7 +270,7 @@ class Scene:
         *,
         radiometric: bool = False,
         at: float | None = None,
-        environment: float | Sequence[float] | str | PathLike[str] | None = None,
+        environment: float | _Vector | str | PathLike[str] | None = None,
         sun: Sequence[float] | None = None,
         environment_rotate: float | None = None,
         environment_strength: float | None = None,
@@ -304,7 +330,8 @@ class Scene:
         """Renders what a camera sees.
 
         camera: one's own, or the name of one of the scene's; its first, or one that sees all of it.
-        size: width, or (width, height), pixels; about 307200 pixels in the camera's aspect ratio.
+        size: width, or (width, height), pixels; about 307200 pixels in the camera's aspect ratio. In another one the vertical field of
+            view is kept.
         device: the usual one, which is opened once and stays open.
         progress: called every few rounds. What it raises ends the run.
         settings: see `Settings`.
@@ -352,6 +379,7 @@ class Scene:
         The rest is as of `render`.
         """
 
+@disjoint_base
 class Run:
     """What all results have: how wrong they are, and how they came about."""
 
@@ -431,15 +459,15 @@ class Film(Run):
 
     @property
     def albedo(self) -> NDArray[np.float32]:
-        """Of what each pixel sees first, shape (height, width, 3); for denoisers."""
+        """Of what each pixel sees first, its mean, shape (height, width, 3); for denoisers."""
 
     @property
     def normal(self) -> NDArray[np.float32]:
-        """Of what each pixel sees first, in the scene's axes, shape (height, width, 3)."""
+        """Of what each pixel sees first, its mean, in the scene's axes, shape (height, width, 3)."""
 
     @property
     def depth(self) -> NDArray[np.float32]:
-        """Metres along the ray to what each pixel sees first, shape (height, width); inf where there is nothing."""
+        """Metres along the ray to what each pixel sees first, its mean, shape (height, width); inf where there is nothing."""
 
     def save(
         self,

@@ -18,6 +18,7 @@ type Vector = [f64; 3];
 impl Camera {
     #[new]
     #[pyo3(signature = (position, target, up=[0.0, 1.0, 0.0], fov=40.0, *, aspect=None, aperture=0.0, focus=None, name="camera"))]
+    #[pyo3(text_signature = "(position, target, up=(0.0, 1.0, 0.0), fov=40.0, *, aspect=None, aperture=0.0, focus=None, name='camera')")]
     #[expect(clippy::too_many_arguments, reason = "they have names in Python")]
     fn new(
         py: Python<'_>,

@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use numpy::ndarray::{Array, Array2, Array3, Dimension};
 use numpy::{IntoPyArray, PyArray, PyArray2, PyArray3, PyArrayMethods};
 use photonmill::output::colour::{Format, Tone};
@@ -39,6 +39,13 @@ fn rows(colours: impl Iterator<Item = Vec3>) -> Array2<f32> {
 
 type Pixels = PyOnceLock<Py<PyArray3<f32>>>;
 
+/// What each pixel sees first.
+struct Surfaces {
+    albedo: Py<PyArray3<f32>>,
+    normal: Py<PyArray3<f32>>,
+    depth: Py<PyArray2<f32>>,
+}
+
 #[doc = doc!("Film")]
 #[pyclass(module = "photonmill", extends = Run, frozen)]
 pub struct Film {
@@ -46,7 +53,7 @@ pub struct Film {
     radiance: Pixels,
     standard_error: Pixels,
     parts: PyOnceLock<Py<PyDict>>,
-    surfaces: PyOnceLock<(Py<PyArray3<f32>>, Py<PyArray3<f32>>, Py<PyArray2<f32>>)>,
+    surfaces: PyOnceLock<Surfaces>,
 }
 
 impl Film {
@@ -65,7 +72,7 @@ impl Film {
         }
     }
 
-    fn surfaces(&self, py: Python<'_>) -> PyResult<&(Py<PyArray3<f32>>, Py<PyArray3<f32>>, Py<PyArray2<f32>>)> {
+    fn surfaces(&self, py: Python<'_>) -> PyResult<&Surfaces> {
         self.surfaces.get_or_try_init(py, || {
             let made = self.picture();
             let seen = py.detach(|| made.surfaces());
@@ -73,7 +80,8 @@ impl Film {
             let (width, height) = (made.size.0 as usize, made.size.1 as usize);
             let depths = seen.iter().map(|surface| surface.depth).collect();
             let depth = Array2::from_shape_vec((height, width), depths).expect("one depth a pixel");
-            Ok((colours(|surface| surface.albedo), colours(|surface| surface.normal), array(py, depth).unbind()))
+            let (albedo, normal) = (colours(|surface| surface.albedo), colours(|surface| surface.normal));
+            Ok(Surfaces { albedo, normal, depth: array(py, depth).unbind() })
         })
     }
 }
@@ -119,7 +127,7 @@ impl Film {
     #[getter]
     fn radiance<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray3<f32>> {
         let Picture { run, size, .. } = self.picture();
-        let make = || array(py, py.detach(|| picture(*size, run.film.means().map(|mean| mean.as_vec3())))).unbind();
+        let make = || array(py, py.detach(|| picture(*size, run.film.means().map(DVec3::as_vec3)))).unbind();
         self.radiance.get_or_init(py, make).bind(py).clone()
     }
 
@@ -155,19 +163,19 @@ impl Film {
     #[doc = doc!("Film.albedo")]
     #[getter]
     fn albedo<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
-        Ok(self.surfaces(py)?.0.bind(py).clone())
+        Ok(self.surfaces(py)?.albedo.bind(py).clone())
     }
 
     #[doc = doc!("Film.normal")]
     #[getter]
     fn normal<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
-        Ok(self.surfaces(py)?.1.bind(py).clone())
+        Ok(self.surfaces(py)?.normal.bind(py).clone())
     }
 
     #[doc = doc!("Film.depth")]
     #[getter]
     fn depth<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        Ok(self.surfaces(py)?.2.bind(py).clone())
+        Ok(self.surfaces(py)?.depth.bind(py).clone())
     }
 
     #[doc = doc!("Film.save")]
@@ -220,7 +228,7 @@ impl Irradiance {
     #[doc = doc!("Irradiance.irradiance")]
     #[getter]
     fn irradiance<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f32>> {
-        let make = || array(py, rows(self.run().film.means().map(|mean| mean.as_vec3()))).unbind();
+        let make = || array(py, rows(self.run().film.means().map(DVec3::as_vec3))).unbind();
         self.irradiance.get_or_init(py, make).bind(py).clone()
     }
 

@@ -7,7 +7,7 @@ use numpy::PyReadonlyArray2;
 use photonmill::bake::MAX_SIDE;
 use photonmill::bake::pages::{Atlas, MIN_PAGE};
 use photonmill::output::destination::Folder;
-use photonmill::render::{BakeRequest, MAX_POINTS, PreparedScene, point_of};
+use photonmill::render::{BakeRequest, PreparedScene, point_of};
 use photonmill::scene::picture_size::{PictureSize, parse_size};
 use photonmill::scene::surroundings::{Environment, Surroundings};
 use photonmill::scene::{LightKind, Reading, built_in};
@@ -99,9 +99,6 @@ fn points_of(points: &Bound<'_, PyAny>, normals: &Bound<'_, PyAny>) -> PyResult<
     if points.len() != normals.len() {
         let counts = format!("normals: there are {} of them, and {} points; each point needs one", normals.len(), points.len());
         return Err(error::argument(py, counts));
-    }
-    if points.is_empty() || points.len() > MAX_POINTS {
-        return Err(error::argument(py, format!("points: there are {}; must be from 1 to {MAX_POINTS}", points.len())));
     }
     let all = points.into_iter().zip(normals).enumerate();
     let point = |(number, (position, normal))| {

@@ -14,7 +14,7 @@ use crate::run::beside_python;
 
 #[doc = doc!("study")]
 #[pyfunction]
-#[pyo3(signature = (scene, folder, *, budget=240.0, repeats=5, side=None, photons=None, rounds=studies::MOST_ROUNDS, seed=1, reference_samples=4096, device=None, progress=None))]
+#[pyo3(signature = (scene, folder, *, budget=240.0, repeats=5, side=None, photons=None, rounds=1_048_576, seed=1, reference_samples=4096, device=None, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "they have names in Python")]
 pub fn study<'py>(
     py: Python<'py>,
