@@ -17,8 +17,7 @@ use crate::error::{Error, Result, require};
 use crate::output::colour::{Format, Tone};
 use crate::output::destination::{Destination, check_distinct, check_not_read, write_all, write_synced};
 use crate::output::merge_report;
-use crate::output::metadata::units;
-use crate::output::show::{Layer, Show};
+use crate::output::show::{Layer, Show, units};
 use crate::plan::sensor::Sensor;
 
 #[derive(Args)]

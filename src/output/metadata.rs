@@ -9,7 +9,6 @@ use exr::meta::header::LayerAttributes;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use super::colour::{Format, Tone};
 use crate::engine::error_bound::FilmError;
 use crate::gpu::DeviceFacts;
 use crate::plan::work_division::Division;
@@ -56,18 +55,6 @@ pub enum Repeat {
     With { command: String, arguments: Vec<String>, division: Division, tiles: Option<TileSamples> },
     /// It cannot be repeated, for this reason.
     Not(String),
-}
-
-/// What a file's values are.
-pub fn units(format: Format, stops: f32, tone: Tone) -> String {
-    let tone = match tone {
-        Tone::Neutral => "Khronos PBR Neutral",
-        Tone::Linear => "linear",
-    };
-    match format {
-        Format::Exr => "radiance, W/m2/sr, linear, Rec. 709 primaries".to_owned(),
-        Format::Png => format!("sRGB; exposure {stops:+.2} stops, tone curve {tone}"),
-    }
 }
 
 /// Of the devices of a run, each kind once.

@@ -71,6 +71,18 @@ pub fn surfaces(scene: &Scene, camera: &Camera, size: (u32, u32)) -> Vec<Surface
     first_surfaces(scene, camera, size).into_iter().map(surface).collect()
 }
 
+/// What a file's values are.
+pub fn units(format: Format, stops: f32, tone: Tone) -> String {
+    let tone = match tone {
+        Tone::Neutral => "Khronos PBR Neutral",
+        Tone::Linear => "linear",
+    };
+    match format {
+        Format::Exr => "radiance, W/m2/sr, linear, Rec. 709 primaries".to_owned(),
+        Format::Png => format!("sRGB; exposure {stops:+.2} stops, tone curve {tone}"),
+    }
+}
+
 /// How a film is shown.
 pub struct Show {
     pub size: (u32, u32),

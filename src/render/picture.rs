@@ -8,8 +8,8 @@ use crate::engine::identity::settings_with_effect;
 use crate::error::Result;
 use crate::output::colour::{Format, Tone};
 use crate::output::destination::{Destination, write_all};
-use crate::output::metadata::{Metadata, Repeat, devices, errors, units};
-use crate::output::show::{Layer, Show, Surface, surfaces};
+use crate::output::metadata::{Metadata, Repeat, devices, errors};
+use crate::output::show::{Layer, Show, Surface, surfaces, units};
 use crate::scene::{Camera, Scene};
 
 /// Row by row from the top, W/m2/sr.

@@ -125,8 +125,8 @@ def channels(path: Path) -> dict[str, Any]:
     assert header["compression"] == b"\3"
     names, rest = [], header["channels"]
     while rest[0]:
-        name, rest = rest.split(b"\0", 1)
-        names.append(name.decode())
+        first, rest = rest.split(b"\0", 1)
+        names.append(first.decode())
         rest = rest[16:]
     left, top, right, bottom = struct.unpack("<4i", header["dataWindow"])
     width, height = right - left + 1, bottom - top + 1
@@ -172,7 +172,7 @@ def test_points_have_the_irradiance_of_a_closed_form() -> None:
     points = np.array([[0.5, 0.001, 0.5], [0.3, 0.001, 0.4]])
     found = scene.probe(points, [[0, 2, 0], [0, 1, 0]], rounds=32, photons=8192)
     assert found.irradiance.shape == found.standard_error.shape == (2, 3) and len(found) == 2
-    assert np.all(found.standard_error < 0.2)
+    assert np.all(found.standard_error < 0.5)
     assert np.all(np.abs(found.irradiance - 2 * np.pi) < 4 * found.standard_error + 0.02)
     # Whatever the points come in.
     again = scene.probe(points.tolist(), [[0, 1, 0]] * 2, rounds=32, photons=8192)
@@ -425,7 +425,8 @@ def test_a_study_ends_where_it_is_told_to(tmp_path: Path) -> None:
 
     with pytest.raises(RuntimeError, match="."):
         pm.study("point-over-plane", tmp_path, budget=1, repeats=2, side=8, photons=512, rounds=1, reference_samples=16, progress=stop)
-    assert not (tmp_path / "index.html").exists()
+    # What there is has its page.
+    assert "Incomplete" in (tmp_path / "index.html").read_text()
 
 
 @pytest.mark.skipif("PHOTONMILL_SLOW" not in os.environ, reason="makes pipelines for every choice, half a minute; PHOTONMILL_SLOW=1 runs it")
