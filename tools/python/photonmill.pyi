@@ -336,7 +336,8 @@ class Scene:
         progress: called every few rounds. What it raises ends the run.
         settings: see `Settings`.
 
-        Other threads of Python go on while the device works. Ctrl-C ends the run within a submission to the device.
+        Other threads of Python go on while the device works. Ctrl-C ends the run within a submission to the device, or after the
+        pilot.
         """
 
     def probe(

@@ -389,7 +389,8 @@ print("ready", flush=True)
 # Nothing of Python runs in this thread, which is the one that hears of signals.
 threading.Timer(0.5, lambda: print("under way", flush=True)).start()
 try:
-    scene.render(size=32, time=20)
+    # No pilot, which ends before the run does.
+    scene.render(size=32, time=20, rounds=100000)
 except KeyboardInterrupt:
     print("interrupted", flush=True)
 # What was interrupted is in nobody's way.
