@@ -3,23 +3,40 @@
 //!
 //! The [`guide`] holds what a user needs: [the paper's box](guide::paper), [the window](guide::view), [scenes](guide::scenes),
 //! [materials](guide::materials), [accuracy](guide::accuracy), a [study](guide::study) of what accuracy costs,
-//! [performance](guide::performance), [scale](guide::scale), [hard cases](guide::hard_cases) and [file formats](guide::formats).
+//! [performance](guide::performance), [scale](guide::scale), [hard cases](guide::hard_cases), [Python](guide::python) and [file formats](guide::formats).
 //! [Architecture](guide::architecture) explains how the program is built, why its results repeat, and how it is tested.
 //!
-//! ```no_run
-//! use photonmill::engine::scene::{Target, render};
-//! use photonmill::gpu::{Gpu, Options};
-//! use photonmill::scene::Scene;
-//! use photonmill::settings::scene::SceneSettings;
+//! A scene to a picture ([`render`] has points and lightmaps, too):
 //!
-//! let gpu = Gpu::open(&Options::default())?;
-//! let scene = Scene::open("cornell", false)?;
-//! let camera = scene.first_camera();
-//! let run = render(&gpu, &scene, &SceneSettings::default(), Target::Picture(&camera, [320, 240]))?;
-//! let radiance: Vec<glam::DVec3> = run.film.means().collect();
-//! println!("{} pixels; {}", radiance.len(), run.ledger());
+//! ```
+//! use photonmill::engine::Control;
+//! use photonmill::gpu::{Gpu, Options};
+//! use photonmill::render::{PreparedScene, Request, Style};
+//! use photonmill::scene::picture_size::PictureSize;
+//! # let folder = tempfile::tempdir().unwrap();
+//! # std::env::set_current_dir(folder.path()).unwrap();
+//!
+//! let mut gpus = vec![Gpu::open(&Options::default())?];
+//! let scene = PreparedScene::open("cornell-spheres")?;
+//! let request = Request { rounds: Some(8), photons: Some(4096), ..Request::default() };
+//! let size = PictureSize::WidthAndHeight(32, 32);
+//! let picture = scene.render(&mut gpus, None, Some(size), &request, &mut Control::default())?;
+//! picture.save("picture.png", &Style::default())?;
+//! println!("{:.1} %", 100.0 * picture.run.error().noise);
+//! # assert!(picture.run.error().noise < 1.0 && std::path::Path::new("picture.png").is_file());
 //! # Ok::<(), photonmill::error::Error>(())
 //! ```
+//!
+//! # Versions
+//!
+//! Versions follow [semantic versioning](https://semver.org). The public API is [`render`] with the types that it takes and gives back
+//! ([`gpu::Gpu`] and its options, [`scene::Scene`], the settings, [`engine::Control`], [`engine::scene::RunResult`], [`error::Error`]), the
+//! program's commands and options, the files that it writes, and the Python module. All else is public for the program and the tests, and may
+//! change in any release.
+//!
+//! As long as the version is 0.x, a release that raises x may change all of that, and the changelog says what; one that raises the last
+//! number breaks nothing. The same version gives the same bits for the same seed on the same device and driver; another version need not. The
+//! oldest Rust that builds it is that of `rust-version`; raising it raises x.
 //!
 //! # The straight line
 //!
@@ -34,7 +51,7 @@
 //!
 //! ```text
 //! constants, error, text, records, rng, ledger, timings < settings, path, photon < scene < plan < cpu, gpu < engine < output
-//! output < bake < measure < cli;  output < view < cli;  scene < verify::judge;  engine < verify::selfcheck;  output < verify::compare < cli
+//! output < bake < measure, render < cli;  output < view < cli;  scene < verify::judge;  engine < verify::selfcheck;  output < verify::compare < cli
 //! ```
 //!
 //! `tests/architecture.rs` checks it.
@@ -56,6 +73,7 @@ pub mod path;
 pub mod photon;
 pub mod plan;
 pub mod records;
+pub mod render;
 pub mod rng;
 pub mod scene;
 pub mod settings;

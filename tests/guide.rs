@@ -46,7 +46,8 @@ fn commands(text: &str) -> Vec<String> {
 }
 
 /// Commands that start so are not run, and why.
-const NOT_RUN: [(&str, &str); 13] = [
+const NOT_RUN: [(&str, &str); 14] = [
+    ("pip install ", "builds a wheel; `tools/python/test` does, and runs what the page shows"),
     ("tools/setup && tools/test", "runs this test"),
     ("tools/test", "runs this test"),
     ("tools/bench/run ", "writes into the repository"),

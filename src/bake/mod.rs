@@ -52,6 +52,7 @@ mod bleeding;
 mod document;
 mod files;
 mod gutters;
+mod lighting;
 mod names;
 mod objects;
 pub mod original;
@@ -67,6 +68,7 @@ use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
 pub use files::{IntoFile, Written, names, preview, write};
+pub use lighting::{estimates, usual_density, usual_exposure};
 pub use texels::{CoveredTexel, SurfacePoint};
 
 use crate::error::{Error, Result};

@@ -8,22 +8,18 @@ use clap::Args;
 use super::job::{Job, MessageArgs};
 use super::options::{DevicesOfRunArgs, ReportArgs};
 use super::progress::ProgressReporter;
-use super::scene::{SceneArgs, TransportArgs, geometry};
+use super::scene::{SceneArgs, TransportArgs, geometry, settings};
 use super::values::{parse_number, parse_stops};
 use super::{End, complain, say_beside};
 use crate::bake::pages::{Atlas, MIN_PAGE, Pages};
-use crate::bake::{self, IntoFile, Layout, MAX_SIDE, PHASE_COUNT, TexelEstimate, Written};
-use crate::engine::scene::RunResult;
+use crate::bake::{self, IntoFile, Layout, MAX_SIDE, Written};
 use crate::error::{Error, Result};
-use crate::output::colour::ColourPicture;
 use crate::output::destination::{Folder, check_distinct, write_all};
 use crate::output::scene_report;
 use crate::plan::sensor::Sensor;
 use crate::plan::work_division::Free;
-use crate::records::Receiver;
-use crate::scene::geometry::Geometry;
+use crate::scene::built_in;
 use crate::scene::gltf::source::File;
-use crate::scene::{Scene, built_in};
 use crate::text::counted;
 
 #[derive(Args)]
@@ -58,7 +54,8 @@ pub(super) struct BakeArgs {
 
 pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
     let map = args.transport.map()?;
-    let settings = args.transport.settings(map.as_ref(), args.transport.light.chosen.open()?.as_ref());
+    let request = args.transport.request();
+    let settings = settings(&request, map.as_ref(), args.transport.light.chosen.open()?.as_ref());
     settings.validate()?;
     let folder = Folder::open("-o", &args.output)?;
     let reports = args.report.open()?;
@@ -79,16 +76,10 @@ pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
     let reporter = ProgressReporter::new(&args.messages.progress);
     let scene = args.scene.open(&reporter)?;
     let file = if is_built_in { None } else { Some(File::open(Path::new(name))?) };
-    let area = baked_area(&scene);
-    if area == 0.0 {
-        let reason =
-            "has nothing to bake: every surface is a mirror, lets light through or is unlit, or has no area; add one that scatters light";
-        return Err(Error::Scene { path: name.into(), object: "the scene".into(), reason: reason.into() });
-    }
+    let density = bake::usual_density(&scene, name)?;
     reporter.status("laying out the lightmaps");
     let atlas = if is_built_in { Atlas::Off } else { args.atlas.unwrap_or(Atlas::Auto) };
-    let density = args.texels_per_metre.unwrap_or((USUAL_TEXELS / area).sqrt());
-    let layout = Layout::of_file(&scene, file.as_ref(), density, atlas.max_side())?;
+    let layout = Layout::of_file(&scene, file.as_ref(), args.texels_per_metre.unwrap_or(density), atlas.max_side())?;
     layout.warnings.iter().for_each(|warning| complain(&format!("warning: {warning}")));
     let pages = Pages::new(&layout, atlas);
     // Before the light, as it says what is wrong with the file.
@@ -99,9 +90,7 @@ pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
         check_distinct(&[&[folder.file(&name)], report_files.as_slice()].concat())?;
     }
     let geometry = geometry(&scene, &settings, &reporter)?;
-    // Each round estimates one point of every texel, another one each time.
-    let phases: Vec<Vec<Receiver>> =
-        (0..PHASE_COUNT.min(settings.rounds as usize)).map(|phase| receivers(&layout, phase, &geometry)).collect();
+    let phases = layout.receivers(settings.rounds, &geometry);
     let sensor = Sensor::Receivers { count: layout.texel_count() as u32 };
     let job = Job {
         scene: &scene,
@@ -111,7 +100,7 @@ pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
         camera: None,
         phases: &phases,
         map: map.as_ref(),
-        free: Free { samples: false, ..args.transport.free() },
+        free: Free { samples: false, ..args.transport.free(&request) },
         chosen: None,
         save_settings: None,
         explain: args.messages.explain,
@@ -120,8 +109,8 @@ pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
     let mut gpus = args.device.open(&reporter)?;
     let lit = job.run(&mut gpus, &args.transport.stop, &mut keeper, &reporter, cancelled)?;
 
-    let estimates = estimates(&lit);
-    let stops = args.exposure.unwrap_or_else(|| usual_exposure(&estimates));
+    let estimates = bake::estimates(&lit);
+    let stops = args.exposure.unwrap_or_else(|| bake::usual_exposure(&estimates));
     let text = scene_report::text(&scene.name, &lit, job.point, args.messages.explain);
     let maps = layout.maps(&estimates);
     let written = match into_file {
@@ -162,38 +151,4 @@ fn built_in_files(layout: &Layout) -> Vec<Written> {
     ]
     .map(|(name, purpose)| Written { name: name.to_owned(), purpose })
     .into()
-}
-
-/// Texels of all maps together, unless the user asks for a density.
-const USUAL_TEXELS: f64 = 65_536.0;
-
-/// Of the surfaces that get lightmaps, square metres.
-fn baked_area(scene: &Scene) -> f64 {
-    let kinds = scene.lobe_kinds();
-    let baked = scene.meshes.iter().filter(|mesh| kinds[mesh.material].matt);
-    baked.map(|mesh| (0..mesh.triangles.len()).map(|triangle| mesh.area(triangle)).sum::<f64>()).sum()
-}
-
-fn receivers(layout: &Layout, phase: usize, geometry: &Geometry) -> Vec<Receiver> {
-    layout
-        .phase(phase)
-        .iter()
-        .map(|sample| Receiver {
-            position: geometry.to_local(sample.position),
-            normal: sample.geometric_normal.as_vec3(),
-            shading_normal: sample.shading_normal.as_vec3(),
-        })
-        .collect()
-}
-
-fn estimates(lit: &RunResult) -> Vec<TexelEstimate> {
-    let errors = lit.film.stated_errors();
-    (0..lit.film.pixels())
-        .map(|texel| TexelEstimate { irradiance: lit.film.mean(texel).as_vec3(), standard_error: errors(texel).as_vec3() })
-        .collect()
-}
-
-fn usual_exposure(estimates: &[TexelEstimate]) -> f32 {
-    let pixels = estimates.iter().map(|estimate| estimate.irradiance / std::f32::consts::PI).collect();
-    ColourPicture { width: estimates.len() as u32, height: 1, pixels }.usual_exposure()
 }

@@ -3,10 +3,10 @@
 use clap::Args;
 use glam::{DVec2, DVec3};
 
-use super::picture_size::{PictureSize, parse_size};
 use super::progress::ProgressReporter;
 use super::values::{parse_number, parse_numbers};
 use crate::error::{Error, Result, require};
+use crate::scene::picture_size::{PictureSize, parse_size};
 use crate::scene::{Camera, Lens, Projection, Scene};
 
 #[derive(Args)]
@@ -90,7 +90,7 @@ impl CameraArgs {
     /// The camera, and the size of its picture.
     pub(super) fn resolve(&self, scene: &Scene, reporter: &ProgressReporter) -> Result<(Camera, [u32; 2])> {
         let own = named(scene, self.camera.as_deref())?;
-        let (width, height) = PictureSize::resolve(self.size, &own, reporter)?;
+        let (width, height) = resolve(self.size, &own, reporter)?;
         let own = if scene.cameras.is_empty() { scene.camera_around(f64::from(width) / f64::from(height)) } else { own };
         let mut camera = self.placed(own)?;
         camera.lens = self.lens(scene, &camera, reporter)?;
@@ -100,7 +100,7 @@ impl CameraArgs {
     /// Of the paper's box, whose camera is not one of a scene; `None` where nobody has asked for a size.
     pub(super) fn size_of_box(&self, reporter: &ProgressReporter) -> Result<Option<[u32; 2]>> {
         let camera = Camera::looking_at("box", DVec3::Z, DVec3::ZERO, DVec3::Y, 1.0);
-        self.size.map(|_| PictureSize::resolve(self.size, &camera, reporter).map(<[u32; 2]>::from)).transpose()
+        self.size.map(|_| resolve(self.size, &camera, reporter).map(<[u32; 2]>::from)).transpose()
     }
 
     fn placed(&self, own: Camera) -> Result<Camera> {
@@ -137,18 +137,14 @@ fn text(point: DVec3) -> String {
     point.to_array().map(|value| value.to_string()).join(",")
 }
 
+/// Width and height in pixels; prints a note if they change what the camera sees.
+pub(super) fn resolve(size: Option<PictureSize>, camera: &Camera, reporter: &ProgressReporter) -> Result<(u32, u32)> {
+    let (width, height, remark) = PictureSize::of(size, camera)?;
+    remark.iter().for_each(|remark| reporter.note(&format!("note: {remark}")));
+    Ok((width, height))
+}
+
 /// The camera by name, else the scene's first, else one that sees all of it.
 pub(super) fn named(scene: &Scene, name: Option<&str>) -> Result<Camera> {
-    match name {
-        Some(name) => scene.cameras.iter().find(|camera| camera.name == name).cloned().ok_or_else(|| {
-            let names: Vec<&str> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
-            let there = if names.is_empty() {
-                "no such camera: the scene has none; leave --camera out".to_owned()
-            } else {
-                format!("must be one of {}", names.join(", "))
-            };
-            Error::setting("--camera", name, there)
-        }),
-        None => Ok(scene.first_camera()),
-    }
+    name.map_or_else(|| Ok(scene.first_camera()), |name| scene.camera(name))
 }

@@ -84,8 +84,9 @@ impl Chosen {
         }
     }
 
-    pub(super) fn set(&self, settings: &SceneSettings) -> SceneSettings {
-        SceneSettings { tiles: self.tiles.clone(), ..self.settings.set(settings) }
+    /// What a request starts from.
+    pub(super) fn settings(&self) -> SceneSettings {
+        SceneSettings { tiles: self.tiles.clone(), rounds: self.rounds, ..self.settings.set(&SceneSettings::default()) }
     }
 
     fn open(path: &Path) -> Result<Chosen> {
@@ -104,7 +105,7 @@ impl Chosen {
     }
 
     fn validate(&self) -> Result<()> {
-        SceneSettings { rounds: self.rounds, ..self.settings.set(&SceneSettings::default()) }.validate()
+        self.settings().validate()
     }
 
     /// What a picture's file says of its rounds; fails where that is nothing that a run can do.

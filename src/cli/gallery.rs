@@ -5,7 +5,6 @@ use std::sync::atomic::AtomicBool;
 
 use clap::Args;
 
-use super::picture_size::MAX_SIDE;
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::values::{parse_integer, parse_percent, parse_seconds};
 use super::{DeviceArgs, End, complain, say};
@@ -13,6 +12,7 @@ use crate::error::{Result, require, within};
 use crate::gpu::Gpu;
 use crate::measure::gallery::{self, Request};
 use crate::output::destination::Folder;
+use crate::scene::picture_size::MAX_SIDE;
 
 #[derive(Args)]
 pub(super) struct GalleryArgs {

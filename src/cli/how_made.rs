@@ -9,9 +9,8 @@ use crate::engine::room::RunResult as RoomResult;
 use crate::engine::saved::SavedRun;
 use crate::engine::scene::{RunResult, SceneFilm};
 use crate::engine::watch::End;
-use crate::gpu::DeviceFacts;
-use crate::output::colour::{Format, Tone};
-use crate::output::metadata::{Metadata, Repeat};
+use crate::output::colour::Format;
+use crate::output::metadata::{Metadata, Repeat, devices, errors};
 use crate::plan::work_division::Division;
 use crate::settings::Builder;
 use crate::settings::scene::SceneSettings;
@@ -96,35 +95,6 @@ pub(super) struct Made<'a> {
 /// The blocks up to the last one of a resumed run that lacks some of them; 0 where it lacks none.
 pub(super) fn blocks_with_gaps(resumed: Option<&SavedRun>) -> u32 {
     resumed.map(|run| run.done.end()).filter(|end| resumed.is_some_and(|run| run.done.count() < *end)).unwrap_or(0)
-}
-
-/// What a file's values are.
-pub(super) fn units(format: Format, stops: f32, tone: Tone) -> String {
-    let tone = match tone {
-        Tone::Neutral => "Khronos PBR Neutral",
-        Tone::Linear => "linear",
-    };
-    match format {
-        Format::Exr => "radiance, W/m2/sr, linear, Rec. 709 primaries".to_owned(),
-        Format::Png => format!("sRGB; exposure {stops:+.2} stops, tone curve {tone}"),
-    }
-}
-
-/// Of the devices of a run, each kind once.
-pub(super) fn devices<'a>(facts: impl Iterator<Item = &'a DeviceFacts>) -> Vec<String> {
-    let mut names: Vec<String> = facts.map(|facts| format!("{}, {}", facts.name, facts.driver)).collect();
-    names.sort();
-    names.dedup();
-    names
-}
-
-fn known(value: f64) -> Option<f64> {
-    Some(value).filter(|value| value.is_finite())
-}
-
-/// Noise, and its bound.
-fn errors(error: &FilmError, confidence: f64) -> [Option<f64>; 2] {
-    [known(error.noise), known(error.noise).and_then(|_| known(error.bound(confidence)))]
 }
 
 impl Made<'_> {

@@ -8,18 +8,15 @@ use super::chosen::{Chosen, For};
 use super::interrupt::interruptible;
 use super::keep::Keeper;
 use super::progress::{ProgressArgs, ProgressReporter};
-use super::stop::{StopArgs, bias_before, check_bias, goals, rounds_after, up_to};
+use super::stop::{StopArgs, bias_before, goals, rounds_after, up_to};
 use super::{complain, device_failed};
-use crate::engine::retry::{run_on, until_done};
-use crate::engine::saved::{SavedFilm, SavedRun};
-use crate::engine::scene::losses::losses;
+use crate::engine::Control;
+use crate::engine::retry::until_done;
+use crate::engine::saved::SavedRun;
 use crate::engine::scene::map_file::MapFile;
-use crate::engine::scene::{self, RunResult, SceneFilm, View};
-use crate::engine::several_devices::Work;
-use crate::engine::{self, Control};
+use crate::engine::scene::{self, RunResult, View};
 use crate::error::Result;
 use crate::gpu::Gpu;
-use crate::ledger::Fates;
 use crate::output::destination::Destination;
 use crate::output::scene_report;
 use crate::plan::film::BiasPlan;
@@ -31,7 +28,6 @@ use crate::records::Receiver;
 use crate::scene::geometry::Geometry;
 use crate::scene::{Camera, Scene};
 use crate::settings::scene::SceneSettings;
-use crate::settings::stop::Stop;
 use crate::text::counted;
 
 /// What a run prints.
@@ -130,7 +126,7 @@ impl Job<'_> {
             interruptible(|| until_done(gpu, &device_failed, once))
         };
         let alpha = settings.alpha;
-        check_bias(&settings.stop, plan.film.bias)?;
+        scene::bias::check(&settings.stop, plan.film.bias)?;
         // The error asked for is noise and bias together, so what blocks do not tell must be known beforehand.
         let takes_extra_runs = stop.bias && plan.film.bias == BiasPlan::ExtraRuns;
         let before =
@@ -140,7 +136,7 @@ impl Job<'_> {
         reporter.status("making the pipelines");
         let keep = keeper.keep(&scene.name);
         let mut control = Control { cancelled, progress: &mut |progress| reporter.report(progress, "round"), keep };
-        let mut lit = interruptible(|| self.light(gpus, &view, &plan, &mut control))?;
+        let mut lit = interruptible(|| scene::light_on(gpus, (scene, &view), &plan, map, &device_failed, &mut control))?;
         if lit.is_cancelled() {
             complain(&format!("ended early: the results are of {} of {}", counted(lit.film.rounds, "round"), settings.rounds));
             return Ok(lit);
@@ -187,14 +183,9 @@ impl Job<'_> {
         let Job { scene, settings, geometry, sensor, free, chosen, save_settings, .. } = *self;
         let mut found = settings.clone();
         let mut rounds = settings.rounds;
-        // A number of rounds is no goal.
-        let has_goal = settings.stop.error.is_some() || settings.stop.seconds.is_some();
-        if has_goal && free != Free::default() {
+        if settings.stop.has_goal() && free != Free::default() {
             reporter.status("looking for the best settings");
-            let pilot = until_done(gpu, &device_failed, |gpu| {
-                let plan = scene::trial::plan(gpu, scene, view, settings, sensor)?;
-                scene::pilot::choose(gpu, scene, view, &plan, free)
-            })?;
+            let pilot = until_done(gpu, &device_failed, |gpu| scene::pilot::choose_for(gpu, scene, view, settings, sensor, free))?;
             if let Some(pilot) = pilot {
                 reporter.note(&scene_report::pilot(&pilot, &settings.stop, self.point));
                 if self.explain {
@@ -216,47 +207,5 @@ impl Job<'_> {
             reporter.note(&format!("settings for about {}: wrote {}", counted(rounds, "round"), file.path().display()));
         }
         Ok(found)
-    }
-
-    /// Runs on all devices, for the first of which the plan was made.
-    fn light(&self, gpus: &mut Vec<Gpu>, view: &View, plan: &ScenePlan, control: &mut Control) -> Result<RunResult> {
-        let Job { scene, geometry, map, .. } = *self;
-        let first = gpus[0].facts().clone();
-        let run = |gpu: &Gpu, stop: Stop, control: &mut Control| {
-            let facts = gpu.facts();
-            let is_alike = (&facts.name, &facts.driver) == (&first.name, &first.driver);
-            let replan = |new: Result<ScenePlan>| map.into_iter().try_fold(new?, |plan, map| map.plan(plan, geometry));
-            let mut plan = if !is_alike {
-                replan(scene::trial::plan(gpu, scene, view, &plan.settings, plan.sensor))?
-            } else if facts.usable_memory_bytes != first.usable_memory_bytes {
-                let limits = engine::limits(facts);
-                replan(ScenePlan::with_trial(scene, geometry, &plan.settings, plan.sensor, &limits, plan.trial.clone()))?
-            } else {
-                plan.clone()
-            };
-            plan.settings.stop = stop;
-            scene::light_from(gpu, view, plan, map, control)
-        };
-        let photons_per_round = plan.maps().map(|map| u64::from(map.photons)).sum();
-        let work = Work {
-            run: &run,
-            film: |film| match film {
-                SavedFilm::Scene(film) => film,
-                SavedFilm::Room(_) => unreachable!("a scene was lit"),
-            },
-            error: &|film: &SceneFilm| film.error(plan.film.confidence),
-            losses: &|film: &SceneFilm, fates: &[Fates]| losses(geometry, plan, fates, film),
-            can_go_on: true,
-            stop: plan.settings.stop,
-            alpha: plan.settings.alpha,
-            rounds: plan.settings.rounds,
-            rounds_per_block: plan.film.rounds_per_block,
-            bounces: plan.settings.bounces,
-            photons_per_round,
-        };
-        let mut lit = run_on(gpus, &work, &device_failed, control)?;
-        // With its goals, which no device had.
-        lit.plan.settings.stop = plan.settings.stop;
-        Ok(lit)
     }
 }

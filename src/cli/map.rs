@@ -5,12 +5,11 @@ use std::sync::atomic::AtomicBool;
 
 use clap::{ArgMatches, Args, Command, FromArgMatches, Subcommand};
 
-use super::camera::named;
+use super::camera::{named, resolve};
 use super::interrupt::interruptible;
 use super::options::{CommonArgs, TimedDeviceArgs};
-use super::picture_size::PictureSize;
 use super::progress::{ProgressArgs, ProgressReporter};
-use super::scene::{PhotonArgs, SceneArgs, geometry};
+use super::scene::{PhotonArgs, SceneArgs, geometry, settings};
 use super::values::{parse_integer, value_enum};
 use super::{End, JsonOrStdoutArg, complain, device_failed, optional_file, say};
 use crate::engine;
@@ -135,7 +134,7 @@ pub(super) fn run(args: &MapArgs, cancelled: &AtomicBool) -> Result<End> {
 }
 
 fn make(args: &MakeArgs, cancelled: &AtomicBool) -> Result<End> {
-    let usual = args.light.settings(&args.common, args.light.chosen.open()?.as_ref());
+    let usual = settings(&args.light.request(&args.common), None, args.light.chosen.open()?.as_ref());
     // Of a block each: rounds know nothing of each other.
     let settings = SceneSettings { rounds: args.rounds.unwrap_or(usual.rounds), block: Some(1), ..usual };
     settings.validate()?;
@@ -144,7 +143,7 @@ fn make(args: &MakeArgs, cancelled: &AtomicBool) -> Result<End> {
     let reporter = ProgressReporter::new(&args.progress);
     let scene = args.scene.open(&reporter)?;
     let camera = named(&scene, args.camera.as_deref())?;
-    let (width, height) = PictureSize::resolve(None, &camera, &reporter)?;
+    let (width, height) = resolve(None, &camera, &reporter)?;
     let camera = if scene.cameras.is_empty() { scene.camera_around(f64::from(width) / f64::from(height)) } else { camera };
     let geometry = geometry(&scene, &settings, &reporter)?;
     let mut gpu = args.device.open(&reporter)?;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::how_made::{of_merge, units};
+use super::how_made::of_merge;
 use super::keep::read;
 use super::scene::ToneArg;
 use super::typed::Typed;
@@ -17,7 +17,7 @@ use crate::error::{Error, Result, require};
 use crate::output::colour::{Format, Tone};
 use crate::output::destination::{Destination, check_distinct, check_not_read, write_all, write_synced};
 use crate::output::merge_report;
-use crate::output::show::{Layer, Show};
+use crate::output::show::{Layer, Show, units};
 use crate::plan::sensor::Sensor;
 
 #[derive(Args)]

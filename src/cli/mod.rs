@@ -17,7 +17,6 @@ mod map;
 mod merge;
 mod options;
 mod paper;
-mod picture_size;
 mod plan;
 mod probe;
 mod progress;
@@ -39,7 +38,7 @@ use std::path::PathBuf;
 
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 
-use crate::engine::retry::Remedy;
+use crate::engine::retry::{Remedy, in_words};
 use crate::engine::run::RunResult;
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Options};
@@ -278,13 +277,7 @@ fn complain(line: &str) {
 
 /// Tells of a device that failed while it was at work.
 fn device_failed(gpu: &Gpu, error: &Error, remedy: Remedy) {
-    let facts = gpu.facts();
-    let what = match remedy {
-        Remedy::OpenedAnew => "was opened anew, and the run goes on".to_owned(),
-        Remedy::LessMemory => format!("goes on in smaller pieces, with {} MiB at most", facts.usable_memory_bytes >> 20),
-        Remedy::GivenUp => "is given up, and the others go on".to_owned(),
-    };
-    complain(&format!("warning: {} {what}: {}", facts.label(), error.what()));
+    complain(&format!("warning: {}", in_words(gpu, error, remedy)));
 }
 
 /// Text on stdout; a reader that has gone away, as `head` does, has seen enough.

@@ -3,7 +3,7 @@
 use clap::Args;
 
 use super::progress::{ProgressArgs, ProgressReporter};
-use super::scene::{PictureArgs, Subject};
+use super::scene::{PictureArgs, Subject, settings};
 use super::{DeviceArgs, JsonOrStdoutArg, optional_file, say};
 use crate::engine;
 use crate::error::Result;
@@ -30,7 +30,7 @@ pub(super) struct PlanArgs {
 
 pub(super) fn run(args: &PlanArgs) -> Result<()> {
     let map = args.picture.transport.map()?;
-    let settings = args.picture.settings(map.as_ref(), args.picture.transport.light.chosen.open()?.as_ref());
+    let settings = settings(&args.picture.request(), map.as_ref(), args.picture.transport.light.chosen.open()?.as_ref());
     settings.validate()?;
     let json = optional_file("--json", args.json.json.as_ref())?;
     let reporter = ProgressReporter::new(&args.progress);

@@ -7,21 +7,18 @@ use std::sync::atomic::AtomicBool;
 use clap::Args;
 use glam::DVec3;
 
-use super::chosen::Chosen;
 use super::job::{Job, MessageArgs};
 use super::options::{DevicesOfRunArgs, ReportArgs};
 use super::progress::ProgressReporter;
-use super::scene::{SceneArgs, TransportArgs, geometry};
+use super::scene::{SceneArgs, TransportArgs, geometry, settings};
 use super::{End, complain, say_beside};
-use crate::engine::scene::map_file::MapFile;
 use crate::engine::scene::{RunResult, Target};
 use crate::error::{Error, Result};
 use crate::output::destination::{Destination, check_distinct, write_all};
 use crate::output::scene_report;
 use crate::plan::sensor::Sensor;
 use crate::plan::work_division::Free;
-use crate::scene::{Light, Mesh};
-use crate::settings::scene::{Illumination, SceneSettings};
+use crate::render::{MAX_POINTS, lacking_at_points, point_of};
 use crate::text::{counted, echo, refusal};
 
 #[derive(Args)]
@@ -45,15 +42,10 @@ pub(super) struct ProbeArgs {
     device: DevicesOfRunArgs,
 }
 
-impl ProbeArgs {
-    pub(super) fn settings(&self, map: Option<&MapFile>, chosen: Option<&Chosen>) -> SceneSettings {
-        self.transport.settings(map, chosen)
-    }
-}
-
 pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
     let map = args.transport.map()?;
-    let settings = args.settings(map.as_ref(), args.transport.light.chosen.open()?.as_ref());
+    let request = args.transport.request();
+    let settings = settings(&request, map.as_ref(), args.transport.light.chosen.open()?.as_ref());
     settings.validate()?;
     let output = Destination::open("-o", &args.output)?;
     let reports = args.report.open()?;
@@ -65,15 +57,7 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
 
     let reporter = ProgressReporter::new(&args.messages.progress);
     let scene = args.scene.open(&reporter)?;
-    let kinds = scene.lobe_kinds();
-    let is_specular = |mesh: &Mesh| kinds[mesh.material].is_sharp();
-    let is_point_like = |light: &Light| !light.kind.is_environment();
-    if scene.lights.iter().any(is_point_like) && scene.meshes.iter().any(is_specular) {
-        complain("warning: points that lie on no surface receive no caustics of point, spot, directional and disc lights");
-    }
-    if settings.illumination == Illumination::Photons && !scene.lights.is_empty() {
-        complain("warning: with --illumination photons, points that lie on no surface receive direct light of emissive meshes only");
-    }
+    lacking_at_points(&scene, &settings).iter().for_each(|line| complain(&format!("warning: {line}")));
     let geometry = geometry(&scene, &settings, &reporter)?;
     let phases = Target::Points(&points).phases(&geometry);
     let sensor = Sensor::Receivers { count: points.len() as u32 };
@@ -85,7 +69,7 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
         camera: None,
         phases: &phases,
         map: map.as_ref(),
-        free: Free { samples: false, ..args.transport.free() },
+        free: Free { samples: false, ..args.transport.free(&request) },
         chosen: None,
         save_settings: None,
         explain: args.messages.explain,
@@ -121,11 +105,6 @@ fn table(lit: &RunResult) -> Vec<u8> {
     table.into_inner().expect("memory takes what is written")
 }
 
-/// Points of one run at most: their numbers are 32-bit.
-const MAX_POINTS: usize = 1 << 28;
-/// Metres: the square of anything larger would leave f32's range once normalised.
-const MAX_COORDINATE: f64 = 1e15;
-
 /// Positions and unit normals; empty lines and lines that begin with # are skipped.
 fn read_points(path: &Path) -> Result<Vec<(DVec3, DVec3)>> {
     let refuse = |reason: String| Error::setting("--points", path.display(), reason);
@@ -151,14 +130,7 @@ fn read_points(path: &Path) -> Result<Vec<(DVec3, DVec3)>> {
             .map(|field| field.parse().map_err(|_| wrong(&format!("'{}' is no number", echo(field)))))
             .collect::<Result<_>>()?;
         let [x, y, z, nx, ny, nz] = fields[..] else { return Err(wrong(&format!("has {} instead of 6", counted(fields.len(), "number")))) };
-        if let Some(value) = fields.iter().find(|value| value.is_nan() || value.abs() > MAX_COORDINATE) {
-            return Err(wrong(&format!("holds {value}; numbers must be from -{MAX_COORDINATE:e} to {MAX_COORDINATE:e}")));
-        }
-        let normal = DVec3::new(nx, ny, nz);
-        if normal == DVec3::ZERO {
-            return Err(wrong("has a normal of length 0"));
-        }
-        points.push((DVec3::new(x, y, z), (normal / normal.abs().max_element()).normalize()));
+        points.push(point_of([x, y, z], [nx, ny, nz]).map_err(|fault| wrong(&fault))?);
     }
     if points.is_empty() {
         return Err(refuse("holds no point; a line is `x y z nx ny nz`".into()));

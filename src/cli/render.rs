@@ -7,12 +7,12 @@ use std::time::Duration;
 use clap::Args;
 
 use super::chosen::Chosen;
-use super::how_made::{Made, blocks_with_gaps, devices, units};
+use super::how_made::{Made, blocks_with_gaps};
 use super::job::{Job, MessageArgs};
 use super::keep::Snapshot;
 use super::options::{DevicesOfRunArgs, ReportArgs};
 use super::progress::{ProgressArgs, ProgressReporter};
-use super::scene::{FilterArg, MOST_ROUNDS, PictureArgs, Subject, ToneArg};
+use super::scene::{FilterArg, PictureArgs, Subject, ToneArg, settings};
 use super::typed::Typed;
 use super::values::{parse_integer, parse_photon_name, parse_seconds, parse_stops};
 use super::{End, complain, optional_file, say, say_beside};
@@ -25,15 +25,15 @@ use crate::error::{Error, Result, require};
 use crate::gpu::Gpu;
 use crate::output::colour::{Format, Tone};
 use crate::output::destination::{Destination, check_distinct, write_all};
-use crate::output::metadata::Metadata;
+use crate::output::metadata::{Metadata, devices};
 use crate::output::scene_report;
-use crate::output::show::{Layer, Show, Surface};
+use crate::output::show::{Layer, Show, surfaces, units};
 use crate::plan::scene::ScenePlan;
-use crate::plan::work_division::Free;
 use crate::scene::{Camera, Scene};
 use crate::settings::Math;
+use crate::settings::request::{GOOD_ERROR, MOST_ROUNDS, Request, longest_seconds};
 use crate::settings::scene::{Filter, Part, SceneSettings};
-use crate::verify::judge::{FirstSurface, Judge, Verdict, first_surfaces};
+use crate::verify::judge::{Judge, Verdict};
 
 #[derive(Args)]
 pub(super) struct RenderArgs {
@@ -104,12 +104,12 @@ fn parse_layers(text: &str) -> std::result::Result<Layers, String> {
 }
 
 impl RenderArgs {
+    fn request(&self) -> Request {
+        Request { filter: self.filter.map(Filter::from), samples: self.samples, ..self.picture.request() }
+    }
+
     pub(super) fn settings(&self, map: Option<&MapFile>, chosen: Option<&Chosen>) -> SceneSettings {
-        let usual = self.picture.settings(map, chosen);
-        // Tiles with more samples were chosen together with those of all pixels.
-        let tiles = usual.tiles.clone().filter(|_| self.samples.is_none());
-        let filter = self.filter.map_or(usual.filter, Filter::from);
-        SceneSettings { filter, samples: self.samples.unwrap_or(usual.samples), tiles, ..usual }
+        settings(&self.request(), map, chosen)
     }
 
     /// Takes from the user what decides no pixel, and where the scene is.
@@ -128,7 +128,7 @@ impl RenderArgs {
             camera: Some(&subject.camera),
             phases: &[],
             map,
-            free: self.free(),
+            free: self.picture.transport.free(&self.request()),
             chosen: None,
             save_settings: None,
             explain: self.messages.explain,
@@ -149,25 +149,9 @@ impl RenderArgs {
     fn shows_parts(&self, format: Option<Format>) -> bool {
         format == Some(Format::Exr) && self.layers().into_iter().any(Layer::is_part)
     }
-
-    /// What a pilot may choose: what is not set, of a run that ends by its error or its time.
-    fn free(&self) -> Free {
-        let free = self.picture.transport.free();
-        Free { samples: free.samples && self.samples.is_none(), ..free }
-    }
 }
 
-/// When a picture is good enough to be shown, where nothing says when it ends, and after how many seconds it ends in any case on a class of
-/// devices.
-const GOOD_ERROR: f64 = 0.02;
-fn longest_seconds(kind: &str) -> f64 {
-    match kind {
-        "cpu" => 45.0,
-        "discrete" => 1.0,
-        _ => 10.0,
-    }
-}
-/// Between two pictures of such a run.
+/// Between two pictures of a run of which nothing says when it ends.
 const SNAPSHOT_SECONDS: f64 = 5.0;
 
 pub(super) fn run(args: &RenderArgs, typed: &Typed, cancelled: &AtomicBool) -> Result<End> {
@@ -303,13 +287,8 @@ fn file(made: &Made, show: &Show, format: Format, scene: &Scene, camera: &Camera
         let (content, stops) = show.png(film, metadata);
         return (content, format!(" at {stops:+.2} stops"));
     }
-    let surface = |seen: FirstSurface| Surface { albedo: seen.albedo.as_vec3(), normal: seen.normal.as_vec3(), depth: seen.depth as f32 };
-    let surfaces: Vec<Surface> = if show.layers.iter().any(|layer| layer.is_of_surface()) {
-        let scene = scene.without(&made.lit.plan.settings.without);
-        first_surfaces(&scene, camera, show.size).into_iter().map(surface).collect()
-    } else {
-        Vec::new()
-    };
+    let scene = scene.without(&made.lit.plan.settings.without);
+    let surfaces = if show.shows_surfaces() { surfaces(&scene, camera, show.size) } else { Vec::new() };
     (show.exr(film, &surfaces, Some(&metadata(0.0))), String::new())
 }
 

@@ -1,10 +1,8 @@
 //! Options of the commands that light a scene of triangles: the scene, how it is lit, what a camera sees of it.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use clap::Args;
-use glam::Vec3;
 
 use super::camera::CameraArgs;
 use super::chosen::{Chosen, ChosenArgs};
@@ -19,12 +17,11 @@ use crate::error::{Error, Result, require};
 use crate::output::colour::Tone;
 use crate::plan::sensor::Sensor;
 use crate::plan::work_division::Free;
-use crate::scene::daylight;
 use crate::scene::geometry::Geometry;
-use crate::scene::light::{Light, LightKind};
-use crate::scene::sky::Sky;
+use crate::scene::surroundings::{Environment, Surroundings};
 use crate::scene::{Camera, Reading, Scene, built_in};
-use crate::settings::scene::{Effect, Filter, Illumination, Kernel, MAX_ROUNDS, Part, SceneSettings, Stop};
+use crate::settings::request::Request;
+use crate::settings::scene::{Effect, Filter, Illumination, Kernel, Part, SceneSettings};
 use crate::settings::{Builder, Math};
 use crate::text::counted;
 
@@ -41,7 +38,7 @@ pub(super) struct SceneArgs {
     /// Light from beyond the scene in place of the file's own: W/m2/sr, one number or three for red, green and blue, or a picture of
     /// all directions (equirectangular, .hdr or .exr) [default: the file's; 1 if nothing in the file emits light]
     #[arg(long, value_name = "R,G,B|FILE", value_parser = parse_environment, allow_hyphen_values = true, help_heading = "Scene")]
-    environment: Option<EnvironmentArg>,
+    environment: Option<Environment>,
     /// Add a sun, degrees clockwise from -z as seen from above and above the horizon, and the clear sky that belongs to it unless
     /// --environment is given
     #[arg(long, value_name = "AZIMUTH,ELEVATION", value_parser = parse_sun, allow_hyphen_values = true, help_heading = "Scene")]
@@ -54,14 +51,6 @@ pub(super) struct SceneArgs {
     environment_strength: Option<f32>,
 }
 
-const ENVIRONMENT: &str = "--environment";
-
-#[derive(Debug, Clone)]
-enum EnvironmentArg {
-    Colour([f32; 3]),
-    Picture(PathBuf),
-}
-
 fn parse_sun(text: &str) -> std::result::Result<[f64; 2], String> {
     let degrees: Vec<f64> = text.split(',').filter_map(|number| number.trim().parse().ok()).collect();
     match degrees[..] {
@@ -72,13 +61,13 @@ fn parse_sun(text: &str) -> std::result::Result<[f64; 2], String> {
     }
 }
 
-fn parse_environment(text: &str) -> std::result::Result<EnvironmentArg, String> {
+fn parse_environment(text: &str) -> std::result::Result<Environment, String> {
     let path = Path::new(text);
     let is_picture =
         path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("hdr") || extension.eq_ignore_ascii_case("exr"));
     match is_picture {
-        true => Ok(EnvironmentArg::Picture(path.to_owned())),
-        false => parse_colour(text).map(EnvironmentArg::Colour).map_err(|reason| format!("{reason}; or a file that ends in .hdr or .exr")),
+        true => Ok(Environment::Picture(path.to_owned())),
+        false => parse_colour(text).map(Environment::Colour).map_err(|reason| format!("{reason}; or a file that ends in .hdr or .exr")),
     }
 }
 
@@ -232,18 +221,6 @@ value_enum!(PartArg => Part {
     Indirect,
 });
 
-/// W/m2/sr. The power of a large scene under more is no number.
-const MOST_RADIANCE: f32 = 1e30;
-
-/// Most rounds of a run with a stop criterion other than --total-photons.
-pub(super) const MOST_ROUNDS: u32 = 65_536;
-
-/// Most rounds of a run with a stop criterion, if there is one; `photons` are those of the smaller map per round.
-fn most_rounds(stop: &Stop, photons: u32) -> Option<u32> {
-    let by_total = |total: u64| total.div_ceil(u64::from(photons.max(1))).clamp(1, u64::from(MAX_ROUNDS)) as u32;
-    stop.is_set().then(|| stop.photons.map_or(MOST_ROUNDS, by_total))
-}
-
 impl SceneArgs {
     /// Of the scene's file, or the name of a built-in one.
     pub(super) fn path(&self) -> &Path {
@@ -255,102 +232,41 @@ impl SceneArgs {
         if let Some(time) = self.at {
             require(time.is_finite(), "--at", time, "must be finite")?;
         }
-        if let Some(degrees) = self.environment_rotate {
-            require(degrees.is_finite(), "--environment-rotate", degrees, "must be finite")?;
-        }
-        if let Some(factor) = self.environment_strength {
-            require((0.0..=1e9).contains(&factor), "--environment-strength", factor, "must be 0 to 1e9")?;
-        }
+        let surroundings = self.surroundings();
+        surroundings.validate()?;
         let reading = Reading { radiometric: self.radiometric, at: self.at };
         let mut scene = Scene::open_with(&self.scene, reading, &mut stages(&self.scene, reporter))?;
-        let is_lit = scene.is_lit();
-        self.set_environment(&mut scene)?;
+        let note = surroundings.light(&mut scene)?;
         for warning in &scene.warnings {
             complain(&format!("warning: {warning}"));
         }
-        if !is_lit && self.environment.is_none() && self.sun.is_none() {
-            complain("note: nothing in this scene emits light; a sky of 1 W/m2/sr lights it (--environment 0 for black)");
-        }
+        note.iter().for_each(|note| complain(&format!("note: {note}")));
         Ok(scene)
     }
 
-    fn set_environment(&self, scene: &mut Scene) -> Result<()> {
-        let own = match &self.environment {
-            Some(EnvironmentArg::Colour(radiance)) => Some(LightKind::Environment { radiance: Vec3::from(*radiance) }),
-            Some(EnvironmentArg::Picture(path)) => {
-                let sky = Sky::read(path).map_err(|reason| Error::setting(ENVIRONMENT, path.display(), reason))?;
-                scene.warnings.extend(sky.warnings.iter().cloned());
-                Some(LightKind::Sky(Arc::new(sky)))
-            }
-            None if self.sun.is_some() => self.sun.map(|[azimuth, elevation]| LightKind::Sky(Arc::new(daylight::sky(azimuth, elevation)))),
-            None if !scene.is_lit() => Some(LightKind::Environment { radiance: Vec3::ONE }),
-            None => None,
-        };
-        if let Some(kind) = own {
-            scene.lights.retain(|light| !light.kind.is_environment());
-            scene.lights.push(Light { name: ENVIRONMENT.into(), kind });
-        }
-        let is_of_sun = self.sun.is_some() && self.environment.is_none();
-        let mut environment = scene.lights.iter_mut().map(|light| &mut light.kind).find(|kind| kind.is_environment());
-        if let Some(degrees) = self.environment_rotate {
-            let reason = "turns a picture, and not the sky of --sun; change the azimuth of --sun";
-            require(!is_of_sun, "--environment-rotate", degrees, reason)?;
-            let Some(LightKind::Sky(sky)) = &mut environment else {
-                let reason = "turns a picture, and the environment is none; give --environment FILE";
-                return Err(Error::setting("--environment-rotate", degrees, reason));
-            };
-            *sky = Arc::new(Sky::clone(sky).turned(degrees));
-        }
-        if let Some(factor) = self.environment_strength {
-            match &mut environment {
-                Some(LightKind::Environment { radiance }) => *radiance *= factor,
-                Some(LightKind::Sky(sky)) => Arc::make_mut(sky).strength *= factor,
-                _ => {
-                    let reason = "multiplies an environment, and there is none; give --environment";
-                    return Err(Error::setting("--environment-strength", factor, reason));
-                }
-            }
-        }
-        let brightest = match environment {
-            Some(LightKind::Environment { radiance }) => radiance.max_element(),
-            Some(LightKind::Sky(sky)) => sky.brightest(),
-            _ => 0.0,
-        };
-        require(brightest <= MOST_RADIANCE, ENVIRONMENT, brightest, format!("must be at most {MOST_RADIANCE:e} W/m2/sr"))?;
-        if let Some([azimuth, elevation]) = self.sun {
-            let mut kind = daylight::sun(azimuth, elevation);
-            if let (true, Some(factor), LightKind::Directional { irradiance, .. }) = (is_of_sun, self.environment_strength, &mut kind) {
-                *irradiance *= factor;
-            }
-            scene.lights.push(Light { name: "--sun".into(), kind });
-        }
-        Ok(())
+    fn surroundings(&self) -> Surroundings {
+        let &SceneArgs { sun, environment_rotate: rotate, environment_strength: strength, .. } = self;
+        Surroundings { environment: self.environment.clone(), sun, rotate, strength }
     }
 }
 
 impl PhotonArgs {
-    /// Settings that are usual or chosen, but for these.
-    pub(super) fn settings(&self, common: &CommonArgs, chosen: Option<&Chosen>) -> SceneSettings {
-        let usual = SceneSettings::default();
-        let usual = chosen.map_or_else(|| usual.clone(), |chosen| chosen.set(&usual));
-        // As many as of the global map, unless something else is known.
-        let caustic_photons = self.photons.filter(|_| chosen.is_none()).unwrap_or(usual.caustic_photons);
-        let photons = self.photons.unwrap_or(usual.photons);
+    pub(super) fn request(&self, common: &CommonArgs) -> Request {
         let &CommonArgs { seed, math, chunk, group_size, paranoid } = common;
-        SceneSettings {
-            photons,
-            caustic_photons: self.caustic_photons.unwrap_or(caustic_photons),
-            bounces: self.bounces.unwrap_or(usual.bounces),
-            aim: self.aim.map_or(usual.aim, |switch| switch == SwitchArg::On),
-            illumination: self.illumination.map_or(usual.illumination, Illumination::from),
+        Request {
+            photons: self.photons,
+            caustic_photons: self.caustic_photons,
+            bounces: self.bounces,
+            aim: self.aim.map(|switch| switch == SwitchArg::On),
+            illumination: self.illumination.map(Illumination::from),
             with: self.with.clone(),
             without: self.without.clone(),
-            seed: seed.unwrap_or(usual.seed),
-            math: math.map_or(usual.math, Math::from),
+            seed,
+            math: math.map(Math::from),
             chunk,
-            group_size: group_size.unwrap_or(usual.group_size),
+            group_size,
             paranoid,
-            ..usual
+            ..Request::default()
         }
     }
 }
@@ -375,57 +291,46 @@ impl TransportArgs {
     }
 
     /// What a pilot may choose of a run of a picture that ends at a goal; shards must not choose each for itself.
-    pub(super) fn free(&self) -> Free {
-        if self.rounds.is_some() || self.stop.counts_photons() || self.keep.shard.is_some() || self.light.chosen.is_given() {
+    pub(super) fn free(&self, request: &Request) -> Free {
+        if self.keep.shard.is_some() || self.light.chosen.is_given() {
             return Free::default();
         }
+        let free = Free::of(request);
         let traces = self.map.is_none();
-        Free {
-            samples: true,
-            shadow_rays: self.shadow_rays.is_none(),
-            photons: traces && self.light.photons.is_none(),
-            caustic_photons: traces && self.light.caustic_photons.is_none(),
-            neighbours: self.neighbours.is_none() && self.radius.is_none(),
-            caustic_neighbours: self.caustic_neighbours.is_none() && self.neighbours.is_none() && self.caustic_radius.is_none(),
-        }
+        Free { photons: traces && free.photons, caustic_photons: traces && free.caustic_photons, ..free }
     }
 
     /// Whether nothing says when a run ends.
     pub(super) fn has_no_end(&self) -> bool {
-        !self.stop.stop().is_set()
-            && self.rounds.is_none()
-            && self.map.is_none()
-            && self.keep.shard.is_none()
-            && !self.light.chosen.is_given()
+        self.request().has_no_end() && self.map.is_none() && self.keep.shard.is_none() && !self.light.chosen.is_given()
     }
 
-    pub(super) fn settings(&self, map: Option<&MapFile>, chosen: Option<&Chosen>) -> SceneSettings {
-        let usual = self.light.settings(&self.common, chosen);
-        let usual = map.map_or_else(|| usual.clone(), |map| map.settings(&usual));
-        let stop = self.stop.stop();
-        let most = || match map {
-            Some(map) => map.rounds(),
-            None => {
-                most_rounds(&stop, usual.photons.min(usual.caustic_photons)).unwrap_or(chosen.map_or(usual.rounds, |chosen| chosen.rounds))
-            }
-        };
-        let quarter = self.neighbours.map(|neighbours| (neighbours / 4).max(1));
-        SceneSettings {
-            block: self.block.or(usual.block),
-            rounds: self.rounds.unwrap_or_else(most),
-            stop,
-            neighbours: self.neighbours.unwrap_or(usual.neighbours),
-            caustic_neighbours: self.caustic_neighbours.or(quarter).unwrap_or(usual.caustic_neighbours),
+    pub(super) fn request(&self) -> Request {
+        Request {
+            stop: self.stop.stop(),
+            rounds: self.rounds,
+            block: self.block,
+            neighbours: self.neighbours,
+            caustic_neighbours: self.caustic_neighbours,
             radius: self.radius,
             caustic_radius: self.caustic_radius,
-            alpha: if self.fixed_radius { 1.0 } else { self.alpha.unwrap_or(usual.alpha) },
-            kernel: self.kernel.map_or(usual.kernel, Kernel::from),
-            edge_correction: self.edge_correction.map_or(usual.edge_correction, |switch| switch == SwitchArg::On),
-            shadow_rays: self.shadow_rays.unwrap_or(usual.shadow_rays),
+            alpha: if self.fixed_radius { Some(1.0) } else { self.alpha },
+            kernel: self.kernel.map(Kernel::from),
+            edge_correction: self.edge_correction.map(|switch| switch == SwitchArg::On),
+            shadow_rays: self.shadow_rays,
             final_gather: self.final_gather,
-            builder: self.variant.unwrap_or(usual.builder),
-            ..usual
+            builder: self.variant.flatten(),
+            ..self.light.request(&self.common)
         }
+    }
+}
+
+/// Settings that are usual, or chosen before, but for what is asked for; and for the photons of a file.
+pub(super) fn settings(request: &Request, map: Option<&MapFile>, chosen: Option<&Chosen>) -> SceneSettings {
+    let settings = request.settings(chosen.map(Chosen::settings).as_ref());
+    match map {
+        Some(map) => SceneSettings { rounds: request.rounds.unwrap_or(map.rounds()), ..map.settings(&settings) },
+        None => settings,
     }
 }
 
@@ -449,9 +354,8 @@ impl PictureArgs {
         !self.scene.path().exists() && !built_in::names().contains(&self.scene.scene.as_str())
     }
 
-    pub(super) fn settings(&self, map: Option<&MapFile>, chosen: Option<&Chosen>) -> SceneSettings {
-        let usual = self.transport.settings(map, chosen);
-        SceneSettings { part: self.part.map_or(usual.part, Part::from), ..usual }
+    pub(super) fn request(&self) -> Request {
+        Request { part: self.part.map(Part::from), ..self.transport.request() }
     }
 
     pub(super) fn open(&self, settings: &SceneSettings, reporter: &ProgressReporter) -> Result<Subject> {
@@ -473,10 +377,6 @@ impl Subject {
 pub(super) fn geometry(scene: &Scene, settings: &SceneSettings, reporter: &ProgressReporter) -> Result<Geometry> {
     let what = format!("{} ({})", scene.name, counted(scene.triangle_count(), "triangle"));
     let geometry = Geometry::new_with(&scene.without(&settings.without), &mut stages(&what, reporter))?;
-    if geometry.left_out > 0 {
-        let count = counted(geometry.left_out, "triangle");
-        complain(&format!("warning: {count} without area in single precision, or on others, left out"));
-    }
     geometry.warnings(scene).iter().for_each(|line| complain(&format!("warning: {line}")));
     Ok(geometry)
 }

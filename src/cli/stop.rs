@@ -7,7 +7,6 @@ use super::values::{parse_percent, parse_seconds, parse_within, value_enum};
 use crate::engine::bias::Bias;
 use crate::engine::blocks::Share;
 use crate::error::{Error, Result, require};
-use crate::plan::film::BiasPlan;
 use crate::settings::stop::{Measure, Stop};
 use crate::text::counted;
 
@@ -57,11 +56,6 @@ impl StopArgs {
         require(!self.bias, "--shard", shard, "cannot be measured with --bias; leave --bias out")
     }
 
-    /// Whether photons end the run, whatever its error.
-    pub(super) fn counts_photons(&self) -> bool {
-        self.total_photons.is_some()
-    }
-
     pub(super) fn stop(&self) -> Stop {
         let usual = Stop::default();
         Stop {
@@ -100,17 +94,6 @@ pub(super) fn rounds_after(rounds: u32) -> u32 {
 /// open whether the error wanted can be reached.
 const FIRST_ROUNDS: u32 = 2;
 const REFINEMENTS: u32 = 4;
-
-/// Refuses an error of a scene whose bias is unknown, and that nothing else would end.
-pub(super) fn check_bias(stop: &Stop, bias: BiasPlan) -> Result<()> {
-    let ends_otherwise = stop.seconds.is_some() || stop.photons.is_some();
-    let Some(wanted) = stop.error.filter(|_| bias == BiasPlan::Nothing && !ends_otherwise) else { return Ok(()) };
-    let allowed = format!(
-        "cannot be reached: the bias is unknown, because {}; leave out what makes the scene so wide, give a --radius, or add --time",
-        Bias::UNKNOWN
-    );
-    Err(Error::setting("--error", format!("{}%", 100.0 * wanted), allowed))
-}
 
 /// Measures the bias of the first round's radius if it is asked for and the run ends at an error, of which it is a part.
 /// `shrinks` says whether later radii are smaller.

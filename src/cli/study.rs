@@ -2,16 +2,15 @@
 
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
-use std::time::Duration;
 
 use clap::Args;
 
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::values::{parse_integer, parse_seconds, parse_within};
 use super::{DeviceArgs, End, complain, help, say};
-use crate::error::{Result, require, within};
+use crate::error::Result;
 use crate::gpu::Gpu;
-use crate::measure::study::{self, Request, peers, strip};
+use crate::measure::study::{self, Request, peers};
 use crate::output::destination::Folder;
 use crate::scene::Scene;
 
@@ -41,7 +40,7 @@ pub(super) struct StudyArgs {
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, default_value_t = study::MOST_ROUNDS, help_heading = "Photons")]
     rounds: u32,
     /// Seed of the first run of every setting; the next runs take the next seeds
-    #[arg(long, value_name = "N", value_parser = parse_within(0..=MAX_SEED), allow_hyphen_values = true, default_value = "1", help_heading = "Photons")]
+    #[arg(long, value_name = "N", value_parser = parse_within(0..=study::MAX_SEED), allow_hyphen_values = true, default_value = "1", help_heading = "Photons")]
     seed: u64,
     /// Draw other programs' curves too, from a file that tools/bench_peers --json wrote for this scene
     #[arg(long, value_name = "FILE", help_heading = "Output")]
@@ -59,7 +58,21 @@ fn scene_help() -> String {
 
 pub(super) fn run(args: &StudyArgs, cancelled: &AtomicBool) -> Result<End> {
     let folder = Folder::open("-o", &args.output)?;
-    args.validate()?;
+    let budget = study::budget(args.budget)?;
+    let request = |is_cpu: bool| {
+        let usual = Request::usual(&args.scene, is_cpu);
+        Request {
+            size: args.side.unwrap_or(usual.size),
+            photons: args.photons.unwrap_or(usual.photons),
+            repeats: args.repeats,
+            seed: args.seed,
+            reference_samples: args.reference_samples,
+            budget,
+            most_rounds: args.rounds,
+            ..usual
+        }
+    };
+    request(true).validate()?;
     let reporter = ProgressReporter::new(&args.progress);
     reporter.status(&format!("reading {}", args.scene));
     let scene = Scene::open(&args.scene, false)?;
@@ -68,23 +81,8 @@ pub(super) fn run(args: &StudyArgs, cancelled: &AtomicBool) -> Result<End> {
     }
     let gpu = Gpu::open(&args.device.steady())?;
     reporter.device(Some(&gpu));
-    let is_cpu = gpu.facts().kind == "cpu";
-    let request = Request {
-        scene: args.scene.clone(),
-        size: args.side.unwrap_or(match (args.scene == "open-box", is_cpu) {
-            (true, true) => 24,
-            (false, false) => 128,
-            _ => 64,
-        }),
-        photons: args.photons.unwrap_or(if is_cpu { 8192 } else { 1 << 18 }),
-        repeats: args.repeats,
-        seed: args.seed,
-        reference_samples: args.reference_samples,
-        budget: Duration::from_secs_f64(args.budget),
-        most_rounds: args.rounds,
-        asked: strip::ASKED.to_vec(),
-        peers: args.peers.as_ref().map_or(Ok(Vec::new()), |path| peers::read(path, &args.scene))?,
-    };
+    let peers = args.peers.as_ref().map_or(Ok(Vec::new()), |path| peers::read(path, &args.scene))?;
+    let request = Request { peers, ..request(gpu.facts().kind == "cpu") };
     reporter.note(&format!(
         "plan: {}, {side} along a side; {} photons per round, {} runs of each point; stops measuring after {} s",
         scene.name,
@@ -108,27 +106,6 @@ pub(super) fn run(args: &StudyArgs, cancelled: &AtomicBool) -> Result<End> {
     }
     say(&format!("wrote {}", folder.path().join("index.html").display()))?;
     Ok(if study.complete { End::Finished } else { End::Cancelled })
-}
-
-/// srand48 takes 32 bits, and each run has a seed of its own.
-const MAX_SEED: u64 = u32::MAX as u64 - 1000;
-/// Of all runs of a choice, a gigabyte in all.
-const MAX_HELD: u64 = 1 << 27;
-
-impl StudyArgs {
-    fn validate(&self) -> Result<()> {
-        within("--side", u64::from(self.side.unwrap_or(128)), 2..=1024, "pixels or texels along a side")?;
-        within("--photons", u64::from(self.photons.unwrap_or(8192)), 64..=1 << 28, "photons per round")?;
-        within("--rounds", u64::from(self.rounds), 1..=u64::from(study::MOST_ROUNDS), "rounds of the longest point")?;
-        within("--repeats", u64::from(self.repeats), 2..=1000, "runs of a point, whose spread is its error")?;
-        within("--reference-samples", u64::from(self.reference_samples), 16..=1 << 24, "samples per pixel")?;
-        let held = 3 * u64::from(self.side.unwrap_or(128)).pow(2) * u64::from(self.repeats);
-        let most = format!(
-            "3 * side^2 * repeats is {held} numbers in memory for each setting, and {MAX_HELD} is the limit; use fewer, or a smaller --side"
-        );
-        require(held <= MAX_HELD, "--repeats", self.repeats, most)?;
-        require((1.0..=1e6).contains(&self.budget), "--budget", self.budget, "must be from 1s to 1000000s")
-    }
 }
 
 #[cfg(test)]

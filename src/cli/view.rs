@@ -7,7 +7,7 @@ use clap::Args;
 use super::camera::CameraArgs;
 use super::options::CommonArgs;
 use super::progress::{ProgressArgs, ProgressReporter};
-use super::scene::{PhotonArgs, SceneArgs};
+use super::scene::{PhotonArgs, SceneArgs, settings};
 use super::typed::Typed;
 use super::values::{BuilderArg, builder_parser, parse_percent, parse_seconds};
 use super::{DeviceArgs, End};
@@ -62,7 +62,7 @@ pub(super) fn run(args: &ViewArgs, typed: &Typed, cancelled: &AtomicBool) -> Res
         (Subject::Box(Box::new(settings)), args.camera.size_of_box(&reporter)?)
     } else {
         let chosen = args.light.chosen.open()?;
-        let settings = SceneSettings { builder, ..args.light.settings(&args.common, chosen.as_ref()) };
+        let settings = SceneSettings { builder, ..settings(&args.light.request(&args.common), None, chosen.as_ref()) };
         settings.validate()?;
         args.camera.check()?;
         let scene = args.scene.open(&reporter)?;

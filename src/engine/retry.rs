@@ -22,6 +22,17 @@ pub enum Remedy {
     GivenUp,
 }
 
+/// What became of a device that failed, in words.
+pub fn in_words(gpu: &Gpu, error: &Error, remedy: Remedy) -> String {
+    let facts = gpu.facts();
+    let what = match remedy {
+        Remedy::OpenedAnew => "was opened anew, and the run goes on".to_owned(),
+        Remedy::LessMemory => format!("goes on in smaller pieces, with {} MiB at most", facts.usable_memory_bytes >> 20),
+        Remedy::GivenUp => "is given up, and the others go on".to_owned(),
+    };
+    format!("{} {what}: {}", facts.label(), error.what())
+}
+
 /// Told of a device that failed, why, and what is done about it.
 pub type Failed<'a> = &'a dyn Fn(&Gpu, &Error, Remedy);
 

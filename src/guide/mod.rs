@@ -45,6 +45,10 @@ pub mod hard_cases {}
 pub mod scale {}
 
 #[doc = include_str!("links.md")]
+#[doc = include_str!("python.md")]
+pub mod python {}
+
+#[doc = include_str!("links.md")]
 #[doc = include_str!("formats.md")]
 pub mod formats {}
 

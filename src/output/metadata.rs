@@ -9,6 +9,8 @@ use exr::meta::header::LayerAttributes;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
+use crate::engine::error_bound::FilmError;
+use crate::gpu::DeviceFacts;
 use crate::plan::work_division::Division;
 use crate::settings::tile_samples::TileSamples;
 
@@ -53,6 +55,23 @@ pub enum Repeat {
     With { command: String, arguments: Vec<String>, division: Division, tiles: Option<TileSamples> },
     /// It cannot be repeated, for this reason.
     Not(String),
+}
+
+/// Of the devices of a run, each kind once.
+pub fn devices<'a>(facts: impl Iterator<Item = &'a DeviceFacts>) -> Vec<String> {
+    let mut names: Vec<String> = facts.map(|facts| format!("{}, {}", facts.name, facts.driver)).collect();
+    names.sort();
+    names.dedup();
+    names
+}
+
+fn known(value: f64) -> Option<f64> {
+    Some(value).filter(|value| value.is_finite())
+}
+
+/// Noise, and its bound, where they are known.
+pub fn errors(error: &FilmError, confidence: f64) -> [Option<f64>; 2] {
+    [known(error.noise), known(error.noise).and_then(|_| known(error.bound(confidence)))]
 }
 
 /// The JSON of anything, in ASCII, which every reader of both formats takes.

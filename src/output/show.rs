@@ -7,6 +7,8 @@ use super::exr_file::{self, Channel, channels};
 use super::metadata::Metadata;
 use crate::constants::PART_COUNT;
 use crate::engine::scene::SceneFilm;
+use crate::scene::{Camera, Scene};
+use crate::verify::judge::{FirstSurface, first_surfaces};
 
 const RGB: [&str; 3] = ["R", "G", "B"];
 /// Parts of the light, by their numbers.
@@ -63,6 +65,24 @@ pub struct Surface {
     pub depth: f32,
 }
 
+/// What each pixel of a picture sees first.
+pub fn surfaces(scene: &Scene, camera: &Camera, size: (u32, u32)) -> Vec<Surface> {
+    let surface = |seen: FirstSurface| Surface { albedo: seen.albedo.as_vec3(), normal: seen.normal.as_vec3(), depth: seen.depth as f32 };
+    first_surfaces(scene, camera, size).into_iter().map(surface).collect()
+}
+
+/// What a file's values are.
+pub fn units(format: Format, stops: f32, tone: Tone) -> String {
+    let tone = match tone {
+        Tone::Neutral => "Khronos PBR Neutral",
+        Tone::Linear => "linear",
+    };
+    match format {
+        Format::Exr => "radiance, W/m2/sr, linear, Rec. 709 primaries".to_owned(),
+        Format::Png => format!("sRGB; exposure {stops:+.2} stops, tone curve {tone}"),
+    }
+}
+
 /// How a film is shown.
 pub struct Show {
     pub size: (u32, u32),
@@ -74,6 +94,11 @@ pub struct Show {
 }
 
 impl Show {
+    /// Whether an EXR has layers of what is seen first.
+    pub fn shows_surfaces(&self) -> bool {
+        self.layers.iter().any(|layer| layer.is_of_surface())
+    }
+
     /// The picture alone, as one is shown while the run goes on.
     pub fn so_far(&self, film: &SceneFilm, format: Format) -> Vec<u8> {
         let image = self.image(film);

@@ -19,11 +19,13 @@ pub mod mesh;
 pub mod open_box;
 pub mod openings;
 pub mod overlap;
+pub mod picture_size;
 mod planes;
 pub mod rectangle;
 pub mod room;
 pub mod showcase;
 pub mod sky;
+pub mod surroundings;
 pub mod targets;
 pub mod texture;
 mod work;
@@ -188,6 +190,19 @@ impl Scene {
     /// Its first camera, or one that sees all of it.
     pub fn first_camera(&self) -> Camera {
         self.cameras.first().cloned().unwrap_or_else(|| self.camera_around(1.0))
+    }
+
+    /// The camera of this name.
+    pub fn camera(&self, name: &str) -> Result<Camera> {
+        self.cameras.iter().find(|camera| camera.name == name).cloned().ok_or_else(|| {
+            let names: Vec<&str> = self.cameras.iter().map(|camera| camera.name.as_str()).collect();
+            let there = if names.is_empty() {
+                "no such camera: the scene has none; leave --camera out".to_owned()
+            } else {
+                format!("must be one of {}", names.join(", "))
+            };
+            Error::setting("--camera", name, there)
+        })
     }
 
     /// A camera that sees all of it in a picture of this width over height.

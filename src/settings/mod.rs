@@ -22,6 +22,7 @@ macro_rules! named {
 }
 
 pub mod builder;
+pub mod request;
 pub mod scene;
 pub mod stop;
 pub mod tile_samples;

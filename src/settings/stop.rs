@@ -50,6 +50,11 @@ impl Stop {
         self.error.is_some() || self.seconds.is_some() || self.photons.is_some()
     }
 
+    /// Whether there is an error or a time to be reached as well as can be: a number of rounds or photons is no goal.
+    pub fn has_goal(&self) -> bool {
+        self.error.is_some() || self.seconds.is_some()
+    }
+
     pub fn validate(&self) -> Result<()> {
         if let Some(error) = self.error {
             require((1e-6..=1.0).contains(&error), "--error", error, "must be from 0.0001 % to 100 %")?;

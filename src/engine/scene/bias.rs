@@ -7,13 +7,26 @@ use crate::engine;
 use crate::engine::bias::Bias;
 use crate::engine::bias_batches::{Batch, Batches};
 use crate::engine::{Control, End};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::plan::film::BiasPlan;
 use crate::plan::radius::{RADIUS_RANGE, RadiusFrom, Trial};
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::scene::Scene;
 use crate::settings::ROOM_BELOW;
 use crate::settings::scene::SceneSettings;
+use crate::settings::stop::Stop;
+
+/// Refuses an error of a scene whose bias is unknown, and that nothing else would end.
+pub fn check(stop: &Stop, bias: BiasPlan) -> Result<()> {
+    let ends_otherwise = stop.seconds.is_some() || stop.photons.is_some();
+    let Some(wanted) = stop.error.filter(|_| bias == BiasPlan::Nothing && !ends_otherwise) else { return Ok(()) };
+    let allowed = format!(
+        "cannot be reached: the bias is unknown, because {}; leave out what makes the scene so wide, give a --radius, or add --time",
+        Bias::UNKNOWN
+    );
+    Err(Error::setting("--error", format!("{}%", 100.0 * wanted), allowed))
+}
 
 /// The bias of all light at the plan's radii of the first round times `factor`, kept through so many rounds a batch;
 /// `None` if it was cancelled. Radii as small as is allowed are taken for larger ones that leave room below them. Light that no map has is the same at every radius, and has no bias.

@@ -25,6 +25,7 @@ pub mod live;
 pub mod losses;
 pub mod map_file;
 mod on_gpu;
+mod on_several;
 pub mod pilot;
 mod pilot_rounds;
 pub mod points;
@@ -40,6 +41,7 @@ use glam::DVec3;
 pub use film::SceneFilm;
 pub use identity::scene_hash;
 pub use on_gpu::{constants, light, light_from, modules};
+pub use on_several::light_on;
 
 use crate::engine::error_bound::FilmError;
 use crate::engine::{Control, run};

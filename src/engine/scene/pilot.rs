@@ -7,8 +7,8 @@
 
 use std::cell::Cell;
 
-use super::View;
 use super::pilot_rounds::{FEW_SAMPLES, MANY_SAMPLES, OfTile, PIXELS_OF_MAP, Parts, PilotRounds, SAMPLES};
+use super::{View, trial};
 use crate::constants::PART_COUNT;
 use crate::engine;
 use crate::error::Result;
@@ -58,6 +58,14 @@ impl Pilot {
     pub fn gain(&self, stop: &Stop) -> f64 {
         self.rounds.loss(self.before, stop) / self.rounds.loss(self.chosen, stop)
     }
+}
+
+/// Chooses the division of the work of a run with these settings; `None` where it has no goal, too.
+pub fn choose_for(gpu: &Gpu, scene: &Scene, view: &View, settings: &SceneSettings, sensor: Sensor, free: Free) -> Result<Option<Pilot>> {
+    if free == Free::default() || !settings.stop.has_goal() {
+        return Ok(None);
+    }
+    choose(gpu, scene, view, &trial::plan(gpu, scene, view, settings, sensor)?, free)
 }
 
 /// Chooses the division of a picture's work, for whose settings there is a plan. `None` where nothing is to be chosen, or nothing varies.

@@ -23,7 +23,7 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, require, within};
 use crate::gpu::{Gpu, clock};
 use crate::measure::compaction;
 use crate::output::destination::{Folder, write_all};
@@ -61,6 +61,53 @@ pub struct Request {
     /// Rounds of the longest point, whatever time is left.
     #[serde(skip)]
     pub most_rounds: u32,
+}
+
+/// srand48 takes 32 bits, and each run has a seed of its own.
+pub const MAX_SEED: u64 = u32::MAX as u64 - 1000;
+/// Of all runs of a choice, a gigabyte in all.
+const MAX_HELD: u64 = 1 << 27;
+
+impl Request {
+    /// Of a scene, on a CPU or a GPU.
+    pub fn usual(scene: &str, is_cpu: bool) -> Request {
+        Request {
+            scene: scene.to_owned(),
+            size: match (scene == "open-box", is_cpu) {
+                (true, true) => 24,
+                (false, false) => 128,
+                _ => 64,
+            },
+            photons: if is_cpu { 8192 } else { 1 << 18 },
+            repeats: 5,
+            seed: 1,
+            reference_samples: 4096,
+            budget: Duration::from_secs(240),
+            asked: strip::ASKED.to_vec(),
+            peers: Vec::new(),
+            most_rounds: MOST_ROUNDS,
+        }
+    }
+
+    pub fn validate(&self) -> Result<()> {
+        within("--side", self.size, 2..=1024, "pixels or texels along a side")?;
+        within("--photons", self.photons, 64..=1 << 28, "photons per round")?;
+        within("--rounds", self.most_rounds, 1..=MOST_ROUNDS, "rounds of the longest point")?;
+        within("--repeats", self.repeats, 2..=1000, "runs of a point, whose spread is its error")?;
+        within("--reference-samples", self.reference_samples, 16..=1 << 24, "samples per pixel")?;
+        within("--seed", self.seed, 0..=MAX_SEED, "seed of the first run")?;
+        let held = 3 * u64::from(self.size).pow(2) * u64::from(self.repeats);
+        let most = format!(
+            "3 * side^2 * repeats is {held} numbers in memory for each setting, and {MAX_HELD} is the limit; use fewer, or a smaller --side"
+        );
+        require(held <= MAX_HELD, "--repeats", self.repeats, most)
+    }
+}
+
+/// A budget of so many seconds.
+pub fn budget(seconds: f64) -> Result<Duration> {
+    require((1.0..=1e6).contains(&seconds), "--budget", seconds, "must be from 1s to 1000000s")?;
+    Ok(Duration::from_secs_f64(seconds))
 }
 
 /// Everything that was found.

@@ -265,7 +265,7 @@ impl Geometry {
         ((position - self.centre) / self.unit).as_vec3()
     }
 
-    /// A line for each pair of meshes that overlap in one plane, and for what is too many to be treated as it should.
+    /// A line for triangles that are left out, for each pair of meshes that overlap in one plane, and for what is too many to be treated as it should.
     pub fn warnings(&self, scene: &Scene) -> Vec<String> {
         const MOST: usize = 5;
         let name = |mesh: u32| &scene.meshes[mesh as usize].name;
@@ -275,7 +275,12 @@ impl Geometry {
             }
             format!("meshes {:?} and {:?} overlap in one plane; only {:?} counts there", name(hidden), name(seen), name(seen))
         };
-        let mut lines: Vec<String> = self.overlaps.iter().take(MOST).map(line).collect();
+        let mut lines: Vec<String> = Vec::new();
+        if self.left_out > 0 {
+            let count = counted(self.left_out, "triangle");
+            lines.push(format!("{count} without area in single precision, or on others, left out"));
+        }
+        lines.extend(self.overlaps.iter().take(MOST).map(line));
         if self.crowded > 0 {
             lines.push(format!(
                 "{} among more than 64 others that overlap each other in one plane; light there may count more than once",

@@ -1,18 +1,17 @@
 //! Width and height of a picture: from the camera's aspect ratio unless both are given.
 
-use super::progress::ProgressReporter;
+use super::Camera;
 use crate::error::{Error, Result};
-use crate::scene::Camera;
 
 /// `--size`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum PictureSize {
+pub enum PictureSize {
     Width(u32),
     WidthAndHeight(u32, u32),
 }
 
 /// Along each side.
-pub(super) const MAX_SIDE: u32 = 65_535;
+pub const MAX_SIDE: u32 = 65_535;
 /// Pixel numbers are 32-bit, with sums over them.
 const MAX_PIXELS: u32 = 1 << 28;
 /// Pixels of a picture whose size is not given.
@@ -25,7 +24,7 @@ fn is_allowed(width: u32, height: u32) -> bool {
 }
 
 /// `1280`, `1280x720`.
-pub(super) fn parse_size(text: &str) -> std::result::Result<PictureSize, String> {
+pub fn parse_size(text: &str) -> std::result::Result<PictureSize, String> {
     let size = match text.split_once('x') {
         Some((width, height)) => {
             width.parse().ok().zip(height.parse().ok()).map(|(width, height)| PictureSize::WidthAndHeight(width, height))
@@ -41,7 +40,7 @@ pub(super) fn parse_size(text: &str) -> std::result::Result<PictureSize, String>
 
 impl PictureSize {
     /// Width and height in pixels, and a remark if they change what the camera sees.
-    fn of(size: Option<PictureSize>, camera: &Camera) -> Result<(u32, u32, Option<String>)> {
+    pub fn of(size: Option<PictureSize>, camera: &Camera) -> Result<(u32, u32, Option<String>)> {
         let aspect = camera.aspect.unwrap_or(DEFAULT_ASPECT);
         // A float that is cut to the range of u32.
         let rounded = |side: f64| (side.round() as u32).max(1);
@@ -74,13 +73,6 @@ impl PictureSize {
                 Ok((width, height, remark))
             }
         }
-    }
-
-    /// Width and height in pixels; prints a note if they change what the camera sees.
-    pub(super) fn resolve(size: Option<PictureSize>, camera: &Camera, reporter: &ProgressReporter) -> Result<(u32, u32)> {
-        let (width, height, remark) = PictureSize::of(size, camera)?;
-        remark.iter().for_each(|remark| reporter.note(&format!("note: {remark}")));
-        Ok((width, height))
     }
 }
 

@@ -1,0 +1,64 @@
+//! A run of a scene on all devices that there are, whatever becomes of them.
+
+use super::losses::losses;
+use super::map_file::MapFile;
+use super::{RunResult, SceneFilm, View, light_from, trial};
+use crate::engine::retry::{Failed, run_on};
+use crate::engine::saved::SavedFilm;
+use crate::engine::several_devices::Work;
+use crate::engine::{self, Control};
+use crate::error::Result;
+use crate::gpu::Gpu;
+use crate::ledger::Fates;
+use crate::plan::scene::ScenePlan;
+use crate::scene::Scene;
+use crate::settings::stop::Stop;
+
+/// Runs on all devices, for the first of which the plan was made; `map` holds photons that need not be traced.
+pub fn light_on(
+    gpus: &mut Vec<Gpu>,
+    (scene, view): (&Scene, &View),
+    plan: &ScenePlan,
+    map: Option<&MapFile>,
+    failed: Failed,
+    control: &mut Control,
+) -> Result<RunResult> {
+    let geometry = view.geometry;
+    let first = gpus[0].facts().clone();
+    let run = |gpu: &Gpu, stop: Stop, control: &mut Control| {
+        let facts = gpu.facts();
+        let is_alike = (&facts.name, &facts.driver) == (&first.name, &first.driver);
+        let replan = |new: Result<ScenePlan>| map.into_iter().try_fold(new?, |plan, map| map.plan(plan, geometry));
+        let mut plan = if !is_alike {
+            replan(trial::plan(gpu, scene, view, &plan.settings, plan.sensor))?
+        } else if facts.usable_memory_bytes != first.usable_memory_bytes {
+            let limits = engine::limits(facts);
+            replan(ScenePlan::with_trial(scene, geometry, &plan.settings, plan.sensor, &limits, plan.trial.clone()))?
+        } else {
+            plan.clone()
+        };
+        plan.settings.stop = stop;
+        light_from(gpu, view, plan, map, control)
+    };
+    let photons_per_round = plan.maps().map(|map| u64::from(map.photons)).sum();
+    let work = Work {
+        run: &run,
+        film: |film| match film {
+            SavedFilm::Scene(film) => film,
+            SavedFilm::Room(_) => unreachable!("a scene was lit"),
+        },
+        error: &|film: &SceneFilm| film.error(plan.film.confidence),
+        losses: &|film: &SceneFilm, fates: &[Fates]| losses(geometry, plan, fates, film),
+        can_go_on: true,
+        stop: plan.settings.stop,
+        alpha: plan.settings.alpha,
+        rounds: plan.settings.rounds,
+        rounds_per_block: plan.film.rounds_per_block,
+        bounces: plan.settings.bounces,
+        photons_per_round,
+    };
+    let mut lit = run_on(gpus, &work, failed, control)?;
+    // With its goals, which no device had.
+    lit.plan.settings.stop = plan.settings.stop;
+    Ok(lit)
+}

@@ -1,0 +1,88 @@
+//! Errors of the library as exceptions.
+
+use photonmill::error::Error as Failure;
+use pyo3::create_exception;
+use pyo3::exceptions::{PyException, PyUserWarning, PyValueError};
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyDict, PyType};
+
+create_exception!(photonmill, Error, PyException, "What went wrong, in one line: what, which value, what is allowed.");
+create_exception!(photonmill, RunWarning, PyUserWarning, "What the user should know of a scene or a run, in one line.");
+
+static ARGUMENT_ERROR: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+
+pub fn add_to(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    let py = module.py();
+    module.add("Error", py.get_type::<Error>())?;
+    module.add("RunWarning", py.get_type::<RunWarning>())?;
+    module.add("ArgumentError", argument_error_type(py)?)
+}
+
+/// An [`Error`] that is a ValueError, too, which no macro makes.
+fn argument_error_type(py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
+    let make = || -> PyResult<Py<PyType>> {
+        let content = PyDict::new(py);
+        content.set_item("__module__", "photonmill")?;
+        content.set_item("__doc__", "An argument has a value that is not allowed.")?;
+        let bases = (py.get_type::<Error>(), py.get_type::<PyValueError>());
+        Ok(py.get_type::<PyType>().call1(("ArgumentError", bases, content))?.cast_into::<PyType>()?.unbind())
+    };
+    Ok(ARGUMENT_ERROR.get_or_try_init(py, make)?.bind(py))
+}
+
+/// The exception for an argument that is not allowed.
+pub fn argument(py: Python<'_>, message: impl Into<String>) -> PyErr {
+    match argument_error_type(py) {
+        Ok(of) => PyErr::from_type(of.clone(), message.into()),
+        Err(error) => error,
+    }
+}
+
+/// The exception for what the library says.
+pub fn of(py: Python<'_>, failure: &Failure) -> PyErr {
+    let message = in_python(&failure.to_string());
+    match failure {
+        Failure::Setting { .. } | Failure::DeviceAbsent { .. } => argument(py, message),
+        _ => Error::new_err(message),
+    }
+}
+
+/// A message in which options are called as arguments are: `--total-photons` is total_photons.
+pub fn in_python(message: &str) -> String {
+    let is_part = |letter: char| letter.is_ascii_lowercase() || letter == '-';
+    let mut text = String::with_capacity(message.len());
+    let mut rest = message.strip_prefix("-o ").map_or_else(|| message.to_owned(), |rest| format!("path {rest}"));
+    if let Some(after) = rest.strip_prefix("SCENE ") {
+        rest = format!("scene {after}");
+    }
+    let mut rest = rest.as_str();
+    while let Some(place) = rest.find("--") {
+        let (before, option) = rest.split_at(place);
+        text.push_str(before);
+        let name = &option[2..];
+        let length = name.find(|letter| !is_part(letter)).unwrap_or(name.len());
+        let starts_a_word = before.chars().next_back().is_none_or(|letter| !letter.is_alphanumeric());
+        if length == 0 || !starts_a_word {
+            text.push_str("--");
+            rest = name;
+            continue;
+        }
+        let name_in_python = match &name[..length] {
+            "with" => "with_".to_owned(),
+            name => name.replace('-', "_"),
+        };
+        text.push_str(&name_in_python);
+        rest = &name[length..];
+    }
+    text + rest
+}
+
+/// Issues warnings, as Python's filters want them.
+pub fn warn(py: Python<'_>, warnings: &[String]) -> PyResult<()> {
+    let category = py.get_type::<RunWarning>();
+    warnings.iter().try_for_each(|line| {
+        let text = std::ffi::CString::new(in_python(line).replace('\0', " ")).expect("no zero byte is left");
+        PyErr::warn(py, &category, &text, 1)
+    })
+}

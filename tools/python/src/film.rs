@@ -1,0 +1,326 @@
+//! Results as arrays of numpy. An array is made once, when it is first asked for, and takes over the memory that the values were written to; as
+//! all who ask share it, it cannot be written to.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use glam::{DVec3, Vec3};
+use numpy::ndarray::{Array, Array2, Array3, Dimension};
+use numpy::{IntoPyArray, PyArray, PyArray2, PyArray3, PyArrayMethods};
+use photonmill::output::colour::{Format, Tone};
+use photonmill::output::show::{Layer, Surface};
+use photonmill::render::{Lightmaps as Baked, Picture, Style};
+use photonmill::settings::scene::Part;
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyBytes, PyDict};
+
+use crate::error;
+use crate::run::{Found, Run};
+
+/// An array that cannot be written to.
+fn array<D: Dimension>(py: Python<'_>, values: Array<f32, D>) -> Bound<'_, PyArray<f32, D>> {
+    let array = values.into_pyarray(py);
+    drop(array.readwrite().make_nonwriteable());
+    array
+}
+
+/// Colours of a picture's pixels.
+fn picture((width, height): (u32, u32), colours: impl Iterator<Item = Vec3>) -> Array3<f32> {
+    let mut values = Vec::with_capacity(3 * width as usize * height as usize);
+    colours.for_each(|colour| values.extend(colour.to_array()));
+    Array3::from_shape_vec((height as usize, width as usize, 3), values).expect("one colour a pixel")
+}
+
+fn rows(colours: impl Iterator<Item = Vec3>) -> Array2<f32> {
+    let values: Vec<f32> = colours.flat_map(|colour| colour.to_array()).collect();
+    Array2::from_shape_vec((values.len() / 3, 3), values).expect("three values a colour")
+}
+
+type Pixels = PyOnceLock<Py<PyArray3<f32>>>;
+
+/// What each pixel sees first.
+struct Surfaces {
+    albedo: Py<PyArray3<f32>>,
+    normal: Py<PyArray3<f32>>,
+    depth: Py<PyArray2<f32>>,
+}
+
+#[doc = doc!("Film")]
+#[pyclass(module = "photonmill", extends = Run, frozen)]
+pub struct Film {
+    found: Arc<Found>,
+    radiance: Pixels,
+    standard_error: Pixels,
+    parts: PyOnceLock<Py<PyDict>>,
+    surfaces: PyOnceLock<Surfaces>,
+}
+
+impl Film {
+    pub fn new(py: Python<'_>, scene: &str, found: Picture) -> PyResult<Py<Film>> {
+        let run = Run::new(py, scene, Found::Picture(found))?;
+        let found = run.found.clone();
+        let film =
+            Film { found, radiance: Pixels::new(), standard_error: Pixels::new(), parts: PyOnceLock::new(), surfaces: PyOnceLock::new() };
+        Py::new(py, PyClassInitializer::from(run).add_subclass(film))
+    }
+
+    fn picture(&self) -> &Picture {
+        match &*self.found {
+            Found::Picture(picture) => picture,
+            _ => unreachable!("a film is of a picture"),
+        }
+    }
+
+    fn surfaces(&self, py: Python<'_>) -> PyResult<&Surfaces> {
+        self.surfaces.get_or_try_init(py, || {
+            let made = self.picture();
+            let seen = py.detach(|| made.surfaces());
+            let colours = |of: fn(&Surface) -> Vec3| array(py, picture(made.size, seen.iter().map(of))).unbind();
+            let (width, height) = (made.size.0 as usize, made.size.1 as usize);
+            let depths = seen.iter().map(|surface| surface.depth).collect();
+            let depth = Array2::from_shape_vec((height, width), depths).expect("one depth a pixel");
+            let (albedo, normal) = (colours(|surface| surface.albedo), colours(|surface| surface.normal));
+            Ok(Surfaces { albedo, normal, depth: array(py, depth).unbind() })
+        })
+    }
+}
+
+fn tone_of(py: Python<'_>, name: &str) -> PyResult<Tone> {
+    match name {
+        "neutral" => Ok(Tone::Neutral),
+        "linear" => Ok(Tone::Linear),
+        _ => Err(error::argument(py, format!("tone '{name}': must be one of neutral, linear"))),
+    }
+}
+
+fn layers_of(py: Python<'_>, names: &[String]) -> PyResult<Vec<Layer>> {
+    let known = Layer::ALL.map(Layer::name).join(", ");
+    let layer = |name: &String| Layer::ALL.into_iter().find(|layer| layer.name() == name);
+    let refused = |name: &String| error::argument(py, format!("layers '{name}': must be among {known}"));
+    names.iter().map(|name| layer(name).ok_or_else(|| refused(name))).collect()
+}
+
+/// Stops of an exposure.
+fn stops_of(py: Python<'_>, exposure: Option<f32>) -> PyResult<Option<f32>> {
+    match exposure.filter(|stops| !(-64.0..=64.0).contains(stops)) {
+        Some(stops) => Err(error::argument(py, format!("exposure {stops}: must be from -64 to 64 stops"))),
+        None => Ok(exposure),
+    }
+}
+
+#[pymethods]
+impl Film {
+    #[doc = doc!("Film.width")]
+    #[getter]
+    fn width(&self) -> u32 {
+        self.picture().size.0
+    }
+
+    #[doc = doc!("Film.height")]
+    #[getter]
+    fn height(&self) -> u32 {
+        self.picture().size.1
+    }
+
+    #[doc = doc!("Film.radiance")]
+    #[getter]
+    fn radiance<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray3<f32>> {
+        let Picture { run, size, .. } = self.picture();
+        let make = || array(py, py.detach(|| picture(*size, run.film.means().map(DVec3::as_vec3)))).unbind();
+        self.radiance.get_or_init(py, make).bind(py).clone()
+    }
+
+    #[doc = doc!("Film.standard_error")]
+    #[getter]
+    fn standard_error<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray3<f32>> {
+        let Picture { run, size, .. } = self.picture();
+        let errors = || {
+            let of_pixel = run.film.stated_errors();
+            picture(*size, (0..run.film.pixels()).map(|pixel| of_pixel(pixel).as_vec3()))
+        };
+        self.standard_error.get_or_init(py, || array(py, py.detach(errors)).unbind()).bind(py).clone()
+    }
+
+    #[doc = doc!("Film.parts")]
+    #[getter]
+    fn parts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let Picture { run, size, .. } = self.picture();
+        let make = || {
+            let parts = PyDict::new(py);
+            let is_apart = run.film.mean_of_part(0, 0).is_some();
+            for (number, part) in Part::EACH.into_iter().enumerate().filter(|_| is_apart) {
+                let mean = |pixel: usize| run.film.mean_of_part(number, pixel).expect("parts are apart").as_vec3();
+                let values = py.detach(|| picture(*size, (0..run.film.pixels()).map(mean)));
+                parts.set_item(format!("{part:?}").to_lowercase(), array(py, values))?;
+            }
+            Ok::<_, PyErr>(parts.unbind())
+        };
+        // The arrays are shared, and the dict is the caller's own.
+        self.parts.get_or_try_init(py, make)?.bind(py).copy()
+    }
+
+    #[doc = doc!("Film.albedo")]
+    #[getter]
+    fn albedo<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
+        Ok(self.surfaces(py)?.albedo.bind(py).clone())
+    }
+
+    #[doc = doc!("Film.normal")]
+    #[getter]
+    fn normal<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
+        Ok(self.surfaces(py)?.normal.bind(py).clone())
+    }
+
+    #[doc = doc!("Film.depth")]
+    #[getter]
+    fn depth<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        Ok(self.surfaces(py)?.depth.bind(py).clone())
+    }
+
+    #[doc = doc!("Film.save")]
+    #[pyo3(signature = (path, *, exposure=None, tone="neutral", layers=None))]
+    fn save(&self, py: Python<'_>, path: PathBuf, exposure: Option<f32>, tone: &str, layers: Option<Vec<String>>) -> PyResult<()> {
+        let layers = layers.map_or(Ok(Style::default().layers), |names| layers_of(py, &names))?;
+        let style = Style { exposure: stops_of(py, exposure)?, tone: tone_of(py, tone)?, layers };
+        py.detach(|| self.picture().save(&path, &style)).map_err(|failure| error::of(py, &failure))
+    }
+
+    #[doc = doc!("Film.png")]
+    #[pyo3(signature = (*, exposure=None, tone="neutral"))]
+    fn png<'py>(&self, py: Python<'py>, exposure: Option<f32>, tone: &str) -> PyResult<Bound<'py, PyBytes>> {
+        let style = Style { exposure: stops_of(py, exposure)?, tone: tone_of(py, tone)?, ..Style::default() };
+        Ok(PyBytes::new(py, &py.detach(|| self.picture().encode(Format::Png, &style))))
+    }
+
+    /// What a notebook shows.
+    fn _repr_png_<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        self.png(py, None, "neutral")
+    }
+}
+
+#[doc = doc!("Irradiance")]
+#[pyclass(module = "photonmill", extends = Run, frozen)]
+pub struct Irradiance {
+    found: Arc<Found>,
+    irradiance: PyOnceLock<Py<PyArray2<f32>>>,
+    standard_error: PyOnceLock<Py<PyArray2<f32>>>,
+}
+
+impl Irradiance {
+    pub fn new(py: Python<'_>, scene: &str, found: photonmill::render::Run) -> PyResult<Py<Irradiance>> {
+        let run = Run::new(py, scene, Found::Points(found))?;
+        let found = run.found.clone();
+        let points = Irradiance { found, irradiance: PyOnceLock::new(), standard_error: PyOnceLock::new() };
+        Py::new(py, PyClassInitializer::from(run).add_subclass(points))
+    }
+
+    fn run(&self) -> &photonmill::render::Run {
+        match &*self.found {
+            Found::Points(run) => run,
+            _ => unreachable!("irradiance is of points"),
+        }
+    }
+}
+
+#[pymethods]
+impl Irradiance {
+    #[doc = doc!("Irradiance.irradiance")]
+    #[getter]
+    fn irradiance<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f32>> {
+        let make = || array(py, rows(self.run().film.means().map(DVec3::as_vec3))).unbind();
+        self.irradiance.get_or_init(py, make).bind(py).clone()
+    }
+
+    #[doc = doc!("Irradiance.standard_error")]
+    #[getter]
+    fn standard_error<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f32>> {
+        let film = &self.run().film;
+        let make = || {
+            let of_point = film.stated_errors();
+            array(py, rows((0..film.pixels()).map(|point| of_point(point).as_vec3()))).unbind()
+        };
+        self.standard_error.get_or_init(py, make).bind(py).clone()
+    }
+
+    #[doc = doc!("Irradiance.__len__")]
+    fn __len__(&self) -> usize {
+        self.run().film.pixels()
+    }
+}
+
+#[doc = doc!("Lightmap")]
+#[pyclass(module = "photonmill", frozen)]
+pub struct Lightmap {
+    #[doc = doc!("Lightmap.name")]
+    #[pyo3(get)]
+    name: String,
+    #[doc = doc!("Lightmap.irradiance")]
+    #[pyo3(get)]
+    irradiance: Py<PyArray3<f32>>,
+    #[doc = doc!("Lightmap.standard_error")]
+    #[pyo3(get)]
+    standard_error: Py<PyArray3<f32>>,
+}
+
+#[pymethods]
+impl Lightmap {
+    fn __repr__(&self, py: Python<'_>) -> String {
+        let shape = numpy::PyUntypedArrayMethods::shape(self.irradiance.bind(py).as_untyped()).to_vec();
+        format!("Lightmap('{}', {} x {})", self.name, shape[1], shape[0])
+    }
+}
+
+#[doc = doc!("Lightmaps")]
+#[pyclass(module = "photonmill", extends = Run, frozen)]
+pub struct Lightmaps {
+    found: Arc<Found>,
+    maps: PyOnceLock<Vec<Py<Lightmap>>>,
+}
+
+impl Lightmaps {
+    pub fn new(py: Python<'_>, scene: &str, baked: Baked) -> PyResult<Py<Lightmaps>> {
+        let run = Run::new(py, scene, Found::Lightmaps(baked))?;
+        let found = run.found.clone();
+        Py::new(py, PyClassInitializer::from(run).add_subclass(Lightmaps { found, maps: PyOnceLock::new() }))
+    }
+
+    fn baked(&self) -> &Baked {
+        match &*self.found {
+            Found::Lightmaps(baked) => baked,
+            _ => unreachable!("lightmaps are of a bake"),
+        }
+    }
+
+    fn maps(&self, py: Python<'_>) -> PyResult<&Vec<Py<Lightmap>>> {
+        self.maps.get_or_try_init(py, || {
+            let map = |map: &photonmill::render::Lightmap| {
+                let values = |colours: &[Vec3]| array(py, picture((map.width, map.height), colours.iter().copied())).unbind();
+                let (irradiance, standard_error) = (values(&map.irradiance), values(&map.standard_error));
+                Py::new(py, Lightmap { name: map.name.clone(), irradiance, standard_error })
+            };
+            self.baked().maps.iter().map(map).collect()
+        })
+    }
+}
+
+#[pymethods]
+impl Lightmaps {
+    #[doc = doc!("Lightmaps.maps")]
+    #[getter]
+    #[pyo3(name = "maps")]
+    fn list(&self, py: Python<'_>) -> PyResult<Vec<Py<Lightmap>>> {
+        Ok(self.maps(py)?.iter().map(|map| map.clone_ref(py)).collect())
+    }
+
+    #[doc = doc!("Lightmaps.files")]
+    #[getter]
+    fn files(&self) -> Vec<String> {
+        self.baked().files.clone()
+    }
+
+    #[doc = doc!("Lightmaps.__len__")]
+    fn __len__(&self) -> usize {
+        self.baked().maps.len()
+    }
+}
