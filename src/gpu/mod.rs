@@ -8,6 +8,7 @@ pub mod commands;
 pub mod device;
 mod faults;
 pub mod kernel;
+mod labels;
 mod mapped_file;
 mod pace;
 mod reconvergence;
@@ -31,6 +32,8 @@ pub use mapped_file::MappedFile;
 
 use crate::error::{Error, Result};
 use clock::Idleness;
+use device::Loaded;
+use labels::Labels;
 use validation::Messages;
 
 /// The kernels that `build.rs` found, one struct each.
@@ -82,8 +85,7 @@ pub(crate) struct Context {
     allocator: Mutex<Option<Allocator>>,
     held: Mutex<HeldMemory>,
     device: ash::Device,
-    /// Names for tools and messages; only with the validation layer.
-    debug: Option<ash::ext::debug_utils::Device>,
+    labels: Option<Labels>,
     messages: Option<Messages>,
     instance: ash::Instance,
     _entry: ash::Entry,
@@ -132,12 +134,13 @@ impl Gpu {
     /// Opens a device and runs the start-up check on it.
     pub fn open(options: &Options) -> Result<Gpu> {
         faults::check()?;
-        let (entry, instance, messages) = device::instance(options.validate).map_err(|error| match (error, &options.device) {
+        let loaded = device::instance(options.validate).map_err(|error| match (error, &options.device) {
             (Error::NoVulkan { reason }, Some(wanted)) => {
                 Error::DeviceAbsent { wanted: wanted.clone(), present: format!("none ({reason})") }
             }
             (error, _) => error,
         })?;
+        let Loaded { entry, instance, messages, has_labels } = loaded;
         let opened = device::choose(&instance, options.device.as_deref()).and_then(|(physical, facts)| {
             device::create(&instance, physical, &facts).map(|(device, queue)| (physical, facts, device, queue))
         });
@@ -159,7 +162,7 @@ impl Gpu {
         if let Some(memory) = options.memory {
             facts.usable_memory_bytes = memory;
         }
-        let debug = messages.is_some().then(|| ash::ext::debug_utils::Device::new(&instance, &device));
+        let labels = has_labels.then(|| Labels::new(&instance, &device));
         let allocator = Allocator::new(&AllocatorCreateDesc {
             instance: instance.clone(),
             device: device.clone(),
@@ -173,7 +176,7 @@ impl Gpu {
             allocator: Mutex::new(Some(allocator)),
             held: Mutex::default(),
             device,
-            debug,
+            labels,
             messages,
             instance,
             _entry: entry,
@@ -198,7 +201,7 @@ impl Gpu {
 
     /// Devices that the loader lists, in its order.
     pub fn list() -> Result<Vec<DeviceFacts>> {
-        let (_entry, instance, _) = device::instance(false)?;
+        let Loaded { entry: _entry, instance, .. } = device::instance(false)?;
         let facts = device::all(&instance).map(|devices| devices.into_iter().map(|(_, facts)| facts).collect());
         // SAFETY: nothing else was made from this instance.
         unsafe { instance.destroy_instance(None) };
@@ -243,18 +246,6 @@ impl Gpu {
         match messages.first() {
             None => Ok(()),
             Some(first) => Err(Error::Validation { count: messages.len(), first: first.clone() }),
-        }
-    }
-}
-
-impl Context {
-    /// Gives an object a name in validation messages and debuggers.
-    fn set_name<T: vk::Handle>(&self, object: T, name: &str) {
-        if let Some(debug) = &self.debug {
-            let name = std::ffi::CString::new(name).expect("names hold no zero byte");
-            let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(object).object_name(&name);
-            // SAFETY: the object belongs to this device. Failing to name it changes nothing.
-            let _ = unsafe { debug.set_debug_utils_object_name(&info) };
         }
     }
 }
