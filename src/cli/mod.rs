@@ -4,7 +4,9 @@ mod bake;
 mod bench;
 mod chosen;
 mod compare;
+mod denoise;
 mod devices;
+mod display;
 mod gallery;
 mod help;
 mod how_made;
@@ -65,7 +67,7 @@ struct Cli {
 enum Command {
     /// Render a picture of a scene
     #[command(after_help = help::RENDER)]
-    Render(render::RenderArgs),
+    Render(Box<render::RenderArgs>),
     /// Bake the irradiance of all surfaces of a scene into lightmaps
     #[command(after_help = help::BAKE)]
     Bake(bake::BakeArgs),
