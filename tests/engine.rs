@@ -129,11 +129,18 @@ fn a_validation_message_is_an_error() {
         let items = gpu.buffer::<u32>("items", 128, Memory::Device).unwrap();
         // Passes that have ended, in this submission and in one before, are in no message; those that go on are.
         let copy_onto_itself = |commands: &mut Commands| {
-            commands.scope("ended", |commands| Ok(commands.clear(&items)))?;
+            let clear = |commands: &mut Commands| {
+                commands.clear(&items);
+                Ok(())
+            };
+            commands.scope("ended", clear)?;
             commands.submit()?;
-            commands.scope("ended too", |commands| Ok(commands.clear(&items)))?;
-            // No buffer can be copied onto itself.
-            commands.scope("index", |commands| Ok(commands.copy(&items, &items, 1)))
+            commands.scope("ended too", clear)?;
+            commands.scope("index", |commands| {
+                // No buffer can be copied onto itself.
+                commands.copy(&items, &items, 1);
+                Ok(())
+            })
         };
         commands.scope("round", copy_onto_itself).unwrap();
     }
