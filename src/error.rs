@@ -107,6 +107,10 @@ pub enum Error {
     #[error("interrupted before the first result; nothing was written")]
     Interrupted,
 
+    /// The denoiser was asked for and cannot be had.
+    #[error("--denoise: Open Image Denoise {reason}")]
+    Denoiser { reason: String },
+
     /// The validation layer was asked for and is not installed.
     #[error("--validate: the layer VK_LAYER_KHRONOS_validation is not installed; install the Vulkan validation layers, or omit --validate")]
     NoValidationLayer,
@@ -126,6 +130,7 @@ impl Error {
             | Error::Scene { .. }
             | Error::Picture { .. }
             | Error::DeviceAbsent { .. }
+            | Error::Denoiser { .. }
             | Error::NoValidationLayer => 2,
             Error::Interrupted => 130,
             _ => 1,

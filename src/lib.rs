@@ -50,7 +50,7 @@
 //! triangles. A file uses only what stands to its left:
 //!
 //! ```text
-//! constants, error, text, records, rng, ledger, timings < settings, path, photon < scene < plan < cpu, gpu < engine < output
+//! constants, error, text, records, rng, ledger, timings < settings, path, photon < scene < plan < cpu, gpu, oidn < engine < output
 //! output < bake < measure, render < cli;  output < view < cli;  scene < verify::judge;  engine < verify::selfcheck;  output < verify::compare < cli
 //! ```
 //!
@@ -62,12 +62,14 @@ pub mod constants;
 pub mod cpu;
 pub mod engine;
 pub mod error;
-#[expect(unsafe_code, reason = "Vulkan's functions are unsafe, and so are mapped files; nothing outside this module is")]
+#[expect(unsafe_code, reason = "Vulkan's functions are unsafe, and so are mapped files")]
 pub mod gpu;
 #[cfg(doc)]
 pub mod guide;
 pub mod ledger;
 pub mod measure;
+#[expect(unsafe_code, reason = "the functions of Open Image Denoise, which is loaded at run time, are unsafe")]
+pub mod oidn;
 pub mod output;
 pub mod path;
 pub mod photon;

@@ -35,6 +35,25 @@ pub struct Span {
     /// Since the start of the run. Device spans are placed by the host's time of their submission.
     pub start: Duration,
     pub duration: Duration,
+    pub handled: Handled,
+}
+
+impl Span {
+    /// Of what the host's clock saw.
+    pub fn of_host(name: &str, start: Duration, duration: Duration) -> Span {
+        Span { name: name.into(), clock: Clock::Wall, start, duration, handled: Handled::default() }
+    }
+}
+
+/// What a scope is known to have handled; 0 where the host does not know it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Handled {
+    /// Photons that left their lights in it.
+    pub photons: u64,
+    /// Photons of a map that it sorted or looked up.
+    pub stored: u64,
+    /// Read and written: of copies and fills all, of kernels what they cannot do without.
+    pub bytes: u64,
 }
 
 /// Timings of a run, in the order in which scopes first appeared.
@@ -167,13 +186,12 @@ impl HostClock {
         let result = body(self);
         let (start, duration) = (begin.duration_since(self.started), begin.elapsed());
         let name = self.open.pop().expect("pushed above");
-        self.timings.add(Span { name: name.into(), clock: Clock::Wall, start, duration });
+        self.timings.add(Span::of_host(&name, start, duration));
         result
     }
 
     pub fn finish(mut self) -> Timings {
-        let whole = Span { name: self.whole.into(), clock: Clock::Wall, start: Duration::ZERO, duration: self.started.elapsed() };
-        self.timings.add(whole);
+        self.timings.add(Span::of_host(self.whole, Duration::ZERO, self.started.elapsed()));
         self.timings
     }
 }

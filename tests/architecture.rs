@@ -11,7 +11,7 @@ const LINE: &[&[&str]] = &[
     &["settings", "path", "photon"],
     &["scene"],
     &["verify::judge", "plan"],
-    &["cpu", "gpu"],
+    &["cpu", "gpu", "oidn"],
     &[
         "engine",
         "engine::bias",
@@ -297,7 +297,8 @@ fn every_file_of_tests_is_run() {
 fn vulkan_and_unsafe_stay_in_the_engine() {
     for (path, source) in files("src", &[".rs"]).into_iter().filter(|(path, _)| !path.starts_with("src/gpu/")) {
         let code = code_of(&source);
-        assert!(!has_word(&code, "unsafe"), "{path}: unsafe");
+        // What is loaded at run time is as unsafe as Vulkan.
+        assert!(path == "src/oidn.rs" || !has_word(&code, "unsafe"), "{path}: unsafe");
         assert!(!has_word(&code, "ash"), "{path}: ash");
     }
 }

@@ -64,7 +64,9 @@ const NOT_RUN: [(&str, &str); 14] = [
 ];
 
 /// Commands of which only the options are checked, and why.
-const PARSED: [(&str, &str); 4] = [
+const PARSED: [(&str, &str); 6] = [
+    ("photonmill render scene.glb -o picture.exr --display ", "needs a viewer; `tests/display.rs` has one"),
+    ("photonmill render scene.glb -o picture.exr --denoise", "needs Open Image Denoise; `tests/denoise.rs` has something in its place"),
     ("photonmill gallery ", "makes pipelines for every picture; `tests/gallery.rs` runs it"),
     ("photonmill paper ", "takes a minute at any size; `tests/bench.rs` and `tests/cli.rs` run its parts"),
     ("photonmill study ", "compiles pipelines for every choice; `tests/study.rs` runs small studies"),
@@ -206,12 +208,13 @@ fn commands_that_are_wrong_are_noticed() {
 }
 
 /// Options of the project's other tools, of cargo and of Slurm.
-const OTHER_OPTIONS: [&str; 24] = [
+const OTHER_OPTIONS: [&str; 25] = [
     "--again",
     "--array",
     "--dependency",
     "--gres",
     "--help",
+    "--hostname",
     "--ignored",
     "--install",
     "--limit",

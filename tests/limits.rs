@@ -138,7 +138,7 @@ fn photons_stored_are_the_length_of_the_map() {
         for map in lit.plan.maps() {
             let mut stored = 0;
             for chunk in map.chunks() {
-                let mut count = |commands: &mut Commands| {
+                let mut count = |commands: &mut Commands, _: Option<u32>| {
                     stored += u64::from(commands.read(&buffers.counters, 1)?[0]);
                     Ok(())
                 };

@@ -7,6 +7,7 @@ use std::process::Stdio;
 use crate::common::gltf_file::{data_uri, floats};
 use crate::common::prelude::*;
 use crate::common::program::on_device;
+use photonmill::constants::RADIUS_CLASSES;
 use serde_json::{Value, json};
 
 const EFFECTS: &str = "direct indirect glossy layers transmission diffuse-transmission iridescence anisotropy media dispersion clear-coat sheen normal-maps alpha reflective-caustics \
@@ -317,6 +318,37 @@ fn tables_and_json_tell_one_plan_with_a_row_an_effect() {
     }
 }
 
+/// Photons and bytes of a trace's spans, and their rates, against the ledgers of the run.
+fn assert_trace_counts(trace: &Value, ledgers: &Value) {
+    let spans: Vec<&Value> = trace["traceEvents"].as_array().unwrap().iter().filter(|event| event["ph"] == "X").collect();
+    let sum = |path: &str, count: &str| -> u64 {
+        let of_path = spans.iter().filter(|span| span["args"]["path"] == path);
+        of_path.map(|span| span["args"][count].as_u64().unwrap_or(0)).sum()
+    };
+    for map in ["global", "caustic"] {
+        let ledger = |fate: &str| ledgers[map][fate].as_u64().unwrap();
+        for pass in ["", "/trace"] {
+            assert_eq!(sum(&format!("round/{map}{pass}"), "photons"), ledger("emitted"), "{map}{pass}");
+        }
+        // Each grid of a map has all of its photons.
+        let sorted = ["/index", "/index/count", "/index/sort", "/gather"].map(|pass| sum(&format!("round/{map}{pass}"), "stored_photons"));
+        let grids = sorted[0] / ledger("stored").max(1);
+        assert!(sorted == [grids * ledger("stored"); 4] && (1..=RADIUS_CLASSES.into()).contains(&grids), "{map}: {sorted:?}");
+        // Two photons of 32 bytes, and a place.
+        assert_eq!(sum(&format!("round/{map}/index/sort"), "bytes"), 68 * sorted[0]);
+    }
+    let passes = ["set-up", "round", "round/visible points", "round/global/gather", "round/flux to radiance", "round/resolve"];
+    assert!(passes.iter().all(|pass| sum(pass, "bytes") > 0), "{passes:?}: {:?}", passes.map(|pass| sum(pass, "bytes")));
+    for span in spans {
+        let (arguments, microseconds) = (&span["args"], span["dur"].as_f64().unwrap());
+        let rates = [("photons", "photons_per_second", 1e6), ("bytes", "gigabytes_per_second", 1e-3)];
+        for (count, rate, unit) in rates.into_iter().filter(|(count, ..)| !arguments[*count].is_null() && microseconds > 0.0) {
+            let expected = arguments[count].as_f64().unwrap() * unit / microseconds;
+            assert!((arguments[rate].as_f64().unwrap() / expected - 1.0).abs() < 1e-9, "{span}");
+        }
+    }
+}
+
 #[test]
 fn a_run_explains_itself_and_its_report_closes() {
     let Some(place) = place_with_device() else { return };
@@ -354,7 +386,7 @@ fn a_run_explains_itself_and_its_report_closes() {
     let shares = ["direct", "specular-chains", "refractive-caustics", "indirect"];
     let share = |name: &str| effects.iter().find(|row| row["effect"] == name).unwrap()["share"].as_f64().unwrap();
     assert!((shares.iter().map(|name| share(name)).sum::<f64>() - 1.0).abs() < 1e-9, "{effects:?}");
-    assert!(!place.json("t.json")["traceEvents"].as_array().unwrap().is_empty());
+    assert_trace_counts(&place.json("t.json"), &report["ledgers"]);
 
     // What is not asked for is not told; one round knows no error and still is JSON.
     let (stdout, _) = place.succeed("render cornell --size 4x4 --photons 10 --rounds 1 --bounces 9 --paranoid -o a.png --json b.json");

@@ -30,6 +30,7 @@ pub(super) fn of_merge(typed: &Typed, run: &SavedRun, film: &SceneFilm, units: S
         error,
         error_bound,
         confidence,
+        denoiser: None,
         units,
         command: typed.line(&[("-o", name_in_text(format).to_owned())]),
         settings: run.identity.settings.clone(),
@@ -55,6 +56,7 @@ pub(super) fn of_room(typed: &Typed, outcome: &RoomResult, error: &FilmError, fo
         error,
         error_bound,
         confidence,
+        denoiser: None,
         units: match format {
             Format::Png => "the paper's illumination, from 0 to 1 as codes from 0 to 255".to_owned(),
             Format::Exr => "the paper's illumination, not clamped to 1".to_owned(),
@@ -167,6 +169,7 @@ impl Made<'_> {
             error,
             error_bound,
             confidence,
+            denoiser: None,
             units,
             command,
             settings: settings_with_effect(settings),

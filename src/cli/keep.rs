@@ -11,7 +11,7 @@ use super::stop::StopArgs;
 use super::values::{parse_seconds, parse_share};
 use crate::engine::blocks::Share;
 use crate::engine::saved::SavedRun;
-use crate::engine::watch::{Keep, SaveRun};
+use crate::engine::watch::{Keep, Later, SaveRun};
 use crate::error::{Error, Result, require};
 use crate::output::destination::{Destination, check_not_read, write_synced};
 use crate::text::refusal;
@@ -39,20 +39,47 @@ pub(super) struct Keeper<'a> {
     every: Duration,
     resume: Option<(PathBuf, SavedRun)>,
     share: Share,
-    snapshot: Option<Snapshot<'a>>,
-    /// When each of the two was written last.
-    written: [Instant; 2],
+    snapshot: Option<Snapshot<Write<'a>>>,
+    display: Option<Snapshot<Show<'a>>>,
+    /// When the checkpoint was written last.
+    written: Instant,
     /// Whether there is a checkpoint of this run, and why the latest is not there.
     has_checkpoint: bool,
     failed: Option<Error>,
-    /// Whether the latest snapshot could not be written.
-    lacks_snapshot: bool,
 }
 
-/// A picture of a run that is under way, written again and again.
-pub(super) struct Snapshot<'a> {
-    pub(super) every: Duration,
-    pub(super) write: &'a mut dyn FnMut(&SavedRun) -> Result<()>,
+/// Writes the picture of a run that is under way.
+type Write<'a> = &'a mut dyn FnMut(&SavedRun) -> Result<()>;
+/// Shows it, beside the run that goes on.
+type Show<'a> = &'a mut dyn FnMut(Later<Arc<SavedRun>>) -> Result<()>;
+
+/// What happens again and again.
+struct Snapshot<W> {
+    every: Duration,
+    write: W,
+    written: Instant,
+    /// Whether the latest could not be written.
+    is_absent: bool,
+}
+
+impl<W> Snapshot<W> {
+    fn new(every: Duration, write: W) -> Snapshot<W> {
+        Snapshot { every, write, written: Instant::now(), is_absent: false }
+    }
+
+    fn is_due(&self) -> bool {
+        self.written.elapsed() >= self.every
+    }
+
+    /// What fails is told of, and does not end the run.
+    fn write(&mut self, write: impl FnOnce(&mut W) -> Result<()>) {
+        let result = write(&mut self.write);
+        if let (Err(error), false) = (&result, self.is_absent) {
+            complain(&format!("warning: {error}; the run goes on"));
+        }
+        self.is_absent = result.is_err();
+        self.written = Instant::now();
+    }
 }
 
 /// Between two checkpoints.
@@ -69,17 +96,16 @@ impl KeepArgs {
         }
         let resume = self.resume.as_ref().map(|path| Ok((path.clone(), read("--resume", path)?))).transpose()?;
         let every = Duration::from_secs_f64(every);
-        let written = [Instant::now(); 2];
         Ok(Keeper {
             checkpoint,
             every,
             resume,
             share: self.shard.unwrap_or_default(),
             snapshot: None,
-            written,
+            display: None,
+            written: Instant::now(),
             has_checkpoint: false,
             failed: None,
-            lacks_snapshot: false,
         })
     }
 }
@@ -93,8 +119,14 @@ pub(super) fn read(option: &'static str, path: &PathBuf) -> Result<SavedRun> {
 }
 
 impl<'a> Keeper<'a> {
-    pub(super) fn set_snapshot(&mut self, snapshot: Option<Snapshot<'a>>) {
-        self.snapshot = snapshot;
+    /// Calls `write` at this interval while the run goes on, but not at its end.
+    pub(super) fn set_snapshot(&mut self, every: Duration, write: Write<'a>) {
+        self.snapshot = Some(Snapshot::new(every, write));
+    }
+
+    /// The same for what need not wait for the picture.
+    pub(super) fn set_display(&mut self, every: Duration, show: Show<'a>) {
+        self.display = Some(Snapshot::new(every, show));
     }
 
     /// Refuses outputs in files that are read. A checkpoint may take the place of the one that the run goes on with.
@@ -120,8 +152,9 @@ impl<'a> Keeper<'a> {
 
     /// For a run on a scene of this name.
     pub(super) fn keep<'b>(&'b mut self, scene: &'b str) -> Keep<'b> {
-        let intervals = [self.checkpoint.as_ref().map(|_| self.every), self.snapshot.as_ref().map(|snapshot| snapshot.every)];
-        let every = intervals.into_iter().flatten().min();
+        let of_checkpoint = self.checkpoint.as_ref().map(|_| self.every);
+        let of_pictures = [self.snapshot.as_ref().map(|snapshot| snapshot.every), self.display.as_ref().map(|display| display.every)];
+        let every = of_pictures.into_iter().chain([of_checkpoint]).flatten().min();
         let (share, resume) = (self.share, self.resume.take());
         Keep { scene, share, resume, every: every.unwrap_or_default(), save: every.map(|_| self as &mut dyn SaveRun), dealt: None }
     }
@@ -138,22 +171,37 @@ impl<'a> Keeper<'a> {
 impl SaveRun for Keeper<'_> {
     /// Writes what is due. A checkpoint that cannot be written is told of, and does not end the run.
     fn save(&mut self, run: &Arc<SavedRun>, is_last: bool) -> Result<()> {
-        if let Some(file) = self.checkpoint.as_ref().filter(|_| is_last || self.written[0].elapsed() >= self.every) {
+        if let Some(file) = self.checkpoint.as_ref().filter(|_| is_last || self.written.elapsed() >= self.every) {
             let result = write_synced(file, &run.to_bytes());
             if let (Err(error), false, None) = (&result, is_last, &self.failed) {
                 complain(&format!("warning: {error}; the run goes on"));
             }
             self.has_checkpoint |= result.is_ok();
             self.failed = result.err();
-            self.written[0] = Instant::now();
+            self.written = Instant::now();
         }
-        if let Some(snapshot) = self.snapshot.as_mut().filter(|snapshot| !is_last && self.written[1].elapsed() >= snapshot.every) {
-            let result = (snapshot.write)(run);
-            if let (Err(error), false) = (&result, self.lacks_snapshot) {
-                complain(&format!("warning: {error}; the run goes on"));
-            }
-            self.lacks_snapshot = result.is_err();
-            self.written[1] = Instant::now();
+        if let Some(snapshot) = self.snapshot.as_mut().filter(|snapshot| !is_last && snapshot.is_due()) {
+            snapshot.write(|write| write(run));
+        }
+        if let Some(display) = self.display.as_mut().filter(|display| !is_last && display.is_due()) {
+            let run = run.clone();
+            display.write(|show| show(Box::new(|| run)));
+        }
+        Ok(())
+    }
+
+    /// What is only shown the run need not wait for.
+    fn may_wait(&self) -> bool {
+        let is_written = self.checkpoint.is_some() && self.written.elapsed() >= self.every;
+        !is_written && !self.snapshot.as_ref().is_some_and(Snapshot::is_due)
+    }
+
+    fn save_later(&mut self, run: Later<SavedRun>) -> Result<()> {
+        if !self.may_wait() {
+            return self.save(&Arc::new(run()), false);
+        }
+        if let Some(display) = self.display.as_mut().filter(|display| display.is_due()) {
+            display.write(|show| show(Box::new(|| Arc::new(run()))));
         }
         Ok(())
     }

@@ -81,6 +81,7 @@ pub(super) fn run(args: &MergeArgs, typed: &Typed) -> Result<()> {
             exposure: args.exposure,
             tone: args.tone.map_or(Tone::default(), Tone::from),
             layers: Layer::ALL.into(),
+            denoised: None,
         };
         files.extend(picture.zip(format).map(|(picture, format)| {
             let metadata = |stops| of_merge(typed, &run, film, units(format, stops, show.tone), format);

@@ -5,7 +5,9 @@ mod bench;
 mod camera;
 mod chosen;
 mod compare;
+mod denoise;
 mod devices;
+mod display;
 mod gallery;
 mod help;
 mod how_made;
@@ -66,7 +68,7 @@ struct Cli {
 enum Command {
     /// Render a picture of a scene
     #[command(after_help = help::RENDER)]
-    Render(render::RenderArgs),
+    Render(Box<render::RenderArgs>),
     /// Look at a scene, or at the paper's box, while its picture is refined, and fly through it
     #[command(after_help = help::VIEW)]
     View(view::ViewArgs),

@@ -1,28 +1,31 @@
 //! `photonmill render`: what a camera sees of a scene.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use clap::Args;
 
 use super::chosen::Chosen;
+use super::display::{DisplayArgs, EVERY};
 use super::how_made::{Made, blocks_with_gaps};
 use super::job::{Job, MessageArgs};
-use super::keep::Snapshot;
 use super::options::{DevicesOfRunArgs, ReportArgs};
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::scene::{FilterArg, PictureArgs, Subject, ToneArg, settings};
 use super::typed::Typed;
 use super::values::{parse_integer, parse_photon_name, parse_seconds, parse_stops};
-use super::{End, complain, optional_file, say, say_beside};
+use super::{End, complain, denoise, optional_file, say, say_beside};
 use crate::engine;
 use crate::engine::replay::PhotonName;
 use crate::engine::saved::{SavedFilm, SavedRun};
 use crate::engine::scene::map_file::MapFile;
 use crate::engine::scene::{RunResult, View, replay, scene_hash};
+use crate::engine::watch::Later;
 use crate::error::{Error, Result, require};
 use crate::gpu::Gpu;
+use crate::oidn::Denoiser;
 use crate::output::colour::{Format, Tone};
 use crate::output::destination::{Destination, check_distinct, write_all};
 use crate::output::metadata::{Metadata, devices};
@@ -44,6 +47,8 @@ pub(super) struct RenderArgs {
     #[arg(long, value_name = "TIME", value_parser = parse_seconds, allow_hyphen_values = true, requires = "output", help_heading = "Output")]
     snapshot: Option<f64>,
     #[command(flatten)]
+    display: DisplayArgs,
+    #[command(flatten)]
     report: ReportArgs,
     /// Write the standard error of each pixel as an .exr, W/m2/sr; infinite where unknown: before two blocks of rounds are
     /// whole, or where no light has reached the pixel though some may
@@ -59,6 +64,10 @@ pub(super) struct RenderArgs {
     /// depth [default: all]
     #[arg(long, value_name = "all|none|LAYER,...", value_parser = parse_layers, allow_hyphen_values = true, help_heading = "Output")]
     layers: Option<Layers>,
+    /// Take the noise from direct light in the picture with Open Image Denoise, which must be installed. Other light, layers and
+    /// errors stay as they were rendered
+    #[arg(long, requires = "output", help_heading = "Output")]
+    denoise: bool,
     #[command(flatten)]
     picture: PictureArgs,
     /// Camera paths per pixel and round, a power of two. Every path queries the caustic map; where all of them
@@ -78,7 +87,7 @@ pub(super) struct RenderArgs {
     /// Trace a single photon of this run, print its path, and exit; rounds and photons count from 0, and `:caustic` at the
     /// end takes a photon of the caustic map
     #[arg(long, value_name = "ROUND:PHOTON", value_parser = parse_photon_name, help_heading = "Checks",
-        conflicts_with_all = ["output", "error_image", "exposure", "tone", "layers", "judge", "explain", "json", "trace", "save_settings", "time_dispatches", "map", "devices"])]
+        conflicts_with_all = ["output", "display", "error_image", "exposure", "tone", "layers", "denoise", "judge", "explain", "json", "trace", "save_settings", "time_dispatches", "map", "devices"])]
     replay: Option<PhotonName>,
     #[command(flatten)]
     messages: MessageArgs,
@@ -138,7 +147,7 @@ impl RenderArgs {
 
     fn show(&self, subject: &Subject) -> Show {
         let size = (subject.width, subject.height);
-        Show { size, exposure: self.exposure, tone: self.tone.map_or(Tone::default(), Tone::from), layers: self.layers() }
+        Show { size, exposure: self.exposure, tone: self.tone.map_or(Tone::default(), Tone::from), layers: self.layers(), denoised: None }
     }
 
     fn layers(&self) -> Vec<Layer> {
@@ -148,6 +157,12 @@ impl RenderArgs {
     /// Whether the picture has layers of the parts of its light.
     fn shows_parts(&self, format: Option<Format>) -> bool {
         format == Some(Format::Exr) && self.layers().into_iter().any(Layer::is_part)
+    }
+
+    /// What a viewer shows.
+    fn live(&self, subject: &Subject) -> Show {
+        let layers = Layer::ALL.into_iter().filter(|layer| !layer.is_of_surface()).collect();
+        Show { layers, ..self.show(subject) }
     }
 }
 
@@ -196,7 +211,9 @@ pub(super) fn run(args: &RenderArgs, typed: &Typed, cancelled: &AtomicBool) -> R
     let stop = &args.picture.transport.stop;
     let mut keeper = args.picture.transport.keep.open(stop)?;
     // A run that goes on with one that has no parts has none.
-    settings.keeps_parts = args.shows_parts(format) && keeper.resumed().is_none_or(SavedRun::has_parts);
+    let denoiser = args.denoise.then(|| denoise::open(&settings, keeper.resumed())).transpose()?;
+    let wants_parts = args.shows_parts(format) || args.display.is_given() || args.denoise;
+    settings.keeps_parts = wants_parts && keeper.resumed().is_none_or(SavedRun::has_parts);
     let save_settings = optional_file("--save-settings", args.save_settings.as_ref())?;
     let files = [&picture, &errors, &save_settings].into_iter().flatten().cloned().collect();
     let all: Vec<Destination> = [files, reports.destinations(), keeper.destinations()].concat();
@@ -206,6 +223,9 @@ pub(super) fn run(args: &RenderArgs, typed: &Typed, cancelled: &AtomicBool) -> R
     let reporter = ProgressReporter::new(&args.messages.progress);
     let subject = args.picture.open(&settings, &reporter)?;
     let Subject { scene, camera, geometry, .. } = &subject;
+    let live = args.live(&subject);
+    let name = output.map_or_else(String::new, |output| output.display().to_string());
+    let mut viewer = args.display.connect(name, live.size)?;
     let mut gpus = args.device.open(&reporter)?;
     if has_no_end {
         settings.stop.seconds = Some(longest_seconds(gpus[0].facts().kind));
@@ -218,7 +238,18 @@ pub(super) fn run(args: &RenderArgs, typed: &Typed, cancelled: &AtomicBool) -> R
     };
     if let Some(seconds) = args.snapshot.or(has_no_end.then_some(SNAPSHOT_SECONDS)) {
         require((0.001..=1e6).contains(&seconds), "--snapshot", seconds, "must be from 1ms to 1000000s")?;
-        keeper.set_snapshot(Some(Snapshot { every: Duration::from_secs_f64(seconds), write: &mut snapshot }));
+        keeper.set_snapshot(Duration::from_secs_f64(seconds), &mut snapshot);
+    }
+    let mut send = |run: Later<Arc<SavedRun>>| {
+        let Some(viewer) = &mut viewer else { return Ok(()) };
+        let live = live.clone();
+        viewer.show(Box::new(move || match &run().film {
+            SavedFilm::Scene(film) => live.channels(film, &[]),
+            SavedFilm::Room(_) => unreachable!("a scene is lit"),
+        }))
+    };
+    if args.display.is_given() {
+        keeper.set_display(EVERY, &mut send);
     }
     if picture.is_none() && args.picture.transport.keep.shard.is_none() {
         let view = View { geometry, camera: Some(camera), phases: &[] };
@@ -228,6 +259,12 @@ pub(super) fn run(args: &RenderArgs, typed: &Typed, cancelled: &AtomicBool) -> R
     }
     let blocks_with_gaps = blocks_with_gaps(keeper.resumed());
     let lit = job.run(&mut gpus, stop, &mut keeper, &reporter, cancelled)?;
+    let kept = keeper.finish();
+    if let Some(viewer) = viewer
+        && let Err(error) = viewer.finish(live.channels(&lit.film, &[]))
+    {
+        complain(&format!("warning: {error}"));
+    }
 
     let text = scene_report::text(&scene.name, &lit, job.point, args.messages.explain);
     let mut files = Vec::new();
@@ -245,9 +282,9 @@ pub(super) fn run(args: &RenderArgs, typed: &Typed, cancelled: &AtomicBool) -> R
             let layers = "has no layers of the parts of its light, which this run does not keep apart";
             complain(&format!("warning: -o {}: {layers}: {}", output.display(), no_parts(&lit, &settings)));
         }
-        let (bytes, exposure) = file(&made, &show, format, scene, camera);
+        let (bytes, how) = file(&made, &show, format, (scene, camera), denoiser.as_ref());
         files.push((picture.clone(), bytes));
-        shown = format!("\nwrote {}{exposure}", output.display());
+        shown = format!("\nwrote {}{how}", output.display());
     }
     files.extend(errors.map(|errors| (errors, show.errors(&lit.film))));
     files.extend(reports.files(&lit, || scene_report::json(&scene.name, &lit)));
@@ -257,7 +294,6 @@ pub(super) fn run(args: &RenderArgs, typed: &Typed, cancelled: &AtomicBool) -> R
         return say_beside(&all, &text).and(Err(error));
     }
     say_beside(&all, &format!("{text}{shown}"))?;
-    let kept = keeper.finish();
     if let Some(samples) = args.judge {
         // The picture is there, so Ctrl-C may end the program here.
         let reporter = ProgressReporter::new(&args.messages.progress);
@@ -279,17 +315,24 @@ fn no_parts(lit: &RunResult, asked: &SceneSettings) -> &'static str {
     }
 }
 
-/// The picture's file, and its exposure in words.
-fn file(made: &Made, show: &Show, format: Format, scene: &Scene, camera: &Camera) -> (Vec<u8>, String) {
-    let metadata = |stops: f32| made.metadata(units(format, stops, show.tone), format);
+/// The picture's file, and in words its exposure and who has changed it.
+fn file(made: &Made, show: &Show, format: Format, (scene, camera): (&Scene, &Camera), denoiser: Option<&Denoiser>) -> (Vec<u8>, String) {
     let film = &made.lit.film;
+    let scene = scene.without(&made.lit.plan.settings.without);
+    let has_layers = format == Format::Exr && show.shows_surfaces();
+    let surfaces = if has_layers || denoiser.is_some() { surfaces(&scene, camera, show.size) } else { Vec::new() };
+    let denoised = denoiser.and_then(|denoiser| Some((denoise::denoised(denoiser, film, &surfaces, show.size)?, denoise::name(denoiser))));
+    let (denoised, denoiser) = denoised.unzip();
+    let by = denoiser.as_ref().map_or_else(String::new, |denoiser| {
+        format!("\ndirect light is denoised by {denoiser}; all errors are those of the picture before that, and layers are as rendered")
+    });
+    let show = Show { denoised, ..show.clone() };
+    let metadata = |stops: f32| Metadata { denoiser: denoiser.clone(), ..made.metadata(units(format, stops, show.tone), format) };
     if format == Format::Png {
         let (content, stops) = show.png(film, metadata);
-        return (content, format!(" at {stops:+.2} stops"));
+        return (content, format!(" at {stops:+.2} stops{by}"));
     }
-    let scene = scene.without(&made.lit.plan.settings.without);
-    let surfaces = if show.shows_surfaces() { surfaces(&scene, camera, show.size) } else { Vec::new() };
-    (show.exr(film, &surfaces, Some(&metadata(0.0))), String::new())
+    (show.exr(film, &surfaces, Some(&metadata(0.0))), by)
 }
 
 /// A picture that is made again.
@@ -320,7 +363,13 @@ pub(super) fn again(args: &RenderArgs, again: &Again, cancelled: &AtomicBool) ->
     let map = args.picture.transport.map()?;
     let mut settings = args.settings(map.as_ref(), Some(chosen));
     settings.validate()?;
-    settings.keeps_parts = args.shows_parts(Some(format));
+    settings.keeps_parts = args.shows_parts(Some(format)) || args.denoise;
+    let denoiser = args.denoise.then(|| denoise::open(&settings, None)).transpose()?;
+    if let (Some(before), Some(now)) = (&made.denoiser, denoiser.as_ref().map(denoise::name))
+        && *before != now
+    {
+        complain(&format!("warning: was denoised by {before}, and now by {now}, which may leave other bits"));
+    }
     let reporter = ProgressReporter::new(&args.messages.progress);
     let subject = args.picture.open(&settings, &reporter)?;
     let hash = scene_hash(&subject.geometry);
@@ -343,7 +392,7 @@ pub(super) fn again(args: &RenderArgs, again: &Again, cancelled: &AtomicBool) ->
     let show = args.show(&subject);
     let scene = &subject.scene.name;
     let made = Made { typed, lit: &lit, scene, scene_hash: hash, is_shard: false, blocks_with_gaps: 0 };
-    let (content, _) = file(&made, &show, format, &subject.scene, &subject.camera);
+    let (content, _) = file(&made, &show, format, (&subject.scene, &subject.camera), denoiser.as_ref());
     Ok(Repeated { content, devices: made.devices() })
 }
 

@@ -42,7 +42,7 @@ use crate::scene::room::RoomScene;
 use crate::settings::stop::Stop;
 use crate::settings::{Builder, EmissionLaw, Gather, Math, PhongDirection, Preset, RoomSettings, Sums};
 use crate::text::counted;
-use crate::timings::{Clock, Span};
+use crate::timings::Span;
 
 #[derive(Args)]
 pub(super) struct RunArgs {
@@ -411,7 +411,7 @@ impl Outputs {
         }
         let run = outcome.timings.spans().iter().map(|span| span.start + span.duration).max().unwrap_or_default();
         outcome.timings.count("output");
-        outcome.timings.add(Span { name: "output".into(), clock: Clock::Wall, start: run, duration: began.elapsed() });
+        outcome.timings.add(Span::of_host("output", run, began.elapsed()));
 
         files.extend(self.reports.files(&outcome, || room_report::json(&outcome, &walls, &error)));
         let destinations: Vec<Destination> = files.iter().map(|(destination, _)| destination.clone()).collect();

@@ -10,7 +10,7 @@ use crate::text::quoted;
 /// rounds that it had say enough.
 const WITHOUT_EFFECT: [&str; 6] = ["Output", "Messages", "Checks", "Device", "When to stop", "Implementation"];
 /// Options under them that do change the file.
-const WITH_EFFECT: [&str; 8] = ["exposure", "tone", "layers", "measure", "confidence", "math", "sums", "gather"];
+const WITH_EFFECT: [&str; 9] = ["exposure", "tone", "layers", "denoise", "measure", "confidence", "math", "sums", "gather"];
 /// The option under another heading in whose place the metadata has what came of it.
 const ROUNDS: &str = "rounds";
 /// The same of scenes.

@@ -9,7 +9,7 @@ use super::identity::Identity;
 use super::run::RunResult;
 use super::saved::SavedRun;
 use super::several_devices::{NOTED_EVERY, Outcome, Together, Work};
-use super::watch::{Control, Keep, SaveRun};
+use super::watch::{Control, Keep, Later, SaveRun};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::settings::stop::Stop;
@@ -66,6 +66,8 @@ struct Notes<'a> {
     outer: Option<&'a mut dyn SaveRun>,
     wants_identity: bool,
     latest: Option<Arc<SavedRun>>,
+    /// When that was.
+    noted: Instant,
 }
 
 impl SaveRun for Notes<'_> {
@@ -79,7 +81,19 @@ impl SaveRun for Notes<'_> {
 
     fn save(&mut self, run: &Arc<SavedRun>, is_last: bool) -> Result<()> {
         self.latest = (!is_last).then(|| run.clone());
+        self.noted = Instant::now();
         self.outer.iter_mut().try_for_each(|outer| outer.save(run, is_last))
+    }
+
+    fn may_wait(&self) -> bool {
+        self.noted.elapsed() < NOTED_EVERY && self.outer.as_ref().is_some_and(|outer| outer.may_wait())
+    }
+
+    fn save_later(&mut self, run: Later<SavedRun>) -> Result<()> {
+        match &mut self.outer {
+            Some(outer) if self.noted.elapsed() < NOTED_EVERY && outer.may_wait() => outer.save_later(run),
+            _ => self.save(&Arc::new(run()), false),
+        }
     }
 }
 
@@ -145,7 +159,8 @@ fn alone<Plan, Film>(
     let Keep { scene, share, every, save, .. } = &mut control.keep;
     let every = if save.is_some() { (*every).min(NOTED_EVERY) } else { NOTED_EVERY };
     let is_used = notes_itself || save.is_some();
-    let mut notes = Notes { outer: save.as_mut().map(|save| &mut **save as &mut dyn SaveRun), wants_identity, latest: None };
+    let mut notes =
+        Notes { outer: save.as_mut().map(|save| &mut **save as &mut dyn SaveRun), wants_identity, latest: None, noted: Instant::now() };
     let save = is_used.then_some(&mut notes as &mut dyn SaveRun);
     let keep = Keep { scene, share: *share, resume, every, save, dealt: None };
     let stop = Stop { seconds: work.stop.seconds.map(|seconds| (seconds - spent.as_secs_f64()).max(0.0)), ..work.stop };

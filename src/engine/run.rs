@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use super::bias::Bias;
 use super::blocks::{Blocks, Dealer, Share};
@@ -11,7 +11,7 @@ use super::error_bound::FilmError;
 use super::identity::Identity;
 use super::nonfinite_values::NonfiniteValues;
 use super::saved::{SavedFilm, SavedRun};
-use super::watch::{Control, End, Later, Progress, Watch};
+use super::watch::{Control, End, Later, Progress, SaveRun, Watch};
 use crate::constants::KEPT_BLOCKS;
 use crate::error::{Error, Result};
 use crate::gpu::check::strict_math;
@@ -158,6 +158,8 @@ pub struct RunState<'a> {
     hands_over: bool,
     /// When the run was saved last.
     saved: Instant,
+    /// How long that took.
+    saving: Duration,
     /// Submissions at the latest look.
     submissions: u64,
     end: Option<End>,
@@ -301,6 +303,9 @@ pub fn commands<'gpu>(
     Ok((commands, pipelines_before))
 }
 
+/// What nobody needs at once is made so many times as long after the one before as that took: of the run's time it takes 2 %.
+const WAITS: u32 = 50;
+
 impl<'a> RunState<'a> {
     /// Goes on with what was saved, if anything was.
     fn new(task: Task<'a>, recorder: &impl Recorder, control: &mut Control) -> Result<RunState<'a>> {
@@ -321,6 +326,7 @@ impl<'a> RunState<'a> {
             dealt: control.keep.dealt.take(),
             hands_over: false,
             saved: Instant::now(),
+            saving: Duration::ZERO,
             submissions: recorder.counts()[1],
             end: None,
             task,
@@ -472,12 +478,15 @@ impl<'a> RunState<'a> {
 
     /// Runs what is recorded where that is due, looks at it, and says whether the run ends.
     fn pause<W: World>(&mut self, world: &mut W, recorder: &mut W::Recorder, control: &mut Control) -> Result<bool> {
-        let is_due = self.hands_over || self.saved.elapsed() >= control.keep.every;
-        let saves = control.keep.save.is_some() && self.is_between_blocks() && is_due;
+        let waited = self.saved.elapsed();
+        let least = |save: &&mut dyn SaveRun| if save.may_wait() { self.saving * WAITS } else { Duration::ZERO };
+        let is_due = self.hands_over || waited >= control.keep.every;
+        let saves = self.is_between_blocks() && is_due && control.keep.save.as_ref().is_some_and(|save| waited >= least(save));
         if !saves && !self.is_due(world, recorder) {
             return Ok(self.end.is_some());
         }
         self.collect(world, recorder, false)?;
+        let began = Instant::now();
         let whole = self.is_between_blocks();
         let looks = whole && self.dealt.is_none() && self.watch.is_due(self.blocks());
         if looks || saves {
@@ -492,6 +501,7 @@ impl<'a> RunState<'a> {
                 let saved_run = self.to_be_saved();
                 save.save_later(Box::new(move || saved_run(film().into())))?;
                 self.saved = Instant::now();
+                self.saving = self.saved - began;
                 self.hands_over = false;
             }
         }

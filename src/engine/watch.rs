@@ -41,6 +41,11 @@ pub trait SaveRun {
     /// `is_last`: the run has ended. An error ends it.
     fn save(&mut self, run: &Arc<SavedRun>, is_last: bool) -> Result<()>;
 
+    /// Whether nobody needs the run at once, so that it may be made when there is time for it.
+    fn may_wait(&self) -> bool {
+        false
+    }
+
     /// The same while the run is under way, which may go on before it is saved.
     fn save_later(&mut self, run: Later<SavedRun>) -> Result<()> {
         self.save(&Arc::new(run()), false)

@@ -15,7 +15,7 @@ use super::timestamps::{TimedScope, Timestamps};
 use super::{AnyBuffer, Buffer, Constants, Context, DeviceFacts, Gpu, Kernel, Memory, call};
 use crate::error::{Error, Result};
 use crate::records::DispatchArgs;
-use crate::timings::{Clock, Span, Timings};
+use crate::timings::{Clock, Handled, Span, Timings};
 
 /// How many invocations or groups a dispatch has.
 #[derive(Clone, Copy)]
@@ -38,6 +38,7 @@ struct Hazards {
 struct OpenScope {
     name: String,
     begin: u32,
+    handled: Handled,
 }
 
 /// Commands being recorded, and the timings of those that ran.
@@ -157,9 +158,8 @@ impl<'gpu> Commands<'gpu> {
             None => name.to_owned(),
         };
         self.timings.count(&path);
-        let begin = self.timestamps.write(self.command_buffer);
         let outer = self.open_scopes.len();
-        self.open_scopes.push(OpenScope { name: path, begin });
+        self.open_scope(path);
         let result = body(self);
         // None is open any more where a submission failed.
         if self.open_scopes.len() > outer {
@@ -168,10 +168,17 @@ impl<'gpu> Commands<'gpu> {
         result
     }
 
+    fn open_scope(&mut self, name: String) {
+        self.context.begin_label(self.command_buffer, name.rsplit('/').next().unwrap_or_default());
+        let begin = self.timestamps.write(self.command_buffer);
+        self.open_scopes.push(OpenScope { name, begin, handled: Handled::default() });
+    }
+
     fn close_scope(&mut self) {
-        let OpenScope { name, begin } = self.open_scopes.pop().expect("a scope is open");
+        let OpenScope { name, begin, handled } = self.open_scopes.pop().expect("a scope is open");
         let end = self.timestamps.write(self.command_buffer);
-        self.timed_scopes.push(TimedScope { name, begin, end });
+        self.context.end_label(self.command_buffer);
+        self.timed_scopes.push(TimedScope { name, begin, end, handled });
     }
 
     /// Timestamps left in this submission; a scope takes two.
@@ -184,7 +191,10 @@ impl<'gpu> Commands<'gpu> {
         if self.gpu.options.time_dispatches {
             return self.scope(K::MODULE.name, |commands| commands.record_dispatch(kernel, push, extent));
         }
-        self.record_dispatch(kernel, push, extent)
+        self.context.begin_label(self.command_buffer, K::MODULE.name);
+        let recorded = self.record_dispatch(kernel, push, extent);
+        self.context.end_label(self.command_buffer);
+        recorded
     }
 
     fn record_dispatch<K: Kernel>(&mut self, kernel: K, push: &K::Push, extent: Extent) -> Result<()> {
@@ -256,6 +266,7 @@ impl<'gpu> Commands<'gpu> {
         let (device, raw) = (&self.context.device, buffer.any().raw());
         // SAFETY: the buffer outlives the submission; the range is inside it.
         unsafe { device.cmd_fill_buffer(self.command_buffer, raw, element * first, element * count, word) };
+        self.count_bytes(element * count);
     }
 
     /// Sets all of a buffer to zero.
@@ -283,9 +294,11 @@ impl<'gpu> Commands<'gpu> {
         }
         let (from, to) = (from.any(), to.any());
         self.order(&[(from, true, false), (to, false, true)]);
-        let region = [vk::BufferCopy::default().size(count * size_of::<T>() as u64)];
+        let bytes = count * size_of::<T>() as u64;
+        let region = [vk::BufferCopy::default().size(bytes)];
         // SAFETY: both buffers outlive the submission and hold so many elements.
         unsafe { self.context.device.cmd_copy_buffer(self.command_buffer, from.raw(), to.raw(), &region) };
+        self.count_bytes(2 * bytes);
     }
 
     /// Runs everything recorded so far and returns the first `count` elements of a buffer.
@@ -303,6 +316,21 @@ impl<'gpu> Commands<'gpu> {
         let read_back = self.gpu.buffer::<T>("read back", count as u64, Memory::ReadBack)?;
         self.copy(buffer, &read_back, count as u64);
         Ok(ReadBack(Some(read_back)))
+    }
+
+    /// Notes what is handled by what was just recorded: photons and bytes by all scopes that are open, stored photons by the innermost.
+    pub fn count(&mut self, handled: Handled) {
+        for scope in &mut self.open_scopes {
+            scope.handled.photons += handled.photons;
+            scope.handled.bytes += handled.bytes;
+        }
+        if let Some(innermost) = self.open_scopes.last_mut() {
+            innermost.handled.stored += handled.stored;
+        }
+    }
+
+    fn count_bytes(&mut self, bytes: u64) {
+        self.count(Handled { bytes, ..Handled::default() });
     }
 
     fn innermost_scope(&self) -> &str {
@@ -395,10 +423,7 @@ impl<'gpu> Commands<'gpu> {
         self.hazards = Hazards::default();
         self.work = 0;
         self.begin()?;
-        for name in open {
-            let begin = self.timestamps.write(self.command_buffer);
-            self.open_scopes.push(OpenScope { name, begin });
-        }
+        open.into_iter().for_each(|name| self.open_scope(name));
         if self.interrupt.is_some_and(|interrupt| interrupt.is_up()) { Err(Error::Interrupted) } else { Ok(()) }
     }
 
@@ -410,7 +435,8 @@ impl<'gpu> Commands<'gpu> {
         let mut took: HashMap<&str, Duration> = HashMap::new();
         if let Some(times) = self.timestamps.read(&timed)? {
             for (scope, (begin, duration)) in timed.iter().zip(times) {
-                self.timings.add(Span { name: scope.name.as_str().into(), clock: Clock::Gpu, start: start + begin, duration });
+                let span = Span::of_host(&scope.name, start + begin, duration);
+                self.timings.add(Span { clock: Clock::Gpu, handled: scope.handled, ..span });
                 *took.entry(&scope.name).or_default() += duration;
             }
         } else {
@@ -420,7 +446,7 @@ impl<'gpu> Commands<'gpu> {
         self.pace.learn(&took);
         let outermost = timed.last().map(|scope| scope.name.split('/').next().unwrap_or_default().to_owned());
         if let Some(name) = outermost {
-            self.timings.add(Span { name: name.into(), clock: Clock::Wall, start, duration: wall });
+            self.timings.add(Span::of_host(&name, start, wall));
         }
         Ok(())
     }
@@ -432,7 +458,7 @@ impl<'gpu> Commands<'gpu> {
     /// Ends the recording; `whole` names the row that spans all of it on the host's clock.
     pub fn finish(mut self, whole: &str) -> Timings {
         let mut timings = std::mem::take(&mut self.timings);
-        timings.add(Span { name: whole.into(), clock: Clock::Wall, start: Duration::ZERO, duration: self.started.elapsed() });
+        timings.add(Span::of_host(whole, Duration::ZERO, self.started.elapsed()));
         timings
     }
 

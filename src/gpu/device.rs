@@ -71,8 +71,18 @@ impl DeviceFacts {
     }
 }
 
+/// An instance, and what it was made with.
+pub(super) struct Loaded {
+    pub(super) entry: ash::Entry,
+    pub(super) instance: ash::Instance,
+    /// Of the validation layer.
+    pub(super) messages: Option<Messages>,
+    /// Whether it takes names and labels (VK_EXT_debug_utils).
+    pub(super) has_labels: bool,
+}
+
 /// Loads the Vulkan loader at run time and makes an instance.
-pub(super) fn instance(validate: bool, window: Option<&Arc<Window>>) -> Result<(ash::Entry, ash::Instance, Option<Messages>)> {
+pub(super) fn instance(validate: bool, window: Option<&Arc<Window>>) -> Result<Loaded> {
     let no_vulkan = |reason: String| Error::NoVulkan { reason };
     // SAFETY: the loader is the system's own library; its initialisers are trusted.
     let entry = unsafe { ash::Entry::load() }.map_err(|_| no_vulkan("the Vulkan loader (libvulkan) is not installed".into()))?;
@@ -87,8 +97,15 @@ pub(super) fn instance(validate: bool, window: Option<&Arc<Window>>) -> Result<(
             return Err(Error::NoValidationLayer);
         }
         layers.push(VALIDATION_LAYER.as_ptr());
-        extensions.push(ash::ext::debug_utils::NAME.as_ptr());
         extensions.push(ash::ext::validation_features::NAME.as_ptr());
+    }
+    // SAFETY: plain enumeration.
+    let present = unsafe { entry.enumerate_instance_extension_properties(None) }.unwrap_or_default();
+    let has = |name: &CStr| present.iter().any(|extension| extension.extension_name_as_c_str() == Ok(name));
+    // The validation layer brings it where nothing else does.
+    let has_labels = validate || has(ash::ext::debug_utils::NAME);
+    if has_labels {
+        extensions.push(ash::ext::debug_utils::NAME.as_ptr());
     }
     let synchronisation = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
     let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&synchronisation);
@@ -105,7 +122,7 @@ pub(super) fn instance(validate: bool, window: Option<&Arc<Window>>) -> Result<(
         _ => no_vulkan(format!("vkCreateInstance says {code}")),
     })?;
     let messages = if validate { Some(Messages::listen(&entry, &instance)?) } else { None };
-    Ok((entry, instance, messages))
+    Ok(Loaded { entry, instance, messages, has_labels })
 }
 
 type Found = (vk::PhysicalDevice, DeviceFacts);

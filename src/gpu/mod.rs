@@ -8,6 +8,7 @@ pub mod commands;
 pub mod device;
 mod faults;
 pub mod kernel;
+mod labels;
 mod mapped_file;
 mod pace;
 mod reconvergence;
@@ -32,6 +33,8 @@ pub use mapped_file::MappedFile;
 
 use crate::error::{Error, Result};
 use clock::Idleness;
+use device::Loaded;
+use labels::Labels;
 use validation::Messages;
 use window::Surface;
 
@@ -86,8 +89,7 @@ pub(crate) struct Context {
     allocator: Mutex<Option<Allocator>>,
     held: Mutex<HeldMemory>,
     device: ash::Device,
-    /// Names for tools and messages; only with the validation layer.
-    debug: Option<ash::ext::debug_utils::Device>,
+    labels: Option<Labels>,
     messages: Option<Messages>,
     /// Of the window, if there is one.
     surface: Option<Surface>,
@@ -140,13 +142,13 @@ impl Gpu {
     /// Opens a device and runs the start-up check on it.
     pub fn open(options: &Options) -> Result<Gpu> {
         faults::check()?;
-        let (entry, instance, messages) =
-            device::instance(options.validate, options.window.as_ref()).map_err(|error| match (error, &options.device) {
-                (Error::NoVulkan { reason }, Some(wanted)) => {
-                    Error::DeviceAbsent { wanted: wanted.clone(), present: format!("none ({reason})") }
-                }
-                (error, _) => error,
-            })?;
+        let loaded = device::instance(options.validate, options.window.as_ref()).map_err(|error| match (error, &options.device) {
+            (Error::NoVulkan { reason }, Some(wanted)) => {
+                Error::DeviceAbsent { wanted: wanted.clone(), present: format!("none ({reason})") }
+            }
+            (error, _) => error,
+        })?;
+        let Loaded { entry, instance, messages, has_labels } = loaded;
         let surface = options.window.as_ref().map(|window| Surface::new(&entry, &instance, window)).transpose();
         let opened = surface.and_then(|surface| {
             let opened = device::choose(&instance, options.device.as_deref()).and_then(|(physical, mut facts)| {
@@ -182,7 +184,7 @@ impl Gpu {
         if let Some(memory) = options.memory {
             facts.usable_memory_bytes = memory;
         }
-        let debug = messages.is_some().then(|| ash::ext::debug_utils::Device::new(&instance, &device));
+        let labels = has_labels.then(|| Labels::new(&instance, &device));
         let allocator = Allocator::new(&AllocatorCreateDesc {
             instance: instance.clone(),
             device: device.clone(),
@@ -196,7 +198,7 @@ impl Gpu {
             allocator: Mutex::new(Some(allocator)),
             held: Mutex::default(),
             device,
-            debug,
+            labels,
             messages,
             surface,
             physical_device,
@@ -223,7 +225,7 @@ impl Gpu {
 
     /// Devices that the loader lists, in its order.
     pub fn list() -> Result<Vec<DeviceFacts>> {
-        let (_entry, instance, _) = device::instance(false, None)?;
+        let Loaded { entry: _entry, instance, .. } = device::instance(false, None)?;
         let facts = device::all(&instance).map(|devices| devices.into_iter().map(|(_, facts)| facts).collect());
         // SAFETY: nothing else was made from this instance.
         unsafe { instance.destroy_instance(None) };
@@ -268,18 +270,6 @@ impl Gpu {
         match messages.first() {
             None => Ok(()),
             Some(first) => Err(Error::Validation { count: messages.len(), first: first.clone() }),
-        }
-    }
-}
-
-impl Context {
-    /// Gives an object a name in validation messages and debuggers.
-    fn set_name<T: vk::Handle>(&self, object: T, name: &str) {
-        if let Some(debug) = &self.debug {
-            let name = std::ffi::CString::new(name).expect("names hold no zero byte");
-            let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(object).object_name(&name);
-            // SAFETY: the object belongs to this device. Failing to name it changes nothing.
-            let _ = unsafe { debug.set_debug_utils_object_name(&info) };
         }
     }
 }

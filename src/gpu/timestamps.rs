@@ -7,6 +7,7 @@ use ash::vk;
 
 use super::{Context, Gpu, call};
 use crate::error::Result;
+use crate::timings::Handled;
 
 /// Queries of one submission; a scope takes two.
 pub(super) const QUERY_COUNT: u32 = 4096;
@@ -19,6 +20,7 @@ pub(super) struct TimedScope {
     pub(super) name: String,
     pub(super) begin: u32,
     pub(super) end: u32,
+    pub(super) handled: Handled,
 }
 
 pub(super) struct Timestamps {

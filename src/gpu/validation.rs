@@ -1,6 +1,7 @@
 //! The Khronos validation layer: its messages are collected, and any message is an error at the end of the run.
 
-use std::ffi::{CStr, c_void};
+use std::ffi::{CStr, c_char, c_void};
+use std::fmt::Write;
 use std::sync::Mutex;
 
 use ash::vk;
@@ -51,13 +52,25 @@ unsafe extern "system" fn keep(
     message: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
     list: *mut c_void,
 ) -> vk::Bool32 {
-    // SAFETY: the layer passes a valid message and the pointer that `listen` gave it.
-    unsafe {
-        let list = &*list.cast::<Mutex<Vec<String>>>();
-        let text = CStr::from_ptr((*message).p_message).to_string_lossy().into_owned();
-        if let Ok(mut list) = list.lock() {
-            list.push(text);
-        }
+    // SAFETY: the layer passes a valid message with labels that have names, and the pointer that `listen` gave it.
+    let (list, mut text, labels) = unsafe {
+        let message = &*message;
+        let text = |text: *const c_char| CStr::from_ptr(text).to_string_lossy().into_owned();
+        let labels = match message.cmd_buf_label_count {
+            0 => &[],
+            count => std::slice::from_raw_parts(message.p_cmd_buf_labels, count as usize),
+        };
+        let labels: Vec<String> = labels.iter().map(|label| text(label.p_label_name)).collect();
+        (&*list.cast::<Mutex<Vec<String>>>(), text(message.p_message), labels)
+    };
+    if !labels.is_empty() {
+        // The innermost comes first; some versions of the layer list each twice.
+        let mut pass: Vec<String> = labels.into_iter().rev().collect();
+        pass.dedup();
+        write!(text, " (in the pass {})", pass.join("/")).expect("text can be written");
+    }
+    if let Ok(mut list) = list.lock() {
+        list.push(text);
     }
     vk::FALSE
 }

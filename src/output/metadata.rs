@@ -37,6 +37,9 @@ pub struct Metadata {
     pub error: Option<f64>,
     pub error_bound: Option<f64>,
     pub confidence: f64,
+    /// What has changed direct light since, of which the errors know nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub denoiser: Option<String>,
     /// Of the values.
     pub units: String,
     /// The command line that makes the same picture.
@@ -104,6 +107,9 @@ impl Metadata {
         writeln!(text, "Seed: {}\nRounds: {}", self.seed, self.rounds).unwrap();
         let (error, bound) = (percent(self.error), percent(self.error_bound));
         writeln!(text, "Relative error: {error}, at most {bound} ({} % confidence)", 100.0 * self.confidence).unwrap();
+        if let Some(denoiser) = &self.denoiser {
+            writeln!(text, "Denoised: direct light, by {denoiser}; the errors are those before it").unwrap();
+        }
         write!(text, "Values: {}", self.units).unwrap();
         text
     }

@@ -16,5 +16,6 @@ pub mod room_report;
 pub mod scene_report;
 pub mod show;
 pub mod svg;
+pub mod tev;
 pub mod trace_file;
 pub mod words;

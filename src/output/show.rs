@@ -84,6 +84,7 @@ pub fn units(format: Format, stops: f32, tone: Tone) -> String {
 }
 
 /// How a film is shown.
+#[derive(Clone)]
 pub struct Show {
     pub size: (u32, u32),
     /// In stops; `None`: what makes the mean middle grey.
@@ -91,6 +92,8 @@ pub struct Show {
     pub tone: Tone,
     /// Of an EXR.
     pub layers: Vec<Layer>,
+    /// Radiance in place of the film's; layers are the film's in any case.
+    pub denoised: Option<Vec<Vec3>>,
 }
 
 impl Show {
@@ -112,12 +115,15 @@ impl Show {
         (image.encode(Format::Png, stops, self.tone, Some(&metadata(stops))), stops)
     }
 
-    /// An EXR: the light, and the layers that are asked for: parts where the film has them, and what is seen first where `surfaces` are
-    /// given.
+    /// An EXR.
     pub fn exr(&self, film: &SceneFilm, surfaces: &[Surface], metadata: Option<&Metadata>) -> Vec<u8> {
-        let light = channels("", RGB, (0..film.pixels()).map(|pixel| film.mean(pixel).as_vec3()));
-        let layers = self.layers.iter().flat_map(|layer| self.layer(*layer, film, surfaces));
-        exr_file::encode(self.size, light.into_iter().chain(layers).collect(), metadata)
+        exr_file::encode(self.size, self.channels(film, surfaces), metadata)
+    }
+
+    /// The light, and the layers that are asked for: parts where the film has them, and what is seen first where `surfaces` are given.
+    pub fn channels(&self, film: &SceneFilm, surfaces: &[Surface]) -> Vec<Channel> {
+        let light = channels("", RGB, (0..film.pixels()).map(|pixel| self.radiance(film, pixel)));
+        light.into_iter().chain(self.layers.iter().flat_map(|layer| self.layer(*layer, film, surfaces))).collect()
     }
 
     fn layer(&self, layer: Layer, film: &SceneFilm, surfaces: &[Surface]) -> Vec<Channel> {
@@ -139,8 +145,12 @@ impl Show {
         }
     }
 
+    fn radiance(&self, film: &SceneFilm, pixel: usize) -> Vec3 {
+        self.denoised.as_ref().map_or_else(|| film.mean(pixel).as_vec3(), |denoised| denoised[pixel])
+    }
+
     fn image(&self, film: &SceneFilm) -> ColourPicture {
-        self.of(film, |pixel| film.mean(pixel))
+        self.of(film, |pixel| self.radiance(film, pixel))
     }
 
     fn stops(&self, image: &ColourPicture) -> f32 {
@@ -149,11 +159,12 @@ impl Show {
 
     /// Standard errors, infinite where they are not known.
     pub fn errors(&self, film: &SceneFilm) -> Vec<u8> {
-        self.of(film, film.stated_errors()).encode(Format::Exr, 0.0, Tone::Linear, None)
+        let errors = film.stated_errors();
+        self.of(film, |pixel| errors(pixel).as_vec3()).encode(Format::Exr, 0.0, Tone::Linear, None)
     }
 
-    fn of(&self, film: &SceneFilm, value: impl Fn(usize) -> DVec3) -> ColourPicture {
+    fn of(&self, film: &SceneFilm, value: impl Fn(usize) -> Vec3) -> ColourPicture {
         let (width, height) = self.size;
-        ColourPicture { width, height, pixels: (0..film.pixels()).map(|pixel| value(pixel).as_vec3()).collect() }
+        ColourPicture { width, height, pixels: (0..film.pixels()).map(value).collect() }
     }
 }

@@ -16,6 +16,7 @@ pub mod room;
 pub mod room_effects;
 pub mod scene;
 pub mod sensor;
+pub mod traffic;
 pub mod work_cost;
 pub mod work_division;
 

@@ -52,7 +52,7 @@ impl Picture {
     /// The content of such a file.
     pub fn encode(&self, format: Format, style: &Style) -> Vec<u8> {
         let Style { exposure, tone, ref layers } = *style;
-        let show = Show { size: self.size, exposure, tone, layers: layers.clone() };
+        let show = Show { size: self.size, exposure, tone, layers: layers.clone(), denoised: None };
         let metadata = |stops: f32| self.metadata(units(format, stops, tone));
         match format {
             Format::Png => show.png(&self.run.film, metadata).0,
@@ -73,6 +73,7 @@ impl Picture {
         let confidence = settings.stop.confidence;
         let [error, error_bound] = errors(&self.run.error(), confidence);
         Metadata {
+            denoiser: None,
             photonmill: env!("CARGO_PKG_VERSION").to_owned(),
             devices: devices(self.run.device.iter().chain(&self.run.more_devices)),
             scene: self.scene.name.clone(),

@@ -14,6 +14,7 @@ use crate::plan::{EmissionRange, RoomPlan, photons_of};
 use crate::records::{EmitPush, EndBouncePush, FillGapsPush, PhotonRange, TracePersistentPush, TracePush};
 use crate::rng::words;
 use crate::settings::Builder;
+use crate::timings::Handled;
 
 /// Kernels that tracing needs.
 pub fn modules(plan: &RoomPlan) -> Vec<Module> {
@@ -38,6 +39,7 @@ pub fn chunk(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan
         commands.fill(&resources.counters, 0, plan.counter_array_length(), 0);
         commands.fill(&resources.counters, 1, 1, photon_count);
         commands.add_work(plan.work.tracing(photon_count));
+        commands.count(Handled { photons: photon_count.into(), ..Handled::default() });
         if plan.settings.builder == Builder::Persistent {
             return trace_persistent(commands, resources, plan, round, ranges);
         }

@@ -15,6 +15,7 @@ use crate::gpu::{Commands, Extent};
 use crate::plan::differences::row_length;
 use crate::plan::scene::MapPlan;
 use crate::records::{CellPush, CrowdSizePush, DiscCutsPush, EndDifferencePush, FluxToRadiancePush, ResolvePush, SceneGatherPush};
+use crate::timings::Handled;
 
 /// Finds the walls at which each visible point's density estimates from a map end.
 pub fn cut_discs(commands: &mut Commands, round: Round, map: &MapPlan) -> Result<()> {
@@ -139,6 +140,7 @@ pub fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u32; 2])
             global_flux: flux(&plan.global),
             caustic_flux: flux(&plan.caustic),
         };
+        commands.count(Handled { bytes: u64::from(end_point - first_point) * plan.bytes_of_point(), ..Handled::default() });
         let kernel = FluxToRadiance {
             scene,
             anomalies,
@@ -177,6 +179,7 @@ pub fn resolve(commands: &mut Commands, round: Round, ends_block: bool) -> Resul
             block,
             ends_block: u32::from(ends_block),
         };
+        commands.count(Handled { bytes: u64::from(end_pixel - first_pixel) * plan.bytes_of_pixel(), ..Handled::default() });
         let kernel = Resolve {
             extra_samples,
             pass_sums,

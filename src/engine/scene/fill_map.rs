@@ -94,7 +94,7 @@ fn one_map(commands: &mut Commands, round: Round, map: &MapPlan, take: &mut dyn 
     let mut stored = 0;
     for chunk in map.chunks() {
         let mut found: Vec<MapPhoton> = Vec::new();
-        trace::trace(commands, round, buffers, map, chunk, &mut |commands| {
+        trace::trace(commands, round, buffers, map, chunk, &mut |commands, _| {
             let count = commands.read(&buffers.counters, 1)?[0].min(map.capacity);
             found.extend(commands.read(&buffers.map, count as usize)?.into_iter().filter(|photon| photon.plane != NONE));
             Ok(())

@@ -8,6 +8,7 @@ use crate::gpu::kernels::{DispatchSize, MapCount, MapScatter, ScanAdd, ScanBlock
 use crate::gpu::{Commands, Extent, Kernel, Module};
 use crate::plan::scene::MapPlan;
 use crate::records::{CellPush, DispatchSizePush};
+use crate::timings::Handled;
 
 /// Kernels that the index needs.
 pub fn modules() -> Vec<Module> {
@@ -25,20 +26,36 @@ pub fn cells(round: Round, map: &MapPlan, radius: f32) -> CellPush {
     }
 }
 
-/// Sorts the map by the buckets of its cells.
-pub fn build(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map_plan: &MapPlan, cells_push: &CellPush) -> Result<()> {
+/// Sorts the map, which holds so many photons where that is known, by the buckets of its cells.
+pub fn build(
+    commands: &mut Commands,
+    round: Round,
+    photons: &PhotonBuffers,
+    map_plan: &MapPlan,
+    cells_push: &CellPush,
+    stored: Option<u32>,
+) -> Result<()> {
+    let stored = stored.map_or(0, u64::from);
+    let handle = |commands: &mut Commands, stored, bytes| commands.count(Handled { stored, bytes, ..Handled::default() });
+    handle(commands, stored, 0);
     let plan = round.plan;
     let totals = &photons.totals[usize::from(map_plan.caustic_only)];
     let PhotonBuffers { map, sorted_map, counters, cells, ranks, block_sums, dispatch_args, .. } = photons;
     let buckets = cells_push.bucket_mask + 1;
     commands.scope("count", |commands| {
+        // The fill counts itself.
+        handle(commands, stored, map_plan.bytes_of_counting(stored) - 4 * u64::from(buckets));
         commands.fill(cells, 0, u64::from(buckets) + 1, 0);
         let push = DispatchSizePush::new(0, cells_push.photon_capacity, plan.settings.group_size);
         commands.dispatch(DispatchSize { counters, dispatch_args }, &push, Extent::Groups(1, 1))?;
         commands.dispatch(MapCount { map, counters, cells, ranks }, cells_push, Extent::Indirect(dispatch_args))
     })?;
-    commands.scope("scan", |commands| scan(commands, cells, block_sums, buckets + 1, plan.settings.group_size))?;
+    commands.scope("scan", |commands| {
+        handle(commands, 0, map_plan.bytes_of_scanning());
+        scan(commands, cells, block_sums, buckets + 1, plan.settings.group_size)
+    })?;
     commands.scope("sort", |commands| {
+        handle(commands, stored, map_plan.bytes_of_sorting(stored));
         commands.dispatch(MapScatter { map, counters, cells, sorted_map, ranks, totals }, cells_push, Extent::Indirect(dispatch_args))
     })
 }

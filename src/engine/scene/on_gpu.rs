@@ -35,7 +35,7 @@ use crate::plan::sensor::Sensor;
 use crate::records::CellPush;
 use crate::scene::Camera;
 use crate::scene::geometry::Geometry;
-use crate::timings::{Clock, Span};
+use crate::timings::{Handled, Span};
 
 /// Kernels that the plan needs, and no others. `go_on` is not among them: few camera paths outlast a dispatch, so its pipeline is
 /// made at its first use.
@@ -117,7 +117,7 @@ pub fn light_from(gpu: &Gpu, view: &View, plan: ScenePlan, map: Option<&MapFile>
     let trial = plan.trial.as_ref().map(|trial| ("trial", Duration::from_secs_f64(trial.seconds)));
     for (name, duration) in [("plan", plan.planned_in)].into_iter().chain(trial) {
         commands.timings().count(name);
-        commands.timings().add(Span { name: name.into(), clock: Clock::Wall, start: Duration::ZERO, duration });
+        commands.timings().add(Span::of_host(name, Duration::ZERO, duration));
     }
     let resources = commands.scope("set-up", |commands| SceneResources::new(gpu, commands, view.geometry, &plan, view.phases))?;
     commands.warm_up()?;
@@ -480,7 +480,7 @@ fn one_stored_map(
     stored.file.photons(round.number, map.name, most, round.geometry.planes.len(), &mut |of_file| {
         commands.upload(&photons.map, of_file)?;
         commands.fill(&photons.counters, 0, 1, of_file.len() as u32);
-        gather_in_grids(commands, round, in_round)?;
+        gather_in_grids(commands, round, in_round, Some(of_file.len() as u32))?;
         // What was staged goes.
         commands.submit()
     })?;
@@ -510,9 +510,9 @@ fn one_map(
         let most = if deadline.is_some() { *timed_chunk } else { map.chunk_photons };
         let count = most.min(map.chunk_photons).min(map.photons - traced);
         state.hand_out(usize::from(map.caustic_only), count);
-        trace::trace(commands, round, in_round.photons, map, (traced, count), &mut |commands| {
+        trace::trace(commands, round, in_round.photons, map, (traced, count), &mut |commands, stored| {
             kept.as_mut().map_or(Ok(()), |kept| kept.keep(commands, in_round.photons, map))?;
-            gather_in_grids(commands, round, in_round)
+            gather_in_grids(commands, round, in_round, stored)
         })?;
         traced += count;
         if deadline.is_some() {
@@ -534,14 +534,14 @@ fn one_kept_map(commands: &mut Commands, round: Round, in_round: &MapInRound, ke
     for part in kept.parts(map) {
         commands.copy(part, &photons.map, part.count());
         commands.fill(&photons.counters, 0, 1, part.count() as u32);
-        gather_in_grids(commands, round, in_round)?;
+        gather_in_grids(commands, round, in_round, Some(part.count() as u32))?;
     }
     Ok(map.photons)
 }
 
-/// Adds the photons that are in the map to the estimates of all points. Points of radii that differ much look photons up in grids of
+/// Adds the photons that are in the map, whose number may be known, to the estimates of all points. Points of radii that differ much look photons up in grids of
 /// their own.
-fn gather_in_grids(commands: &mut Commands, round: Round, map: &MapInRound) -> Result<()> {
+fn gather_in_grids(commands: &mut Commands, round: Round, map: &MapInRound, stored: Option<u32>) -> Result<()> {
     let MapInRound { photons, map, grids } = *map;
     for (grid, classes) in grids.iter().enumerate() {
         if commands.timestamps_left() < TIMESTAMPS_PER_GRID || commands.is_full(round.plan.work_per_submission) {
@@ -549,8 +549,12 @@ fn gather_in_grids(commands: &mut Commands, round: Round, map: &MapInRound) -> R
         }
         let radius = radius_class::radius_of_class(round.plan.widest_radius(map, round.number), classes.start);
         let cells = CellPush { counts_stored: u32::from(grid == 0), ..index::cells(round, map, radius) };
-        commands.scope("index", |commands| index::build(commands, round, photons, map, &cells))?;
-        commands.scope("gather", |commands| estimate::gather(commands, round, photons, map, classes.clone(), cells))?;
+        commands.scope("index", |commands| index::build(commands, round, photons, map, &cells, stored))?;
+        commands.scope("gather", |commands| {
+            let stored = stored.map_or(0, u64::from);
+            commands.count(Handled { stored, bytes: map.bytes_of_reading(stored), ..Handled::default() });
+            estimate::gather(commands, round, photons, map, classes.clone(), cells)
+        })?;
     }
     Ok(())
 }

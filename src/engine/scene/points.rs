@@ -12,6 +12,7 @@ use crate::records::{Draws, GoOnPush, ReceivePush, ViewPush};
 use crate::rng::{mix32, words};
 use crate::scene::geometry::Geometry;
 use crate::scene::{Camera, Lens, Projection};
+use crate::timings::Handled;
 
 /// Records `count` items, so many that none keeps the device busy for long, and at most `most`, at a time; each is so much `work`. Hands
 /// the commands over where they amount to a submission.
@@ -69,6 +70,7 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
     let emitter_count = geometry.emitters.len() as u32;
     let draws = |domain| Draws { seed: words(plan.settings.seed), round, domain };
     let record = |commands: &mut Commands, first: u32, end: u32| {
+        commands.count(Handled { bytes: u64::from(end - first) * plan.bytes_of_path(), ..Handled::default() });
         if goes_on {
             commands.fill(camera_path_counts, 0, 1, 0);
         }

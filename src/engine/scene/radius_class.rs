@@ -119,7 +119,7 @@ fn of_map(commands: &mut Commands, round: Round, buffers: &PhotonBuffers, map: &
             photon_capacity: kept.len() as u32,
             ..index::cells(round, map, radius_of_class(widest, first_class))
         };
-        index::build(commands, round, buffers, map, &cells)?;
+        index::build(commands, round, buffers, map, &cells, None)?;
         let (points, most) = (plan.visible_points(), plan.points_at_once());
         in_pieces(commands, plan, points, most, TESTS_PER_POINT, |commands, first_point, end_point| {
             let push = RadiusClassPush {

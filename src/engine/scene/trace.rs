@@ -17,6 +17,7 @@ use crate::records::{DispatchSizePush, Draws, EmissionPush, FlightPush, PhotonEm
 use crate::rng::words;
 use crate::scene::geometry::Geometry;
 use crate::settings::Builder;
+use crate::timings::Handled;
 
 /// Kernels that tracing needs.
 pub fn modules(plan: &ScenePlan) -> Vec<Module> {
@@ -48,14 +49,14 @@ enum Start {
 
 /// Traces the photons (first, count) of a chunk to their end and adds their fates to the map's tallies. They go in segments of
 /// bounces where more would not fit one dispatch or one map; survivors go on in the next. `gather` is called with the photons in
-/// the map: at the end, and before a segment for which the map might have no room.
+/// the map, and with their number where that is known: at the end, and before a segment for which the map might have no room.
 pub fn trace(
     commands: &mut Commands,
     round: Round,
     photons: &PhotonBuffers,
     map: &MapPlan,
     chunk: (u32, u32),
-    gather: &mut dyn FnMut(&mut Commands) -> Result<()>,
+    gather: &mut dyn FnMut(&mut Commands, Option<u32>) -> Result<()>,
 ) -> Result<()> {
     commands.fill(&photons.counters, 0, map.counter_count(), 0);
     let mut start = Start::Lights(chunk);
@@ -69,18 +70,20 @@ pub fn trace(
             commands.fill(&photons.counters, 0, 1, slots);
         }
         if first_bounce == map.bounces {
-            return gather(commands);
+            return gather(commands, None);
         }
         let counters = commands.read(&photons.counters, map.counter_count() as usize)?;
         let left = counters[if is_persistent(round.plan) { 1 } else { 1 + flights as usize }];
         let stored = counters[0];
+        // Slots may be empty.
+        let known = slots.is_none().then_some(stored);
         if left == 0 {
-            return if stored > 0 { gather(commands) } else { Ok(()) };
+            return if stored > 0 { gather(commands, known) } else { Ok(()) };
         }
         let landings = u64::from(map.capacity / map.chunk_photons);
         let is_full = slots.is_some() || u64::from(stored) + u64::from(left) * landings > u64::from(map.capacity);
         if is_full {
-            gather(commands)?;
+            gather(commands, known)?;
         }
         commands.fill(&photons.counters, 0, map.counter_count(), 0);
         if !is_full {
@@ -96,7 +99,7 @@ pub fn trace(
 pub fn stored(commands: &mut Commands, round: Round, map: &MapPlan) -> Result<Vec<MapPhoton>> {
     let buffers = round.resources.photons.as_ref().expect("a map has photons");
     let mut found = Vec::new();
-    let mut take = |commands: &mut Commands| {
+    let mut take = |commands: &mut Commands, _: Option<u32>| {
         let count = commands.read(&buffers.counters, 1)?[0].min(map.capacity);
         let entries = commands.read(&buffers.map, count as usize)?;
         found.extend(entries.into_iter().filter(|photon| photon.plane != NONE));
@@ -125,6 +128,7 @@ fn segment(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: 
     let (count, mut parity, first_bounce) = match start {
         Start::Lights(chunk) => {
             emit(commands, round, photons, map, chunk)?;
+            commands.count(Handled { photons: chunk.1.into(), ..Handled::default() });
             (chunk.1, 0, 0)
         }
         Start::List { count, parity, first_bounce } => (count, parity, first_bounce),
@@ -215,6 +219,9 @@ fn trace_persistent(
         };
         commands.dispatch(kernel, &push, Extent::Items(u64::from(push.stride)))?;
         commands.add_work(WORK_PER_PHOTON * u64::from(count));
+        if matches!(start, Start::Lights(_)) {
+            commands.count(Handled { photons: count.into(), ..Handled::default() });
+        }
         first += count;
         if first < end && commands.is_due(plan.work_per_submission) {
             commands.submit()?;

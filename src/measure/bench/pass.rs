@@ -196,7 +196,7 @@ mod tests {
         let mut timings = Timings::default();
         for (name, ms) in spans {
             timings.count(name);
-            timings.add(Span { name: (*name).into(), clock: Clock::Gpu, start: Duration::ZERO, duration: Duration::from_millis(*ms) });
+            timings.add(Span { clock: Clock::Gpu, ..Span::of_host(name, Duration::ZERO, Duration::from_millis(*ms)) });
         }
         timings
     }

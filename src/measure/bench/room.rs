@@ -173,7 +173,7 @@ const FLIGHT_OPERATIONS: f64 = 7.0 * SLOW_OPERATION + 32.0;
 /// Squared distance, two comparisons, a sum.
 const PAIR_OPERATIONS: f64 = 11.0;
 /// A photon's place among those of its cell.
-pub const RANK_BYTES: f64 = 4.0;
+const RANK_BYTES: f64 = 4.0;
 /// Of rand48: one product to 64 bits and two to 32 a draw.
 const RAND48_PRODUCTS: f64 = 3.0;
 

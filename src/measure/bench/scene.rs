@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::pass::{Cost, SLOW_OPERATION, Work, bytes, scan_dispatches};
 use super::rates::{PHILOX_PRODUCTS, Rates};
-use super::room::{Counts, DROPPED, RANK_BYTES, REPEATS, Timed};
+use super::room::{Counts, DROPPED, REPEATS, Timed};
 use crate::engine::scene::resources::SceneResources;
 use crate::engine::scene::{self, Round, RunResult, View, points, trace};
 use crate::engine::{self, Control};
@@ -80,7 +80,7 @@ pub fn survey(gpu: &Gpu, job: &Job, map: impl Fn(&ScenePlan) -> Option<&MapPlan>
     let step = (asking.len() / SAMPLES).max(1);
     let radius_squared = plan.radius(map, 0).powi(2) as f32;
     let (mut stored, mut found) = (0u64, 0u64);
-    let mut look = |commands: &mut Commands| {
+    let mut look = |commands: &mut Commands, _: Option<u32>| {
         let length = commands.read(&buffers.counters, 1)?[0];
         let photons = commands.read(&buffers.map, length as usize)?;
         stored += u64::from(length);
@@ -167,12 +167,11 @@ impl Model<'_> {
         let pixels = f64::from(self.plan.sensor.pixels());
         let samples = pixels * f64::from(self.plan.samples());
         let points = f64::from(self.plan.visible_points());
-        let sums = 24.0 * points * f64::from(self.plan.arrival_sets) + 8.0 * self.plan.near_sums() as f64;
         let shadow_rays = f64::from(self.plan.shadow_rays());
         let (item, items, cost) = match pass {
             "visible points" => {
                 let cost = Cost {
-                    bytes: samples * 24.0 + points * bytes::<VisiblePoint>(),
+                    bytes: samples * self.plan.bytes_of_path() as f64,
                     float_operations: samples * ((1.0 + shadow_rays) * self.ray_operations() + shadow_rays * LIGHT_OPERATIONS),
                     // Where a path starts, and where its shadow rays end.
                     integer_products: samples * 2.0 * f64::from(PHILOX_PRODUCTS),
@@ -180,14 +179,10 @@ impl Model<'_> {
                 ("samples", samples, cost)
             }
             "flux to radiance" => {
-                let bytes = points * (bytes::<VisiblePoint>() + 24.0) + sums;
+                let bytes = points * self.plan.bytes_of_point() as f64;
                 ("points", points, Cost { bytes, float_operations: points * WEIGH_OPERATIONS, ..Cost::default() })
             }
-            // Sums and squares are read and written.
-            "resolve" => {
-                let read = if self.plan.maps().next().is_some() { points + samples } else { samples };
-                ("pixels", pixels, Cost { bytes: 24.0 * read + pixels * 2.0 * 72.0, ..Cost::default() })
-            }
+            "resolve" => ("pixels", pixels, Cost { bytes: pixels * self.plan.bytes_of_pixel() as f64, ..Cost::default() }),
             _ => {
                 let (map, stage) = pass.split_once('/').unwrap_or((pass, ""));
                 return self.work_of_map(self.plan.maps().find(|known| known.name == map)?, stage);
@@ -216,14 +211,14 @@ impl Model<'_> {
                 + counts.events * SCATTER_OPERATIONS,
             integer_products: (2.0 * counts.emitted + counts.events) * f64::from(PHILOX_PRODUCTS),
         };
-        // Photons are counted by their first half and numbered; counts of buckets are cleared, and twice read and written; then
-        // photons are read again and written in order.
-        let count = Cost { bytes: survey.stored * (0.5 * bytes::<MapPhoton>() + RANK_BYTES) + 4.0 * buckets, ..Cost::default() };
-        let scan = Cost { bytes: 16.0 * buckets, ..Cost::default() };
-        let sort = Cost { bytes: survey.stored * (2.0 * bytes::<MapPhoton>() + RANK_BYTES), ..Cost::default() };
+        let stored = survey.stored as u64;
+        let of_bytes = |bytes: u64| Cost { bytes: bytes as f64, ..Cost::default() };
+        let count = of_bytes(map.bytes_of_counting(stored));
+        let scan = of_bytes(map.bytes_of_scanning());
+        let sort = of_bytes(map.bytes_of_sorting(stored));
         let found = survey.asking_points * survey.per_estimate;
         let gather = Cost {
-            bytes: survey.stored * bytes::<MapPhoton>() + survey.asking_points * (bytes::<VisiblePoint>() + 48.0),
+            bytes: map.bytes_of_reading(stored) as f64 + survey.asking_points * (bytes::<VisiblePoint>() + 48.0),
             float_operations: found * PAIR_OPERATIONS,
             ..Cost::default()
         };

@@ -281,7 +281,7 @@ impl Trial<'_> {
                 self.turns(commands, |commands, turn| {
                     tallies::clear(commands, &buffers.tallies[0]);
                     for chunk in map.chunks() {
-                        commands.scope(turn, |commands| scene_trace::trace(commands, round, buffers, map, chunk, &mut |_| Ok(())))?;
+                        commands.scope(turn, |commands| scene_trace::trace(commands, round, buffers, map, chunk, &mut |_, _| Ok(())))?;
                         commands.submit()?;
                     }
                     tallies::read(commands, &buffers.tallies[0], plan.tally_rows())
