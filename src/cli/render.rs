@@ -131,7 +131,7 @@ impl RenderArgs {
             free: self.free(),
             chosen: None,
             save_settings: None,
-            explain: self.messages.explain,
+            explain: self.messages.explains(),
             point: "pixel",
         }
     }
@@ -245,7 +245,7 @@ pub(super) fn run(args: &RenderArgs, typed: &Typed, cancelled: &AtomicBool) -> R
     let blocks_with_gaps = blocks_with_gaps(keeper.resumed());
     let lit = job.run(&mut gpus, stop, &mut keeper, &reporter, cancelled)?;
 
-    let text = scene_report::text(&scene.name, &lit, job.point, args.messages.explain);
+    let text = scene_report::text(&scene.name, &lit, job.point, args.messages.explains());
     let mut files = Vec::new();
     let mut shown = String::new();
     if let (Some(picture), Some(format), Some(output)) = (&picture, format, output) {

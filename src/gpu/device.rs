@@ -6,7 +6,7 @@ use ash::vk;
 use serde::Serialize;
 
 use super::kernels::MAX_BUFFERS;
-use super::{call, validation::Messages};
+use super::{call, platform, validation::Messages};
 use crate::error::{Error, Result};
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
@@ -44,6 +44,9 @@ pub struct DeviceFacts {
     pub votes_in_loops: bool,
     /// What the device lacks of what every kernel needs; empty if it can be used.
     pub lacks: Vec<String>,
+    /// Extensions that this platform wants enabled.
+    #[serde(skip)]
+    pub(super) of_platform: Vec<&'static CStr>,
     #[serde(skip)]
     pub(super) queue_family: u32,
     #[serde(skip)]
@@ -71,12 +74,14 @@ impl DeviceFacts {
 /// Loads the Vulkan loader at run time and makes an instance.
 pub(super) fn instance(validate: bool) -> Result<(ash::Entry, ash::Instance, Option<Messages>)> {
     let no_vulkan = |reason: String| Error::NoVulkan { reason };
-    // SAFETY: the loader is the system's own library; its initialisers are trusted.
-    let entry = unsafe { ash::Entry::load() }.map_err(|_| no_vulkan("the Vulkan loader (libvulkan) is not installed".into()))?;
+    let entry = platform::load().map_err(|_| no_vulkan(platform::NO_LOADER.into()))?;
     let app = vk::ApplicationInfo::default().application_name(c"photonmill").api_version(vk::API_VERSION_1_3);
 
     let mut layers = Vec::new();
-    let mut extensions = Vec::new();
+    // SAFETY: plain enumeration.
+    let present = unsafe { entry.enumerate_instance_extension_properties(None) }.unwrap_or_default();
+    let (extensions, flags) = platform::instance(&present);
+    let mut extensions: Vec<_> = extensions.into_iter().map(CStr::as_ptr).collect();
     if validate {
         // SAFETY: plain enumeration.
         let present = call("vkEnumerateInstanceLayerProperties", || unsafe { entry.enumerate_instance_layer_properties() })?;
@@ -89,8 +94,8 @@ pub(super) fn instance(validate: bool) -> Result<(ash::Entry, ash::Instance, Opt
     }
     let synchronisation = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
     let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&synchronisation);
-    let mut info =
-        vk::InstanceCreateInfo::default().application_info(&app).enabled_layer_names(&layers).enabled_extension_names(&extensions);
+    let info = vk::InstanceCreateInfo::default().flags(flags).application_info(&app);
+    let mut info = info.enabled_layer_names(&layers).enabled_extension_names(&extensions);
     if validate {
         info = info.push_next(&mut features);
     }
@@ -164,14 +169,16 @@ fn facts(instance: &ash::Instance, device: vk::PhysicalDevice, index: usize) -> 
     let mut f13 = vk::PhysicalDeviceVulkan13Features::default();
     let mut maximal = vk::PhysicalDeviceShaderMaximalReconvergenceFeaturesKHR::default();
     let mut uniform = vk::PhysicalDeviceShaderSubgroupUniformControlFlowFeaturesKHR::default();
+    let of_platform;
     // SAFETY: the device belongs to the instance; only a 1.3 device fills the 1.3 structs, and they
     // are chained only for one.
     let (properties, features, families, memory) = unsafe {
         let extensions = instance.enumerate_device_extension_properties(device).unwrap_or_default();
-        let has = |name: &CStr| extensions.iter().any(|extension| extension.extension_name_as_c_str() == Ok(name));
+        let has = |name: &CStr| platform::has(&extensions, name);
         let version = instance.get_physical_device_properties(device).api_version;
         let mut properties = vk::PhysicalDeviceProperties2::default();
         let mut features = vk::PhysicalDeviceFeatures2::default();
+        of_platform = platform::device(&extensions);
         if version >= vk::API_VERSION_1_3 {
             properties = properties.push_next(&mut v11).push_next(&mut v12).push_next(&mut v13);
             features = features.push_next(&mut f12).push_next(&mut f13);
@@ -255,6 +262,7 @@ fn facts(instance: &ash::Instance, device: vk::PhysicalDevice, index: usize) -> 
         },
         votes_in_loops: false,
         lacks,
+        of_platform,
         queue_family: queue_family.unwrap_or(0),
         pipeline_cache_id: properties.pipeline_cache_uuid.iter().map(|byte| format!("{byte:02x}")).collect(),
     }
@@ -268,11 +276,12 @@ pub(super) fn create(instance: &ash::Instance, physical: vk::PhysicalDevice, fac
     let mut v13 = vk::PhysicalDeviceVulkan13Features::default().synchronization2(true).maintenance4(true);
     let mut maximal = vk::PhysicalDeviceShaderMaximalReconvergenceFeaturesKHR::default().shader_maximal_reconvergence(true);
     let mut uniform = vk::PhysicalDeviceShaderSubgroupUniformControlFlowFeaturesKHR::default().shader_subgroup_uniform_control_flow(true);
-    let extensions = match facts.reconvergence {
-        Reconvergence::Maximal => vec![ash::khr::shader_maximal_reconvergence::NAME.as_ptr()],
-        Reconvergence::UniformControlFlow => vec![ash::khr::shader_subgroup_uniform_control_flow::NAME.as_ptr()],
-        Reconvergence::None => Vec::new(),
+    let of_lanes = match facts.reconvergence {
+        Reconvergence::Maximal => Some(ash::khr::shader_maximal_reconvergence::NAME),
+        Reconvergence::UniformControlFlow => Some(ash::khr::shader_subgroup_uniform_control_flow::NAME),
+        Reconvergence::None => None,
     };
+    let extensions: Vec<_> = of_lanes.into_iter().chain(facts.of_platform.iter().copied()).map(CStr::as_ptr).collect();
     let mut info = vk::DeviceCreateInfo::default()
         .queue_create_infos(&queues)
         .enabled_features(&features)

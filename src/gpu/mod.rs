@@ -10,6 +10,7 @@ mod faults;
 pub mod kernel;
 mod mapped_file;
 mod pace;
+mod platform;
 mod reconvergence;
 mod specialize;
 pub mod timestamps;
