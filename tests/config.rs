@@ -31,18 +31,24 @@ json = true
 #[test]
 fn a_run_from_a_file_is_that_of_its_options() {
     let place = Place::new();
-    place.write("run.toml", FILE);
-    let (stdout, stderr) = place.succeed("render --config run.toml");
-    assert!(stderr.is_empty() && stdout.contains("judge: "), "{stdout}{stderr}");
-    let typed = "render cornell -o b.png --size 16x12 --rounds 8 --photons 1000 --environment 0.5,0.5,0.25 --without glossy,sheen --seed 3";
-    place.succeed(&format!("{typed} -q"));
-    assert!(std::fs::read(place.at("a.png")).unwrap() == std::fs::read(place.at("b.png")).unwrap(), "the pictures differ");
-    place.succeed("render --config run.toml -o c.png --seed 4");
-    assert!(std::fs::read(place.at("a.png")).unwrap() != std::fs::read(place.at("c.png")).unwrap(), "--seed 4 changes nothing");
+    let table = "[open-box]\nvariant = \"cpu\"\noutput = \"a.png\"\nmesh = 0x10\nphotons = 1_000\neye = [0.25, 0, 1]\nbias = false\n";
+    place.write("run.toml", format!("seed = 3\nquiet = true\nmesh = 1\n\n{table}"));
+    let run = |line: &str| {
+        let output = place.run(line);
+        assert!(output.status.success(), "{line}: {}", text(&output.stderr));
+        (text(&output.stdout), text(&output.stderr))
+    };
+    let picture = |name: &str| std::fs::read(place.at(name)).unwrap();
+    let (stdout, stderr) = run("--config run.toml");
+    assert!(stderr.is_empty() && stdout.contains("wrote a.png"), "{stdout}{stderr}");
+    run("--variant cpu --mesh 16 --photons 1000 --eye 0.25,0,1 --seed 3 -o b.png");
+    assert!(picture("a.png") == picture("b.png"), "the pictures differ");
+    run("--config run.toml -o c.png --seed 4");
+    assert!(picture("a.png") != picture("c.png"), "--seed 4 changes nothing");
     // What conflicts with a typed option is not taken: --quiet with --progress.
-    let (_, stderr) = place.succeed("render --config run.toml -o d.png --progress json");
+    let (_, stderr) = run("--config run.toml -o d.png --progress json");
     assert!(stderr.lines().all(|line| serde_json::from_str::<Value>(line).is_ok()) && !stderr.is_empty(), "{stderr}");
-    let (stdout, _) = place.succeed("repeat a.png");
+    let (stdout, _) = run("repeat a.png");
     assert!(stdout.contains("identical"), "{stdout}");
 }
 
@@ -75,7 +81,7 @@ fn options_in_force_are_printed_as_a_file() {
         let all: Vec<&str> = first.lines().skip(1).map(|line| line.trim_start_matches("# ")).collect();
         place.write("all.toml", all.join("\n"));
         let given = print(&format!("{} --config all.toml", words.join(" ")));
-        let missing: Vec<&str> = given.lines().skip(1).filter(|line| line.starts_with("# ") && !line.starts_with("# progress")).collect();
+        let missing: Vec<&str> = given.lines().skip(1).filter(|line| line.starts_with("# ")).collect();
         assert_eq!(missing, Vec::<&str>::new(), "{line}");
     }
     let render = print("render --config run.toml --seed 4");
@@ -123,12 +129,21 @@ fn files_that_are_wrong_are_refused_in_one_line() {
 #[test]
 fn messages_are_more_or_fewer() {
     let place = Place::new();
-    let run = "render cornell -o a.png --size 16x12 --rounds 2 --photons 500";
-    let [quiet, usual, verbose] = ["-q", "", "-v"].map(|option| place.succeed(&format!("{run} {option}")));
-    assert!(quiet.1.is_empty() && usual.1.contains("photonmill: plan: "), "{}{}", quiet.1, usual.1);
-    for word in [" s: making the pipelines", "subgroups of ", " s: writing the results"] {
-        assert!(verbose.1.contains(word) && !usual.1.contains(word), "{word}: {}", verbose.1);
-    }
+    let [quiet, usual] = ["-q", ""].map(|option| place.succeed(&format!("--mesh 8 -o a.png {option}")));
+    let verbose = place.succeed("render cornell -o a.png --size 16 --rounds 2 --photons 500 -v");
+    assert!(quiet.1.is_empty() && usual.1.contains("photonmill: device: "), "{}{}", quiet.1, usual.1);
+    // What is printed every few seconds of a slow run has whole seconds.
+    let steps = |stderr: &str| {
+        let time =
+            |line: &str| line.strip_prefix("photonmill: ")?.split_once(" s: ").map(|(time, step)| (time.contains('.'), step.to_owned()));
+        let steps = stderr.lines().filter_map(time).filter(|(is_step, _)| *is_step);
+        steps.map(|(_, step)| step).collect::<BTreeSet<String>>()
+    };
+    assert!(
+        steps(&usual.1).is_empty()
+            && steps(&verbose.1).is_superset(&["making the pipelines", "writing the results"].map(str::to_owned).into())
+    );
+    assert!(verbose.1.contains("subgroups of ") && !usual.1.contains("subgroups of "), "{}", verbose.1);
     assert!(verbose.0.contains("no glossy material") && !usual.0.contains("no glossy material"), "{}", verbose.0);
     assert!(quiet.0.contains("wrote a.png"), "{}", quiet.0);
 }
@@ -148,7 +163,7 @@ fn on_terminal(place: &Place, line: &str, variable: (&str, &str)) -> String {
 #[test]
 fn no_escapes_reach_who_does_not_want_them() {
     let place = Place::new();
-    let run = on_device("render cornell -o a.png --size 16x12 --rounds 2 --photons 500");
+    let run = on_device("--mesh 8 -o a.png");
     assert!(on_terminal(&place, &run, ("CLICOLOR", "1")).contains('\u{1b}'), "a terminal has a bar");
     for variable in [("NO_COLOR", "1"), ("TERM", "dumb")] {
         for line in [run.as_str(), "--help", "devices"] {

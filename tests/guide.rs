@@ -46,13 +46,14 @@ fn commands(text: &str) -> Vec<String> {
 }
 
 /// Commands that start so are not run, and why.
-const NOT_RUN: [(&str, &str); 13] = [
+const NOT_RUN: [(&str, &str); 14] = [
     ("tools/setup && tools/test", "runs this test"),
     ("tools/test", "runs this test"),
     ("tools/bench/run ", "writes into the repository"),
     ("tools/bench_peers", "installs other programs"),
     ("tools/fuzz/run ", "needs a nightly toolchain"),
     ("tools/faults", "takes half an hour; `tests/faults.rs` has short forms"),
+    ("tools/package", "`tests/package.rs` runs it"),
     ("tools/soak ", "takes an hour"),
     ("tools/sanitize", "needs a nightly toolchain"),
     ("tools/sample_models ", "needs a collection of files"),
@@ -299,7 +300,10 @@ fn guide_links_check(path: &str, text: &str, for_rustdoc: &[(String, String)], b
         };
         require(has_twin, || format!("{path}: rustdoc knows no [{label}]"))?;
     }
-    let in_brackets = text.split('[').skip(1).filter_map(|rest| Some(rest.split_once(']')?.0));
+    // Tables of TOML are no links.
+    let toml = fenced(text, "toml").join("\n");
+    let without_toml = if toml.is_empty() { text.to_owned() } else { text.replace(&toml, "") };
+    let in_brackets = without_toml.split('[').skip(1).filter_map(|rest| Some(rest.split_once(']')?.0));
     let is_label = |label: &&str| !label.is_empty() && label.chars().all(|letter| letter.is_ascii_lowercase() || letter == '-');
     for label in in_brackets.filter(is_label) {
         require(defined.iter().any(|(known, _)| known == label), || format!("{path}: [{label}] is not defined"))?;

@@ -13,7 +13,8 @@ fn packed(folder: &Path) -> PathBuf {
     let spirv = Path::new(env!("OUT_DIR")).join("spirv");
     let mut package = Command::new(root("tools/package"));
     // Whatever cargo builds is here already.
-    let package = package.arg(folder).env("PHOTONMILL_SPIRV", spirv).env("CARGO_NET_OFFLINE", "true").output().expect("tools/package starts");
+    let package =
+        package.arg(folder).env("PHOTONMILL_SPIRV", spirv).env("CARGO_NET_OFFLINE", "true").output().expect("tools/package starts");
     assert!(package.status.success(), "{}", text(&package.stderr));
     let name = format!("photonmill-{}", env!("CARGO_PKG_VERSION"));
     let file = folder.join(format!("{name}.crate"));

@@ -284,7 +284,9 @@ pub(super) fn printed(known: &Command, matches: &ArgMatches) -> Result<String, S
         let line = |value: String| format!("{name} = {value}");
         if was_typed(selected.matches, argument) {
             lines.push(line(written(argument, selected.matches).map_err(|reason| format!("--print-config: {name} {reason}"))?));
-        } else if let Some(default) = default(argument) {
+        } else if let Some(default) =
+            default(argument).filter(|_| !selected.typed().any(|given| excludes(selected.command, argument, given)))
+        {
             lines.push(format!("# {}", line(in_toml(&default))));
         }
     }
@@ -295,7 +297,7 @@ pub(super) fn printed(known: &Command, matches: &ArgMatches) -> Result<String, S
 
 /// What a command line lacks does not keep it from being printed.
 pub(super) fn incomplete(known: &Command, arguments: &[OsString]) -> Option<ArgMatches> {
-    lenient(arguments).filter(|matches| Selected::of(matches, known).matches.get_flag("print_config"))
+    lenient(arguments).filter(|matches| Selected::of(matches, known).matches.get_one::<bool>("print_config") == Some(&true))
 }
 
 fn written(argument: &Arg, matches: &ArgMatches) -> Result<String, String> {

@@ -239,8 +239,8 @@ pub fn main() -> u8 {
             return 0;
         }
         Err(error) => {
-            let asked = config::incomplete(&command, &arguments).filter(|_| error.kind() == ClapErrorKind::MissingRequiredArgument);
-            return match asked {
+            let is_incomplete = error.kind() == ClapErrorKind::MissingRequiredArgument;
+            return match config::incomplete(&command, &arguments).filter(|_| is_incomplete) {
                 Some(matches) => print_config(&command, &matches),
                 None => refuse(&origins.located(usage::one_line(&error, &command, &arguments))),
             };
