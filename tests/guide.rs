@@ -46,8 +46,10 @@ fn commands(text: &str) -> Vec<String> {
 }
 
 /// Commands that start so are not run, and why.
-const NOT_RUN: [(&str, &str); 14] = [
+const NOT_RUN: [(&str, &str); 16] = [
     ("tools/setup && tools/test", "runs this test"),
+    ("tools/setup && cargo build", "takes minutes; whatever it builds is here"),
+    ("export PATH", "is for the user's shell"),
     ("tools/test", "runs this test"),
     ("tools/bench/run ", "writes into the repository"),
     ("tools/bench_peers", "installs other programs"),
@@ -206,7 +208,7 @@ fn commands_that_are_wrong_are_noticed() {
 }
 
 /// Options of the project's other tools, of cargo and of Slurm.
-const OTHER_OPTIONS: [&str; 24] = [
+const OTHER_OPTIONS: [&str; 25] = [
     "--again",
     "--array",
     "--dependency",
@@ -221,6 +223,7 @@ const OTHER_OPTIONS: [&str; 24] = [
     "--parsable",
     "--pictures",
     "--partition",
+    "--path",
     "--plot",
     "--quick",
     "--release",
