@@ -348,8 +348,8 @@ pub(super) fn check_not_named_again(known: &Command, matches: &ArgMatches) -> Re
     let config = selected.matches.get_one::<PathBuf>("config").and_then(|path| path.canonicalize().ok());
     let Some(config) = config else { return Ok(()) };
     for (name, argument) in in_files(selected.command).filter(|(_, argument)| argument.get_action().takes_values()) {
-        let values = selected.matches.get_raw(argument.get_id().as_str()).into_iter().flatten();
-        for value in values.filter(|value| Path::new(value).canonicalize().is_ok_and(|path| path == config)) {
+        let mut values = selected.matches.get_raw(argument.get_id().as_str()).into_iter().flatten();
+        if let Some(value) = values.find(|value| Path::new(value).canonicalize().is_ok_and(|path| path == config)) {
             return Err(format!("--{name} {}: is the file of --config; name another file", echo(value.display())));
         }
     }

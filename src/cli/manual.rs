@@ -75,15 +75,12 @@ fn pages(command: &Command) -> Vec<(String, Vec<u8>)> {
 fn page(man: &Man, command: &Command) -> Vec<u8> {
     let examples = command.get_after_help().map(ToString::to_string).unwrap_or_default();
     let mut page = Vec::new();
-    let sections: [fn(&Man, &mut dyn std::io::Write) -> std::io::Result<()>; 5] = [
-        Man::render_title,
-        Man::render_name_section,
-        Man::render_synopsis_section,
-        Man::render_description_section,
-        Man::render_options_section,
-    ];
     let render = |page: &mut Vec<u8>| -> std::io::Result<()> {
-        sections.iter().try_for_each(|section| section(man, page))?;
+        man.render_title(page)?;
+        man.render_name_section(page)?;
+        man.render_synopsis_section(page)?;
+        man.render_description_section(page)?;
+        man.render_options_section(page)?;
         if command.has_subcommands() {
             man.render_subcommands_section(page)?;
         }
