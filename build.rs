@@ -1,6 +1,8 @@
 //! Compiles every kernel of `glsl/kernels` to SPIR-V and writes `kernels.rs`: for each kernel a
 //! struct whose fields are its buffers, with everything else that reflection knows of it. Writes `records.rs` too, the records
 //! that Rust and GLSL share, and `charts.md`, the charts of the guide.
+//!
+//! Without the feature `compile-glsl`, as in the packed crate, the SPIR-V is that of `glsl/prebuilt`, which `tools/package` puts there.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -9,11 +11,12 @@ use std::{env, fs};
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
-use compile::{Compiled, compile};
+use sha2::{Digest, Sha256};
 use spirq::ReflectConfig;
 use spirq::ty::{AccessType, DescriptorType, StructType, Type};
 use spirq::var::Variable;
 
+#[cfg(feature = "compile-glsl")]
 #[path = "glsl/compile.rs"]
 mod compile;
 #[path = "src/constants.rs"]
@@ -26,36 +29,26 @@ fn main() {
     let glsl = PathBuf::from(env::var("CARGO_MANIFEST_DIR").expect("cargo sets it")).join("glsl");
     let out = PathBuf::from(env::var("OUT_DIR").expect("cargo sets it"));
 
-    // A fault in a shared file is found by every kernel that includes it, and shown once.
-    let mut failures = BTreeSet::new();
+    let modules = modules(&glsl);
+    let spirv = out.join("spirv");
+    fs::create_dir_all(&spirv).expect("OUT_DIR can be written");
     let mut structs = String::new();
     let mut layouts = String::new();
     let mut max_buffers = 0;
     let mut scene_elements: BTreeMap<String, String> = BTreeMap::new();
-    for source in compile::sources(&glsl) {
-        let compile::Source { name, path, .. } = &source;
-        match compile(&glsl, &source, constants::SHARED_WITH_GLSL, &|_, text| text) {
-            Ok(Compiled { words, files }) => {
-                files.iter().for_each(|file| println!("cargo:rerun-if-changed={}", file.display()));
-                let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
-                fs::write(out.join(format!("{name}.spv")), bytes).expect("OUT_DIR can be written");
-                let kernel =
-                    Kernel { votes_in_loops: files.iter().any(|file| file.ends_with("builder/persistent.glsl")), ..reflect(&words) };
-                for Buffer { name: buffer, element, .. } in &kernel.scene {
-                    assert_eq!(scene_elements.entry(buffer.clone()).or_insert(element.clone()), element, "{buffer} of set 0 in {name}");
-                }
-                let scene_bindings = world_of(name, &kernel.scene).map_or(0, |(_, buffers)| buffers.len());
-                max_buffers = max_buffers.max(scene_bindings + kernel.buffers.len());
-                write_kernel(&mut structs, path, name, &kernel);
-                write_layouts(&mut layouts, name, &kernel);
-            }
-            Err(message) => drop(failures.insert(message)),
+    for Module { name, path, words, files } in &modules {
+        let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+        fs::write(spirv.join(format!("{name}.spv")), bytes).expect("OUT_DIR can be written");
+        let kernel = Kernel { votes_in_loops: files.iter().any(|file| file == "builder/persistent.glsl"), ..reflect(words) };
+        for Buffer { name: buffer, element, .. } in &kernel.scene {
+            assert_eq!(scene_elements.entry(buffer.clone()).or_insert(element.clone()), element, "{buffer} of set 0 in {name}");
         }
+        let scene_bindings = world_of(name, &kernel.scene).map_or(0, |(_, buffers)| buffers.len());
+        max_buffers = max_buffers.max(scene_bindings + kernel.buffers.len());
+        write_kernel(&mut structs, path, name, &kernel);
+        write_layouts(&mut layouts, name, &kernel);
     }
-    if !failures.is_empty() {
-        failures.iter().for_each(|message| eprint!("{message}"));
-        std::process::exit(1);
-    }
+    fs::write(spirv.join(LIST), list(&glsl, &modules)).expect("OUT_DIR can be written");
     write_worlds(&mut structs, &scene_elements);
     let buffer_count =
         format!("/// Storage buffers that the kernel with the most of them binds.\npub const MAX_BUFFERS: u32 = {max_buffers};\n");
@@ -65,6 +58,99 @@ fn main() {
     fs::write(out.join("kernels.rs"), source).expect("OUT_DIR can be written");
     fs::write(out.join("records.rs"), records(&glsl)).expect("OUT_DIR can be written");
     fs::write(out.join("charts.md"), charts()).expect("OUT_DIR can be written");
+}
+
+/// A kernel's SPIR-V.
+struct Module {
+    name: String,
+    /// Within `glsl`, as are the files.
+    path: String,
+    words: Vec<u32>,
+    /// What it was made from.
+    files: Vec<String>,
+}
+
+/// Every kernel, compiled from its GLSL.
+#[cfg(feature = "compile-glsl")]
+fn modules(glsl: &Path) -> Vec<Module> {
+    // A fault in a shared file is found by every kernel that includes it, and shown once.
+    let mut failures = BTreeSet::new();
+    let mut modules = Vec::new();
+    for source in compile::sources(glsl) {
+        match compile::compile(glsl, &source, constants::SHARED_WITH_GLSL, &|_, text| text) {
+            Ok(compile::Compiled { words, files }) => {
+                files.iter().for_each(|file| println!("cargo:rerun-if-changed={}", file.display()));
+                let within = |file: &PathBuf| file.strip_prefix(glsl).expect("GLSL is in its folder").to_string_lossy().into_owned();
+                modules.push(Module { name: source.name, path: source.path, words, files: files.iter().map(within).collect() });
+            }
+            Err(message) => drop(failures.insert(message)),
+        }
+    }
+    if !failures.is_empty() {
+        failures.iter().for_each(|message| eprint!("{message}"));
+        std::process::exit(1);
+    }
+    modules
+}
+
+/// Every kernel, as it was compiled before.
+#[cfg(not(feature = "compile-glsl"))]
+fn modules(glsl: &Path) -> Vec<Module> {
+    let prebuilt = glsl.join("prebuilt");
+    let end = |what: &str| -> ! {
+        eprintln!("{what}; build with --features compile-glsl, which needs the library shaderc");
+        std::process::exit(1);
+    };
+    let Ok(list) = fs::read_to_string(prebuilt.join(LIST)) else { end("there is no SPIR-V in glsl/prebuilt, as the packed crate has it") };
+    let (sources, kernels) = list.split_once('\n').unwrap_or_default();
+    if sources != hash(glsl) {
+        end("the SPIR-V in glsl/prebuilt was made from other sources than those in glsl");
+    }
+    let module = |line: &str| {
+        let mut words = line.split(' ').map(str::to_owned);
+        let [name, path] = [(); 2].map(|()| words.next().expect("a kernel has a name and a path"));
+        let file = prebuilt.join(format!("{name}.spv"));
+        let bytes = fs::read(&file).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
+        let spirv = bytes.chunks_exact(4).map(|word| u32::from_le_bytes(word.try_into().expect("four bytes")));
+        Module { name, path, words: spirv.collect(), files: words.collect() }
+    };
+    kernels.lines().map(module).collect()
+}
+
+/// File in which kernels are listed: after the hash of the sources, a line for each with its name, its path, and the files that it
+/// was made from.
+const LIST: &str = "kernels.txt";
+
+fn list(glsl: &Path, modules: &[Module]) -> String {
+    let line = |Module { name, path, files, .. }: &Module| format!("{name} {path} {}\n", files.join(" "));
+    format!("{}\n{}", hash(glsl), modules.iter().map(line).collect::<String>())
+}
+
+/// SHA-256 of all that decides the SPIR-V.
+fn hash(glsl: &Path) -> String {
+    let mut hash = Sha256::new();
+    let mut add = |name: &str, content: &[u8]| hash.update([name.as_bytes(), &content.len().to_le_bytes(), content].concat());
+    let mut folders = vec![glsl.to_owned()];
+    let mut files = BTreeSet::new();
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(&folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display())) {
+            let path = entry.expect("a folder can be read").path();
+            let is_source = path.extension().is_some_and(|kind| ["glsl", "comp", "rs"].iter().any(|known| kind == *known));
+            if path.is_dir() {
+                folders.push(path);
+            } else if is_source {
+                files.insert(path);
+            }
+        }
+    }
+    for path in files {
+        let name = path.strip_prefix(glsl).expect("GLSL is in its folder").to_string_lossy().replace('\\', "/");
+        add(&name, &fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display())));
+    }
+    for (name, value) in constants::SHARED_WITH_GLSL {
+        add(name, &value.to_le_bytes());
+    }
+    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// Files of `glsl` whose structs are records of Rust too.
@@ -305,7 +391,7 @@ fn write_kernel(source: &mut String, path: &str, name: &str, kernel: &Kernel) {
     writeln!(source, "    type Push = {push};").unwrap();
     writeln!(source, "    const MODULE: Module = Module {{").unwrap();
     writeln!(source, "        name: \"{name}\",").unwrap();
-    writeln!(source, "        spirv: include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{name}.spv\")),").unwrap();
+    writeln!(source, "        spirv: include_bytes!(concat!(env!(\"OUT_DIR\"), \"/spirv/{name}.spv\")),").unwrap();
     writeln!(source, "        push_bytes: size_of::<{push}>() as u32,").unwrap();
     writeln!(source, "        scene_bindings: {},", world.map_or(0, |(_, bindings)| bindings.len())).unwrap();
     writeln!(source, "        votes_in_loops: {},", kernel.votes_in_loops).unwrap();

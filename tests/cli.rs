@@ -424,6 +424,30 @@ fn a_slip_is_answered_with_what_was_meant() {
     place.assert_refused(cases);
 }
 
+/// What a newcomer may have in place of a scene, and what to do about it.
+#[test]
+fn files_that_are_no_scenes_are_refused_with_a_remedy() {
+    let place = Place::new();
+    let whole = std::fs::read(crate::common::sources::root("tests/scenes/blender.glb")).unwrap();
+    place.write("cut.glb", &whole[..5000]);
+    place.write("longer.glb", [&whole[..], b"more"].concat());
+    place.write("empty.glb", "");
+    place.write("noise.glb", [0xd5; 300]);
+    place.write("pointer.glb", "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n");
+    place.write("scene.blend", "BLENDER");
+    place.write("apart.gltf", "{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"byteLength\":36,\"uri\":\"absent.bin\"}]}");
+    let cases = [
+        ("cut.glb", ["has 5000; it was cut off", "download it again"]),
+        ("longer.glb", ["behind its end", "export it again"]),
+        ("empty.glb", ["is empty", "export it again"]),
+        ("noise.glb", ["is no glTF", "neither JSON nor binary"]),
+        ("pointer.glb", ["is no glTF", "git lfs pull"]),
+        ("scene.blend", ["scene.blend: must be a .gltf or .glb file", "File > Export"]),
+        ("apart.gltf", ["absent.bin", "export a .glb"]),
+    ];
+    place.assert_refused(cases.map(|(file, words)| (format!("render {file} -o a.png"), words)));
+}
+
 #[test]
 fn without_arguments_it_says_how_to_start() {
     let place = Place::new();

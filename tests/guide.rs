@@ -46,14 +46,17 @@ fn commands(text: &str) -> Vec<String> {
 }
 
 /// Commands that start so are not run, and why.
-const NOT_RUN: [(&str, &str); 14] = [
+const NOT_RUN: [(&str, &str); 17] = [
     ("pip install ", "builds a wheel; `tools/python/test` does, and runs what the page shows"),
     ("tools/setup && tools/test", "runs this test"),
+    ("tools/setup && cargo build", "takes minutes; whatever it builds is here"),
+    ("export PATH", "is for the user's shell"),
     ("tools/test", "runs this test"),
     ("tools/bench/run ", "writes into the repository"),
     ("tools/bench_peers", "installs other programs"),
     ("tools/fuzz/run ", "needs a nightly toolchain"),
     ("tools/faults", "takes half an hour; `tests/faults.rs` has short forms"),
+    ("tools/package", "`tests/package.rs` runs it"),
     ("tools/soak ", "takes an hour"),
     ("tools/sanitize", "needs a nightly toolchain"),
     ("tools/sample_models ", "needs a collection of files"),
@@ -208,7 +211,7 @@ fn commands_that_are_wrong_are_noticed() {
 }
 
 /// Options of the project's other tools, of cargo and of Slurm.
-const OTHER_OPTIONS: [&str; 25] = [
+const OTHER_OPTIONS: [&str; 26] = [
     "--again",
     "--array",
     "--dependency",
@@ -224,6 +227,7 @@ const OTHER_OPTIONS: [&str; 25] = [
     "--parsable",
     "--pictures",
     "--partition",
+    "--path",
     "--plot",
     "--quick",
     "--release",
@@ -303,7 +307,10 @@ fn guide_links_check(path: &str, text: &str, for_rustdoc: &[(String, String)], b
         };
         require(has_twin, || format!("{path}: rustdoc knows no [{label}]"))?;
     }
-    let in_brackets = text.split('[').skip(1).filter_map(|rest| Some(rest.split_once(']')?.0));
+    // Tables of TOML are no links.
+    let toml = fenced(text, "toml").join("\n");
+    let without_toml = if toml.is_empty() { text.to_owned() } else { text.replace(&toml, "") };
+    let in_brackets = without_toml.split('[').skip(1).filter_map(|rest| Some(rest.split_once(']')?.0));
     let is_label = |label: &&str| !label.is_empty() && label.chars().all(|letter| letter.is_ascii_lowercase() || letter == '-');
     for label in in_brackets.filter(is_label) {
         require(defined.iter().any(|(known, _)| known == label), || format!("{path}: [{label}] is not defined"))?;

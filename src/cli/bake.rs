@@ -103,7 +103,7 @@ pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
         free: Free { samples: false, ..args.transport.free(&request) },
         chosen: None,
         save_settings: None,
-        explain: args.messages.explain,
+        explain: args.messages.explains(),
         point: "texel",
     };
     let mut gpus = args.device.open(&reporter)?;
@@ -111,7 +111,7 @@ pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
 
     let estimates = bake::estimates(&lit);
     let stops = args.exposure.unwrap_or_else(|| bake::usual_exposure(&estimates));
-    let text = scene_report::text(&scene.name, &lit, job.point, args.messages.explain);
+    let text = scene_report::text(&scene.name, &lit, job.point, args.messages.explains());
     let maps = layout.maps(&estimates);
     let written = match into_file {
         Some(into_file) => into_file.write(&folder, &maps, args.preview.then(|| stops.exp2())),

@@ -157,3 +157,19 @@ Examples:
       All figures and tables; open paper/index.html
   photonmill paper -o paper --threads all --longest 20s
       Also with all CPU threads; leaves out rows that would take longer than 20 s";
+
+pub(super) const COMPLETIONS: &str = "\
+Examples:
+  photonmill completions bash > ~/.local/share/bash-completion/completions/photonmill
+      For bash, with the package bash-completion
+  photonmill completions zsh > ~/.zfunc/_photonmill
+      For zsh, where ~/.zfunc is in fpath
+  photonmill completions fish > ~/.config/fish/completions/photonmill.fish
+      For fish";
+
+pub(super) const MAN: &str = "\
+Examples:
+  photonmill man ~/.local/share/man/man1
+      Writes a page for each command; then: man photonmill-render
+  photonmill man | man -l -
+      Shows the first page";

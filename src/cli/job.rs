@@ -35,9 +35,15 @@ use crate::text::counted;
 pub(super) struct MessageArgs {
     /// Also print which effects were kept or dropped and why, with the time and the light of each, and what a pilot chose
     #[arg(long, help_heading = "Messages")]
-    pub(super) explain: bool,
+    explain: bool,
     #[command(flatten)]
     pub(super) progress: ProgressArgs,
+}
+
+impl MessageArgs {
+    pub(super) fn explains(&self) -> bool {
+        self.explain || self.progress.verbose
+    }
 }
 
 /// What a run is about.

@@ -5,6 +5,7 @@ mod bench;
 mod camera;
 mod chosen;
 mod compare;
+mod config;
 mod denoise;
 mod devices;
 mod display;
@@ -15,6 +16,7 @@ mod info;
 mod interrupt;
 mod job;
 mod keep;
+mod manual;
 mod map;
 mod merge;
 mod options;
@@ -38,7 +40,8 @@ use std::ffi::OsString;
 use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
 
-use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
+use clap::error::ErrorKind as ClapErrorKind;
+use clap::{ArgMatches, Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::engine::retry::{Remedy, in_words};
 use crate::engine::run::RunResult;
@@ -60,6 +63,8 @@ use values::parse_bytes;
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
+    #[command(flatten)]
+    config: config::ConfigArgs,
     #[command(flatten)]
     run: run::RunArgs,
 }
@@ -114,6 +119,12 @@ enum Command {
     /// Reproduce every figure and table of the paper as images, CSV and one HTML page
     #[command(after_help = help::PAPER)]
     Paper(paper::PaperArgs),
+    /// Print a script by which a shell completes commands and options
+    #[command(after_help = help::COMPLETIONS)]
+    Completions(manual::CompletionsArgs),
+    /// Print the manual page, or write those of all commands into a folder
+    #[command(after_help = help::MAN)]
+    Man(manual::ManArgs),
 }
 
 /// Which device, and how closely it is watched.
@@ -215,7 +226,16 @@ pub fn main() -> u8 {
     if arguments[1] == "help" {
         arguments.retain(|argument| argument != "--help" && argument != "-h");
     }
-    let command = Cli::command();
+    let mut command = Cli::command();
+    command.build();
+    let refuse = |reason: &str| {
+        complain(reason);
+        2
+    };
+    let (arguments, origins) = match config::expanded(&command, arguments) {
+        Ok(expanded) => expanded,
+        Err(reason) => return refuse(&reason),
+    };
     let parsed = command.clone().try_get_matches_from(&arguments).and_then(|matches| Ok((Cli::from_arg_matches(&matches)?, matches)));
     let (cli, matches) = match parsed {
         Ok(parsed) => parsed,
@@ -225,10 +245,19 @@ pub fn main() -> u8 {
             return 0;
         }
         Err(error) => {
-            complain(&usage::one_line(&error, &command, &arguments));
-            return 2;
+            let is_incomplete = error.kind() == ClapErrorKind::MissingRequiredArgument;
+            return match config::incomplete(&command, &arguments).filter(|_| is_incomplete) {
+                Some(matches) => print_config(&command, &matches),
+                None => refuse(&origins.located(usage::one_line(&error, &command, &arguments))),
+            };
         }
     };
+    if cli.config.is_printed() {
+        return print_config(&command, &matches);
+    }
+    if let Err(reason) = config::check_not_named_again(&command, &matches) {
+        return refuse(&origins.located(reason));
+    }
     let cancelled = cancel_on_signal();
     let result = match cli.command {
         None => interruptible(|| run::run(&cli.run, &Typed::of(&matches, &command), &cancelled)),
@@ -248,26 +277,43 @@ pub fn main() -> u8 {
         Some(Command::Bench(args)) => interruptible(|| bench::run(&args, &cancelled)),
         Some(Command::Gallery(args)) => interruptible(|| gallery::run(&args, &cancelled)),
         Some(Command::Paper(args)) => interruptible(|| paper::run(&args, &cancelled)),
+        Some(Command::Completions(args)) => manual::completions(&args, Cli::command()).map(|()| End::Finished),
+        Some(Command::Man(args)) => manual::man(&args, Cli::command()).map(|()| End::Finished),
     };
     match result {
         Ok(End::Finished) => 0,
         Ok(End::Cancelled) => exit_code(),
         Err(error) => {
             let error = usage::as_typed(error, &matches, &command);
-            complain(&error.to_string());
+            complain(&origins.located(error.to_string()));
             if matches!(error, Error::Interrupted) { exit_code() } else { error.exit_code() }
         }
     }
 }
 
 fn print_start() -> u8 {
-    match say(help::START) {
-        Ok(()) => 0,
-        Err(error) => {
-            complain(&error.to_string());
-            error.exit_code()
+    printed(say(help::START))
+}
+
+fn print_config(command: &clap::Command, matches: &ArgMatches) -> u8 {
+    match config::printed(command, matches) {
+        Ok(text) => printed(say(&text)),
+        Err(reason) => {
+            complain(&reason);
+            2
         }
     }
+}
+
+/// The exit code of a program that only prints.
+fn printed(result: Result<()>) -> u8 {
+    result.map_or_else(
+        |error| {
+            complain(&error.to_string());
+            error.exit_code()
+        },
+        |()| 0,
+    )
 }
 
 /// One line on stderr. Where nobody can read it there still is the exit code.

@@ -72,14 +72,14 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
         free: Free { samples: false, ..args.transport.free(&request) },
         chosen: None,
         save_settings: None,
-        explain: args.messages.explain,
+        explain: args.messages.explains(),
         point: "point",
     };
     let mut gpus = args.device.open(&reporter)?;
     let lit = job.run(&mut gpus, &args.transport.stop, &mut keeper, &reporter, cancelled)?;
     reporter.finish();
 
-    let text = scene_report::text(&scene.name, &lit, job.point, args.messages.explain);
+    let text = scene_report::text(&scene.name, &lit, job.point, args.messages.explains());
     let wrote = if output.is_standard_output() { String::new() } else { format!("\nwrote {}", args.output.display()) };
     let mut files = vec![(output, table(&lit))];
     files.extend(reports.files(&lit, || scene_report::json(&scene.name, &lit)));

@@ -12,7 +12,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::complain;
 use crate::engine::Progress;
-use crate::gpu::Gpu;
+use crate::gpu::{DeviceFacts, Gpu};
 use crate::text::counted;
 
 #[derive(Args)]
@@ -24,6 +24,10 @@ pub(super) struct ProgressArgs {
     /// Before the report print only warnings and errors: no device, plan or progress
     #[arg(short, long, conflicts_with = "progress")]
     quiet: bool,
+    /// Also print every step with the time when it begins, what the device can do, and what a run of a scene explains with
+    /// --explain
+    #[arg(short, long, conflicts_with = "quiet")]
+    pub(super) verbose: bool,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -41,6 +45,8 @@ pub(super) struct ProgressReporter {
     status: Arc<Mutex<String>>,
     /// Prints the status every few seconds; ends when the sender goes.
     ticker: Option<(Sender<()>, JoinHandle<()>)>,
+    is_verbose: bool,
+    started: Instant,
 }
 
 enum Form {
@@ -74,7 +80,7 @@ impl ProgressReporter {
         let form = match args.progress {
             _ if args.quiet => Form::Quiet,
             ProgressForm::Json => Form::Json,
-            ProgressForm::Auto if std::io::stderr().is_terminal() => {
+            ProgressForm::Auto if std::io::stderr().is_terminal() && takes_escapes() => {
                 let bar = ProgressBar::new(BAR_STEPS).with_style(style("{spinner} {elapsed} {msg}"));
                 bar.enable_steady_tick(Duration::from_millis(200));
                 *BAR.lock().unwrap_or_else(PoisonError::into_inner) = Some(bar.clone());
@@ -95,7 +101,7 @@ impl ProgressReporter {
             });
             (end, thread)
         });
-        ProgressReporter { form, status, ticker }
+        ProgressReporter { form, status, ticker, is_verbose: args.verbose, started: Instant::now() }
     }
 
     /// One line, printed now.
@@ -110,11 +116,17 @@ impl ProgressReporter {
     /// The device in use; `None` is the CPU builder.
     pub(super) fn device(&self, gpu: Option<&Gpu>) {
         self.note(&format!("device: {}", gpu.map_or_else(|| "CPU".to_owned(), |gpu| gpu.facts().label())));
+        if let Some(gpu) = gpu.filter(|_| self.is_verbose) {
+            self.note(&abilities(gpu.facts()));
+        }
     }
 
     /// What is being done from now on; printed every few seconds.
     pub(super) fn status(&self, what: &str) {
         self.set_status(what);
+        if self.is_verbose && !matches!(self.form, Form::Json) {
+            self.note(&format!("{:.2} s: {what}", self.started.elapsed().as_secs_f64()));
+        }
         match &self.form {
             Form::Bar(bar, is_run) => {
                 if is_run.replace(false) {
@@ -129,7 +141,7 @@ impl ProgressReporter {
 
     /// A step of several, printed now and every few seconds until the next one.
     pub(super) fn step(&self, what: &str) {
-        if !matches!(self.form, Form::Json) {
+        if !self.is_verbose && !matches!(self.form, Form::Json) {
             self.note(what);
         }
         self.status(what);
@@ -172,6 +184,23 @@ impl Drop for ProgressReporter {
             bar.finish_and_clear();
         }
     }
+}
+
+/// Whether the user's terminal takes the escape sequences of a bar: https://no-color.org, and terminals that only print.
+fn takes_escapes() -> bool {
+    let is_plain = std::env::var_os("TERM").is_some_and(|kind| kind == "dumb");
+    !is_plain && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
+}
+
+/// What decides how work is divided.
+fn abilities(facts: &DeviceFacts) -> String {
+    let DeviceFacts { kind, vulkan, subgroup_size, work_group_size, usable_memory_bytes, device_memory_bytes, .. } = facts;
+    let mebibytes = |bytes: &u64| bytes >> 20;
+    let atomics = if facts.int64_atomics { "64-bit atomics" } else { "no 64-bit atomics" };
+    let [usable, all] = [usable_memory_bytes, device_memory_bytes].map(mebibytes);
+    format!(
+        "device: {kind}, Vulkan {vulkan}, subgroups of {subgroup_size}, work groups up to {work_group_size}, {atomics}, {usable} of {all} MiB"
+    )
 }
 
 fn style(template: &str) -> ProgressStyle {

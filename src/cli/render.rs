@@ -140,7 +140,7 @@ impl RenderArgs {
             free: self.picture.transport.free(&self.request()),
             chosen: None,
             save_settings: None,
-            explain: self.messages.explain,
+            explain: self.messages.explains(),
             point: "pixel",
         }
     }
@@ -266,7 +266,7 @@ pub(super) fn run(args: &RenderArgs, typed: &Typed, cancelled: &AtomicBool) -> R
         complain(&format!("warning: {error}"));
     }
 
-    let text = scene_report::text(&scene.name, &lit, job.point, args.messages.explain);
+    let text = scene_report::text(&scene.name, &lit, job.point, args.messages.explains());
     let mut files = Vec::new();
     let mut shown = String::new();
     if let (Some(picture), Some(format), Some(output)) = (&picture, format, output) {

@@ -11,8 +11,8 @@ use crate::text::quoted;
 const WITHOUT_EFFECT: [&str; 6] = ["Output", "Messages", "Checks", "Device", "When to stop", "Implementation"];
 /// Options under them that do change the file.
 const WITH_EFFECT: [&str; 9] = ["exposure", "tone", "layers", "denoise", "measure", "confidence", "math", "sums", "gather"];
-/// The option under another heading in whose place the metadata has what came of it.
-const ROUNDS: &str = "rounds";
+/// Options under other headings in whose place the metadata has what came of them.
+const IN_FORCE: [&str; 3] = ["rounds", "config", "print_config"];
 /// The same of scenes.
 const REPLACED: [&str; 8] =
     ["settings", "save_settings", "samples", "shadow_rays", "photons", "caustic_photons", "neighbours", "caustic_neighbours"];
@@ -23,6 +23,37 @@ struct Argument {
     option: Option<String>,
     /// `None` of a switch.
     value: Option<String>,
+}
+
+/// The innermost command of a command line: `map info` of `photonmill map info FILE`.
+pub(super) struct Selected<'a> {
+    /// The commands' names; none for the paper's box.
+    pub(super) path: Vec<&'a str>,
+    pub(super) matches: &'a ArgMatches,
+    pub(super) command: &'a Command,
+}
+
+impl<'a> Selected<'a> {
+    pub(super) fn of(matches: &'a ArgMatches, command: &'a Command) -> Selected<'a> {
+        let mut selected = Selected { path: Vec::new(), matches, command };
+        while let Some((name, matches)) = selected.matches.subcommand() {
+            selected.path.push(name);
+            let command = selected.command.find_subcommand(name).unwrap_or(selected.command);
+            selected = Selected { path: selected.path, matches, command };
+        }
+        selected
+    }
+
+    /// Arguments that the user gave, in the order of the help.
+    pub(super) fn typed(&self) -> impl Iterator<Item = &'a Arg> {
+        let matches = self.matches;
+        self.command.get_arguments().filter(move |argument| was_typed(matches, argument))
+    }
+}
+
+pub(super) fn was_typed(matches: &ArgMatches, argument: &Arg) -> bool {
+    matches!(matches.try_get_raw(argument.get_id().as_str()), Ok(Some(_)))
+        && matches.value_source(argument.get_id().as_str()) == Some(ValueSource::CommandLine)
 }
 
 /// Of one command.
@@ -36,16 +67,14 @@ pub(super) struct Typed {
 fn is_kept(argument: &Arg, is_of_box: bool) -> bool {
     let id = argument.get_id().as_str();
     let is_under = argument.get_help_heading().is_some_and(|heading| WITHOUT_EFFECT.contains(&heading));
-    (!is_under || WITH_EFFECT.contains(&id)) && id != ROUNDS && (is_of_box || !REPLACED.contains(&id))
+    (!is_under || WITH_EFFECT.contains(&id)) && !IN_FORCE.contains(&id) && (is_of_box || !REPLACED.contains(&id))
 }
 
 impl Typed {
     pub(super) fn of(matches: &ArgMatches, command: &Command) -> Typed {
-        let (name, matches, command) = match matches.subcommand() {
-            Some((name, inner)) => (name, inner, command.find_subcommand(name).unwrap_or(command)),
-            None => ("", matches, command),
-        };
-        let was_typed = |argument: &&Arg| matches.value_source(argument.get_id().as_str()) == Some(ValueSource::CommandLine);
+        let selected = Selected::of(matches, command);
+        let name = selected.path.join(" ");
+        let matches = selected.matches;
         let of_argument = |argument: &Arg| -> Vec<Argument> {
             let values = matches.get_raw(argument.get_id().as_str()).into_iter().flatten();
             let values: Vec<String> = values.map(|value| value.to_string_lossy().into_owned()).collect();
@@ -57,11 +86,11 @@ impl Typed {
                 None => values.into_iter().map(|value| Argument { option: None, value: Some(value) }).collect(),
             }
         };
-        let known = command.get_arguments().filter(|argument| is_kept(argument, name.is_empty())).filter(was_typed);
+        let known = selected.typed().filter(|argument| is_kept(argument, name.is_empty()));
         let mut arguments: Vec<Argument> = known.flat_map(of_argument).collect();
         // The scene first.
         arguments.sort_by_key(|argument| argument.option.is_some());
-        Typed { command: name.to_owned(), arguments }
+        Typed { command: name, arguments }
     }
 
     /// Whether it has this option, of those that decide pixels.

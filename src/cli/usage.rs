@@ -3,9 +3,9 @@
 use std::ffi::OsString;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
-use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Command};
 
+use super::typed::{Selected, was_typed};
 use crate::error::Error;
 use crate::output::words::list;
 use crate::scene::built_in;
@@ -91,15 +91,12 @@ fn scene_without_command(name: &str) -> Option<String> {
 /// `--confidence 0.95`, in which nobody finds the fault.
 pub(super) fn as_typed(error: Error, matches: &ArgMatches, command: &Command) -> Error {
     let Error::Setting { option, value, allowed } = error else { return error };
-    let (matches, command) = match matches.subcommand() {
-        Some((name, inner)) => (inner, command.find_subcommand(name).unwrap_or(command)),
-        None => (matches, command),
-    };
+    let Selected { matches, command, .. } = Selected::of(matches, command);
     let argument = command
         .get_arguments()
         .filter(|argument| argument.get_long().is_some_and(|long| option.strip_prefix("--") == Some(long)))
         .find(|argument| argument.get_action().takes_values())
-        .filter(|argument| matches.value_source(argument.get_id().as_str()) == Some(ValueSource::CommandLine));
+        .filter(|argument| was_typed(matches, argument));
     let typed: Vec<_> = argument.and_then(|argument| matches.get_raw(argument.get_id().as_str())).into_iter().flatten().collect();
     // Of a list, the value already is the entry in question.
     let value = if let [typed] = typed[..] { typed.to_string_lossy().into_owned() } else { value };

@@ -9,7 +9,7 @@ use winit::window::Window;
 
 use super::kernels::MAX_BUFFERS;
 use super::window::instance_extensions;
-use super::{call, validation::Messages};
+use super::{call, platform, validation::Messages};
 use crate::error::{Error, Result};
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
@@ -47,6 +47,9 @@ pub struct DeviceFacts {
     pub votes_in_loops: bool,
     /// What the device lacks of what every kernel needs; empty if it can be used.
     pub lacks: Vec<String>,
+    /// Extensions that this platform wants enabled.
+    #[serde(skip)]
+    pub(super) of_platform: Vec<&'static CStr>,
     #[serde(skip)]
     pub(super) queue_family: u32,
     #[serde(skip)]
@@ -84,23 +87,24 @@ pub(super) struct Loaded {
 /// Loads the Vulkan loader at run time and makes an instance.
 pub(super) fn instance(validate: bool, window: Option<&Arc<Window>>) -> Result<Loaded> {
     let no_vulkan = |reason: String| Error::NoVulkan { reason };
-    // SAFETY: the loader is the system's own library; its initialisers are trusted.
-    let entry = unsafe { ash::Entry::load() }.map_err(|_| no_vulkan("the Vulkan loader (libvulkan) is not installed".into()))?;
+    let entry = platform::load().map_err(|_| no_vulkan(platform::NO_LOADER.into()))?;
     let app = vk::ApplicationInfo::default().application_name(c"photonmill").api_version(vk::API_VERSION_1_3);
 
     let mut layers = Vec::new();
-    let mut extensions = window.map_or(Ok(&[][..]), |window| instance_extensions(window))?.to_vec();
+    // SAFETY: plain enumeration.
+    let present = unsafe { entry.enumerate_instance_extension_properties(None) }.unwrap_or_default();
+    let (extensions, flags) = platform::instance(&present);
+    let mut extensions: Vec<_> = extensions.into_iter().map(CStr::as_ptr).collect();
+    extensions.extend(window.map_or(Ok(&[][..]), |window| instance_extensions(window))?);
     if validate {
         // SAFETY: plain enumeration.
-        let present = call("vkEnumerateInstanceLayerProperties", || unsafe { entry.enumerate_instance_layer_properties() })?;
-        if !present.iter().any(|layer| layer.layer_name_as_c_str() == Ok(VALIDATION_LAYER)) {
+        let layers_present = call("vkEnumerateInstanceLayerProperties", || unsafe { entry.enumerate_instance_layer_properties() })?;
+        if !layers_present.iter().any(|layer| layer.layer_name_as_c_str() == Ok(VALIDATION_LAYER)) {
             return Err(Error::NoValidationLayer);
         }
         layers.push(VALIDATION_LAYER.as_ptr());
         extensions.push(ash::ext::validation_features::NAME.as_ptr());
     }
-    // SAFETY: plain enumeration.
-    let present = unsafe { entry.enumerate_instance_extension_properties(None) }.unwrap_or_default();
     let has = |name: &CStr| present.iter().any(|extension| extension.extension_name_as_c_str() == Ok(name));
     // The validation layer brings it where nothing else does.
     let has_labels = validate || has(ash::ext::debug_utils::NAME);
@@ -109,8 +113,8 @@ pub(super) fn instance(validate: bool, window: Option<&Arc<Window>>) -> Result<L
     }
     let synchronisation = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
     let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&synchronisation);
-    let mut info =
-        vk::InstanceCreateInfo::default().application_info(&app).enabled_layer_names(&layers).enabled_extension_names(&extensions);
+    let info = vk::InstanceCreateInfo::default().flags(flags).application_info(&app);
+    let mut info = info.enabled_layer_names(&layers).enabled_extension_names(&extensions);
     if validate {
         info = info.push_next(&mut features);
     }
@@ -189,14 +193,16 @@ fn facts(instance: &ash::Instance, device: vk::PhysicalDevice, index: usize) -> 
     let mut f13 = vk::PhysicalDeviceVulkan13Features::default();
     let mut maximal = vk::PhysicalDeviceShaderMaximalReconvergenceFeaturesKHR::default();
     let mut uniform = vk::PhysicalDeviceShaderSubgroupUniformControlFlowFeaturesKHR::default();
+    let of_platform;
     // SAFETY: the device belongs to the instance; only a 1.3 device fills the 1.3 structs, and they
     // are chained only for one.
     let (properties, features, families, memory) = unsafe {
         let extensions = instance.enumerate_device_extension_properties(device).unwrap_or_default();
-        let has = |name: &CStr| extensions.iter().any(|extension| extension.extension_name_as_c_str() == Ok(name));
+        let has = |name: &CStr| platform::has(&extensions, name);
         let version = instance.get_physical_device_properties(device).api_version;
         let mut properties = vk::PhysicalDeviceProperties2::default();
         let mut features = vk::PhysicalDeviceFeatures2::default();
+        of_platform = platform::device(&extensions);
         if version >= vk::API_VERSION_1_3 {
             properties = properties.push_next(&mut v11).push_next(&mut v12).push_next(&mut v13);
             features = features.push_next(&mut f12).push_next(&mut f13);
@@ -280,6 +286,7 @@ fn facts(instance: &ash::Instance, device: vk::PhysicalDevice, index: usize) -> 
         },
         votes_in_loops: false,
         lacks,
+        of_platform,
         queue_family: queue_family.unwrap_or(0),
         pipeline_cache_id: properties.pipeline_cache_uuid.iter().map(|byte| format!("{byte:02x}")).collect(),
     }
@@ -298,14 +305,13 @@ pub(super) fn create(
     let mut v13 = vk::PhysicalDeviceVulkan13Features::default().synchronization2(true).maintenance4(true).dynamic_rendering(presents);
     let mut maximal = vk::PhysicalDeviceShaderMaximalReconvergenceFeaturesKHR::default().shader_maximal_reconvergence(true);
     let mut uniform = vk::PhysicalDeviceShaderSubgroupUniformControlFlowFeaturesKHR::default().shader_subgroup_uniform_control_flow(true);
-    let mut extensions = match facts.reconvergence {
-        Reconvergence::Maximal => vec![ash::khr::shader_maximal_reconvergence::NAME.as_ptr()],
-        Reconvergence::UniformControlFlow => vec![ash::khr::shader_subgroup_uniform_control_flow::NAME.as_ptr()],
-        Reconvergence::None => Vec::new(),
+    let of_lanes = match facts.reconvergence {
+        Reconvergence::Maximal => Some(ash::khr::shader_maximal_reconvergence::NAME),
+        Reconvergence::UniformControlFlow => Some(ash::khr::shader_subgroup_uniform_control_flow::NAME),
+        Reconvergence::None => None,
     };
-    if presents {
-        extensions.push(ash::khr::swapchain::NAME.as_ptr());
-    }
+    let of_window = presents.then_some(ash::khr::swapchain::NAME);
+    let extensions: Vec<_> = of_lanes.into_iter().chain(of_window).chain(facts.of_platform.iter().copied()).map(CStr::as_ptr).collect();
     let mut info = vk::DeviceCreateInfo::default()
         .queue_create_infos(&queues)
         .enabled_features(&features)

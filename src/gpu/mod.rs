@@ -11,6 +11,7 @@ pub mod kernel;
 mod labels;
 mod mapped_file;
 mod pace;
+mod platform;
 mod reconvergence;
 mod specialize;
 pub mod timestamps;

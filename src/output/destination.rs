@@ -217,7 +217,7 @@ impl Staged {
             file.as_file().sync_all().map_err(|error| (error, None))?;
             file.persist(&target).map_err(|refused| (refused.error, Some(refused.file)))?;
             // The new name too.
-            File::open(parent(&target)).and_then(|folder| folder.sync_all()).map_err(|error| (error, None))
+            sync_folder(parent(&target)).map_err(|error| (error, None))
         };
         let finished = finish().map_err(|(error, file)| match file.filter(|_| saves).map(|file| elsewhere(&destination, file)) {
             Some(Ok(folder)) => destination.saved(&error, folder),
@@ -226,6 +226,11 @@ impl Staged {
         STAGED.lock().unwrap_or_else(PoisonError::into_inner).take();
         finished
     }
+}
+
+/// Names on the disk; Windows opens no folders, and writes them with the file.
+fn sync_folder(folder: &Path) -> std::io::Result<()> {
+    if cfg!(windows) { Ok(()) } else { File::open(folder)?.sync_all() }
 }
 
 /// Copies a file that is whole, and whose folder is gone, into a new folder.

@@ -93,6 +93,10 @@ impl Scene {
         let path = Path::new(name);
         match path.extension().and_then(|extension| extension.to_str()).map(str::to_lowercase).as_deref() {
             Some("gltf" | "glb") => gltf::load(path, reading, progress),
+            _ if path.is_file() => {
+                let remedy = "must be a .gltf or .glb file; export it as glTF 2.0, in Blender by File > Export";
+                Err(Error::setting("SCENE", name, remedy))
+            }
             _ => {
                 let names = built_in::names();
                 let likeness = |known: &&str| strsim::jaro(known, name);

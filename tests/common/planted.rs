@@ -28,3 +28,14 @@ pub fn kernels(names: &[&str], file: &str, changes: &[(&str, &str)]) -> Vec<(Str
     };
     names.iter().map(compile).collect()
 }
+
+/// Every kernel of the sources as they are.
+pub fn all_kernels() -> Vec<(String, Vec<u32>)> {
+    let glsl = Path::new(env!("CARGO_MANIFEST_DIR")).join("glsl");
+    let compile = |source: &compile::Source| {
+        let compiled =
+            compile::compile(&glsl, source, constants::SHARED_WITH_GLSL, &|_, text| text).unwrap_or_else(|error| panic!("{error}"));
+        (source.name.clone(), compiled.words)
+    };
+    compile::sources(&glsl).iter().map(compile).collect()
+}

@@ -38,7 +38,17 @@ pub(super) struct Parts<'a> {
 }
 
 pub(super) fn parts(content: &[u8]) -> Result<Parts<'_>, String> {
+    if content.is_empty() {
+        return Err("is empty; export it again".to_owned());
+    }
     if !content.starts_with(b"glTF") {
+        // JSON begins with a bracket, after a byte order mark perhaps.
+        let start = content.strip_prefix(b"\xef\xbb\xbf").unwrap_or(content).trim_ascii_start();
+        if !start.starts_with(b"{") {
+            let git =
+                if content.starts_with(b"version https://git-lfs") { "; git lfs pull fetches the file that it stands for" } else { "" };
+            return Err(format!("is no glTF, neither JSON nor binary{git}"));
+        }
         return Ok(Parts { json: Cow::Borrowed(content), binary: None });
     }
     binary_length(content)?;
@@ -152,7 +162,12 @@ fn allowed(path: &str, member: &str) -> Option<String> {
 fn binary_length(content: &[u8]) -> Result<(), String> {
     let announced = content.get(8..12).map_or(0, |bytes| u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]) as usize);
     if announced != content.len() {
-        return Err(format!("announces {announced} bytes and has {}", content.len()));
+        let fault = if content.len() < announced {
+            "was cut off: copy or download it again"
+        } else {
+            "has something behind its end: export it again"
+        };
+        return Err(format!("announces {announced} bytes and has {}; it {fault}", content.len()));
     }
     Ok(())
 }

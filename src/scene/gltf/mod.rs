@@ -212,7 +212,8 @@ fn read_uri(path: &Path, uri: &str) -> std::result::Result<Vec<u8>, String> {
     if leaves_folder(Path::new(&name)) || leads_out() {
         return Err(format!("lies at {uri}, outside the scene's folder, and is not read; copy it into that folder"));
     }
-    read_file(&place).map_err(|reason| format!("lies at {uri}, which {reason}"))
+    read_file(&place)
+        .map_err(|reason| format!("lies at {uri}, which {reason}; copy it along with the scene, or export a .glb, which holds everything"))
 }
 
 /// A name without line breaks and other control characters, nor those that are not seen and change the order of what is.

@@ -1,0 +1,63 @@
+//! The packed crate: SPIR-V of every kernel, from the sources beside it, and no shaderc by default.
+
+use std::fs;
+use std::process::Command;
+
+use crate::common::planted::all_kernels;
+use crate::common::prelude::*;
+use crate::common::program::entries;
+use crate::common::sources::{files, root};
+
+/// The crate as it is unpacked.
+fn packed(folder: &Path) -> PathBuf {
+    let spirv = Path::new(env!("OUT_DIR")).join("spirv");
+    let mut package = Command::new(root("tools/package"));
+    // Whatever cargo builds is here already.
+    let package =
+        package.arg(folder).env("PHOTONMILL_SPIRV", spirv).env("CARGO_NET_OFFLINE", "true").output().expect("tools/package starts");
+    assert!(package.status.success(), "{}", text(&package.stderr));
+    let name = format!("photonmill-{}", env!("CARGO_PKG_VERSION"));
+    let file = folder.join(format!("{name}.crate"));
+    // What crates.io takes.
+    assert!(fs::metadata(&file).unwrap().len() < 10 << 20, "{} bytes", fs::metadata(&file).unwrap().len());
+    let tar = Command::new("tar").arg("xzf").arg(&file).arg("-C").arg(folder).output().expect("tar starts");
+    assert!(tar.status.success(), "{}", text(&tar.stderr));
+    folder.join(name)
+}
+
+/// Compares the SPIR-V of an unpacked crate with what its sources are compiled to.
+fn check(folder: &Path, compiled: &[(String, Vec<u32>)]) -> Check {
+    let prebuilt = folder.join("glsl/prebuilt");
+    let wanted: BTreeSet<String> = compiled.iter().map(|(name, _)| format!("{name}.spv")).chain(["kernels.txt".to_owned()]).collect();
+    let there: BTreeSet<String> = entries(&prebuilt).into_iter().collect();
+    require(wanted == there, || format!("{:?} differ", wanted.symmetric_difference(&there)))?;
+    for (name, words) in compiled {
+        let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+        require(fs::read(prebuilt.join(format!("{name}.spv"))).unwrap() == bytes, || format!("{name} is of other sources"))?;
+    }
+    for (path, source) in files("glsl", &[".glsl", ".comp", ".rs"]).into_iter().chain(files("src", &[".rs"])) {
+        require(fs::read_to_string(folder.join(&path)).is_ok_and(|packed| packed == source), || format!("{path} differs"))?;
+    }
+    Ok(())
+}
+
+#[test]
+fn the_packed_crate_has_the_spirv_of_its_sources() {
+    let place = Place::new();
+    let folder = packed(place.path());
+    let compiled = all_kernels();
+    assert!(compiled.len() > 50, "{} kernels", compiled.len());
+    assert_holds("the packed crate", check(&folder, &compiled));
+    let manifest = fs::read_to_string(folder.join("Cargo.toml")).unwrap();
+    assert!(manifest.contains("default = []"), "{manifest}");
+    let absent = [".ci", ".shaderc", "tests", "target"].into_iter().find(|name| folder.join(name).exists());
+    assert_eq!(absent, None);
+
+    let prebuilt = folder.join("glsl/prebuilt").join(format!("{}.spv", compiled[0].0));
+    let mut bytes = fs::read(&prebuilt).unwrap();
+    *bytes.last_mut().unwrap() ^= 1;
+    fs::write(&prebuilt, bytes).unwrap();
+    assert_complains("another kernel", check(&folder, &compiled));
+    fs::remove_file(&prebuilt).unwrap();
+    assert_complains("no kernel", check(&folder, &compiled));
+}
