@@ -52,7 +52,7 @@ fn a_moved_camera_sees_kept_photons_and_the_picture_of_its_own_run() {
     rounds(&mut own, 8);
     assert!(after == own.look().unwrap().0);
     assert_eq!(live.ledger(), own.ledger());
-    assert!(live.ledger().closes() && live.ledger().emitted == 8 * 2 << 10);
+    assert!(live.ledger().closes() && live.ledger().emitted == (8 * 2) << 10);
     assert!(before.of_blocks.sums != after.of_blocks.sums);
     // Back again, from kept photons alone.
     live.look_from(&first).unwrap();
@@ -107,7 +107,11 @@ fn the_window_has_the_values_of_the_film_and_the_codes_of_its_file() {
         assert!(if rounds > 1 { known_pixels > pixels / 2 } else { known_pixels == 0 }, "{known_pixels}");
     }
     let film = live.look().unwrap().0;
-    let colours = ColourPicture { width: SIZE[0], height: SIZE[1], pixels: film.means().map(|mean| mean.as_vec3()).collect() };
+    let colours = ColourPicture {
+        width: SIZE[0],
+        height: SIZE[1],
+        pixels: film.means().map(|mean| Vec3::new(mean.x as f32, mean.y as f32, mean.z as f32)).collect(),
+    };
     let stops = colours.usual_exposure();
     let of_file = png_codes(&colours.encode(Format::Png, stops, Tone::Neutral, None)).unwrap();
     for blue_first in [false, true] {

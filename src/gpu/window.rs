@@ -61,12 +61,10 @@ impl Surface {
         let has_swapchain = extensions.iter().any(|extension| extension.extension_name_as_c_str() == Ok(khr::swapchain::NAME));
         let does = |family: &u32| {
             let wanted = vk::QueueFlags::COMPUTE | vk::QueueFlags::GRAPHICS;
+            let functions = &self.functions;
             // SAFETY: device, family and surface belong together.
-            let presents = || {
-                call("vkGetPhysicalDeviceSurfaceSupportKHR", || unsafe {
-                    self.functions.get_physical_device_surface_support(physical, *family, self.raw)
-                })
-            };
+            let ask = || unsafe { functions.get_physical_device_surface_support(physical, *family, self.raw) };
+            let presents = || call("vkGetPhysicalDeviceSurfaceSupportKHR", ask);
             families[*family as usize].queue_flags.contains(wanted) && presents().unwrap_or(false)
         };
         (0..families.len() as u32)

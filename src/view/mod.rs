@@ -4,6 +4,7 @@
 mod camera;
 mod choices;
 mod events;
+mod live;
 mod panel;
 pub mod picture;
 mod session;

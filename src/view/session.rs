@@ -11,6 +11,7 @@ use glam::DVec3;
 use super::camera::MovingCamera;
 use super::choices::Choices;
 use super::events::Events;
+use super::live::{Live, Rate};
 use super::panel::{self, PHOTON_COLOURS, Requests, Status};
 use super::picture::{Exposure, Picture};
 use super::{Request, Subject};
@@ -20,13 +21,12 @@ use crate::engine::scene::{View, trial};
 use crate::error::Result;
 use crate::gpu::window::Presenter;
 use crate::gpu::{Commands, Gpu};
-use crate::output::colour::{ColourPicture, png_of_codes};
+use crate::output::colour::png_of_codes;
 use crate::plan::scene::ScenePlan;
 use crate::plan::sensor::Sensor;
 use crate::scene::geometry::Geometry;
 use crate::scene::open_box::open_box;
 use crate::scene::{Camera, Lens, Projection};
-use crate::timings::{Row, Timings};
 
 /// How a run that was looked at ended.
 pub enum Next {
@@ -51,12 +51,6 @@ pub struct Session<'a> {
     said: Option<Instant>,
     files: u32,
     child: Option<(Child, PathBuf)>,
-}
-
-/// The two kinds of runs.
-enum Live<'a> {
-    Scene(LiveScene<'a>),
-    Room(Box<LiveRoom<'a>>),
 }
 
 /// Rounds are run for so long before the window is shown again.
@@ -123,7 +117,7 @@ impl<'a> Session<'a> {
                 let plan = trial::plan(self.gpu, scene, &view, &settings, sensor)?;
                 let live = LiveScene::new(self.gpu, &geometry, &self.camera.camera, &plan, self.request.cancelled)?;
                 self.take_plan(&plan, &geometry, choices);
-                self.frames(Live::Scene(live), &picture, events, presenter, choices)
+                self.frames(Live::Scene(Box::new(live)), &picture, events, presenter, choices)
             }
             Subject::Box(settings) => {
                 let settings = choices.run.of_box(settings);
@@ -401,125 +395,4 @@ fn camera_options(camera: &Camera) -> Vec<(&'static str, String)> {
 fn word_of([red, green, blue]: [u8; 3], blue_first: bool) -> u32 {
     let ordered = if blue_first { [blue, green, red, 255] } else { [red, green, blue, 255] };
     u32::from_le_bytes(ordered)
-}
-
-/// Rounds per second, over the last ones.
-#[derive(Default)]
-struct Rate {
-    since: Option<(Instant, u32)>,
-    per_second: f64,
-}
-
-impl Rate {
-    fn take(&mut self, rounds: u32) {
-        let (since, before) = *self.since.get_or_insert((Instant::now(), rounds));
-        let seconds = since.elapsed().as_secs_f64();
-        // A camera that moved has begun anew.
-        if rounds < before {
-            self.since = None;
-        } else if seconds >= 0.5 {
-            self.per_second = f64::from(rounds - before) / seconds;
-            self.since = Some((Instant::now(), rounds));
-        }
-    }
-}
-
-impl Status {
-    /// Takes what the latest round has left.
-    fn take(&mut self, live: &mut Live) {
-        self.ledger = match live {
-            Live::Scene(live) => live.ledger(),
-            Live::Room(live) => live.ledger(),
-        };
-        if let Live::Scene(live) = live {
-            (self.kept_rounds, self.kept_bytes) = live.kept();
-        }
-        let timings = live.take_timings();
-        let of_round = |row: &Row| row.name.strip_prefix("round").map(str::to_owned);
-        let rounds = timings.row("round").map_or(1, |row| row.count.max(1)) as f64;
-        let passes: Vec<(String, usize, f64)> = timings
-            .rows()
-            .iter()
-            .filter_map(|row| Some((of_round(row)?, row.gpu_ms.or(row.wall_ms)? / rounds)))
-            .map(|(path, ms)| {
-                let depth = path.matches('/').count();
-                (path.rsplit('/').next().filter(|name| !name.is_empty()).unwrap_or("round").to_owned(), depth, ms)
-            })
-            .collect();
-        if !passes.is_empty() {
-            self.passes = passes;
-        }
-    }
-}
-
-/// What a look at the film tells.
-pub struct Look {
-    pub noise: f64,
-    pub bias: Option<f64>,
-    pub mean: f64,
-    /// The exposure that a picture file would have.
-    pub stops: f32,
-}
-
-impl<'a> Live<'a> {
-    /// One more round; whether there are more.
-    fn round(&mut self) -> Result<bool> {
-        match self {
-            Live::Scene(live) => live.round()?,
-            Live::Room(live) => live.round()?,
-        }
-        Ok(!self.has_ended())
-    }
-
-    fn has_ended(&self) -> bool {
-        match self {
-            Live::Scene(live) => live.has_ended(),
-            Live::Room(live) => live.has_ended(),
-        }
-    }
-
-    fn rounds(&self) -> u32 {
-        match self {
-            Live::Scene(live) => live.rounds(),
-            Live::Room(live) => live.rounds(),
-        }
-    }
-
-    fn take_timings(&mut self) -> Timings {
-        match self {
-            Live::Scene(live) => live.take_timings(),
-            Live::Room(live) => live.take_timings(),
-        }
-    }
-
-    /// The room's light is on its walls, whoever looks.
-    fn look_from(&mut self, camera: &Camera) -> Result<()> {
-        match self {
-            Live::Scene(live) => live.look_from(camera),
-            Live::Room(_) => Ok(()),
-        }
-    }
-
-    fn commands(&mut self) -> &mut Commands<'a> {
-        match self {
-            Live::Scene(live) => live.commands(),
-            Live::Room(live) => live.commands(),
-        }
-    }
-
-    fn look(&mut self) -> Result<Look> {
-        match self {
-            Live::Scene(live) => {
-                let (film, error) = live.look()?;
-                let pixels: Vec<glam::Vec3> = film.means().map(|mean| mean.as_vec3()).collect();
-                let mean = film.surface_means().map(|mean| mean.element_sum() / 3.0).sum::<f64>() / pixels.len().max(1) as f64;
-                let picture = ColourPicture { width: pixels.len() as u32, height: 1, pixels };
-                Ok(Look { noise: error.noise, bias: error.bias.map(|bias| bias.relative), mean, stops: picture.usual_exposure() })
-            }
-            Live::Room(live) => {
-                let (noise, mean) = live.look()?;
-                Ok(Look { noise, bias: None, mean, stops: 0.0 })
-            }
-        }
-    }
 }
