@@ -184,7 +184,7 @@ fn rust_type(glsl: &str) -> &str {
 }
 
 /// Charts and pictures of the guide.
-const CHARTS: [&str; 11] = [
+const CHARTS: [&str; 12] = [
     "tools/study/open-box-main.svg",
     "tools/study/open-box-radius.svg",
     "tools/study/open-box-paper.svg",
@@ -196,6 +196,7 @@ const CHARTS: [&str; 11] = [
     "tools/bench/h200-scale/scale-triangles.svg",
     "src/guide/sunlit-room.png",
     "src/guide/dispersion.png",
+    "src/guide/window.png",
 ];
 
 /// Markdown that defines a link for each chart, named as its file. The link is the chart itself, as rustdoc keeps no files

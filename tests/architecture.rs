@@ -41,7 +41,7 @@ const LINE: &[&[&str]] = &[
     &["measure::interval"],
     &["measure::paper"],
     &["measure::study"],
-    &["measure::bench", "measure::gallery", "render"],
+    &["measure::bench", "measure::gallery", "render", "view"],
     &["cli"],
     &["main", "lib"],
 ];

@@ -99,7 +99,7 @@ fn bad_input_is_refused_in_one_line() {
         ("paper", ["--out", "required", "photonmill paper -o paper"]),
         ("render cornell", ["required", "--output <FILE>", "photonmill render cornell-spheres -o picture.png"]),
         ("render", ["--output <FILE> and <SCENE>", "photonmill render cornell-spheres", "-o picture.png"]),
-        ("--size 64", ["--size", "is an option of render, plan and gallery;", "photonmill render --help"]),
+        ("--size 64", ["--size", "is an option of render, view, plan and gallery;", "photonmill render --help"]),
         ("devices --points p", ["--points", "is an option of probe", "--help"]),
         ("render cornell -o a.png --mesh 8", ["--mesh", "is an option of photonmill without a command", "photonmill --help"]),
         ("render absent.glb -o a.png", ["photonmill: absent.glb: the file cannot be read", "no such file", ""]),

@@ -67,7 +67,8 @@ const NOT_RUN: [(&str, &str); 17] = [
 ];
 
 /// Commands of which only the options are checked, and why.
-const PARSED: [(&str, &str); 6] = [
+const PARSED: [(&str, &str); 7] = [
+    ("photonmill view ", "opens a window; `tests/view.rs` has a display for it"),
     ("photonmill render scene.glb -o picture.exr --display ", "needs a viewer; `tests/display.rs` has one"),
     ("photonmill render scene.glb -o picture.exr --denoise", "needs Open Image Denoise; `tests/denoise.rs` has something in its place"),
     ("photonmill gallery ", "makes pipelines for every picture; `tests/gallery.rs` runs it"),

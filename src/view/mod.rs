@@ -44,6 +44,8 @@ pub struct Request<'a> {
 /// Pixels of a window that nobody has given another size, and its width over height where the camera does not say.
 const WINDOW_HEIGHT: u32 = 768;
 const USUAL_ASPECT: f64 = 4.0 / 3.0;
+/// In a narrower window the panel would hide the picture: it opens by its key.
+const PANEL_WINDOW: u32 = 600;
 /// Along each side of a pixel of the picture, where a CPU computes it.
 const ZOOM_OF_CPU: u32 = 4;
 
@@ -71,7 +73,8 @@ pub fn run(request: Request) -> Result<()> {
     let zoom = if is_slow && request.size.is_none() { ZOOM_OF_CPU } else { 1 };
     let mut presenter = Presenter::new(&gpu)?;
     let run = RunChoices::of(&request.subject, request.photons, gpu.facts().kind);
-    let mut choices = Choices { shows: crate::constants::SHOW_ALL, stops: 0.0, has_photons: false, is_open: true, zoom, run };
+    let mut choices =
+        Choices { shows: crate::constants::SHOW_ALL, stops: 0.0, has_photons: false, is_open: window[0] >= PANEL_WINDOW, zoom, run };
     let mut session = Session::new(&gpu, &request, interface, name);
     // What worked last, where a change does not.
     let mut last: Option<Choices> = None;
