@@ -319,7 +319,8 @@ fn tables_and_json_tell_one_plan_with_a_row_an_effect() {
 }
 
 /// Photons and bytes of a trace's spans, and their rates, against the ledgers of the run.
-fn assert_trace_counts(trace: &Value, ledgers: &Value) {
+fn assert_trace_counts(trace: &Value, report: &Value) {
+    let ledgers = &report["ledgers"];
     let spans: Vec<&Value> = trace["traceEvents"].as_array().unwrap().iter().filter(|event| event["ph"] == "X").collect();
     let sum = |path: &str, count: &str| -> u64 {
         let of_path = spans.iter().filter(|span| span["args"]["path"] == path);
@@ -332,12 +333,17 @@ fn assert_trace_counts(trace: &Value, ledgers: &Value) {
         }
         // Each grid of a map has all of its photons.
         let sorted = ["/index", "/index/count", "/index/sort", "/gather"].map(|pass| sum(&format!("round/{map}{pass}"), "stored_photons"));
+        // Where photons are traced to their end in one go, only the device knows how many are in a map.
+        if sorted == [0; 4] && !report["device"].as_str().unwrap().contains("llvmpipe") {
+            continue;
+        }
         let grids = sorted[0] / ledger("stored").max(1);
         assert!(sorted == [grids * ledger("stored"); 4] && (1..=RADIUS_CLASSES.into()).contains(&grids), "{map}: {sorted:?}");
+        assert!(sum(&format!("round/{map}/gather"), "bytes") > 0, "{map}");
         // Two photons of 32 bytes, and a place.
         assert_eq!(sum(&format!("round/{map}/index/sort"), "bytes"), 68 * sorted[0]);
     }
-    let passes = ["set-up", "round", "round/visible points", "round/global/gather", "round/flux to radiance", "round/resolve"];
+    let passes = ["set-up", "round", "round/visible points", "round/flux to radiance", "round/resolve"];
     assert!(passes.iter().all(|pass| sum(pass, "bytes") > 0), "{passes:?}: {:?}", passes.map(|pass| sum(pass, "bytes")));
     for span in spans {
         let (arguments, microseconds) = (&span["args"], span["dur"].as_f64().unwrap());
@@ -386,7 +392,7 @@ fn a_run_explains_itself_and_its_report_closes() {
     let shares = ["direct", "specular-chains", "refractive-caustics", "indirect"];
     let share = |name: &str| effects.iter().find(|row| row["effect"] == name).unwrap()["share"].as_f64().unwrap();
     assert!((shares.iter().map(|name| share(name)).sum::<f64>() - 1.0).abs() < 1e-9, "{effects:?}");
-    assert_trace_counts(&place.json("t.json"), &report["ledgers"]);
+    assert_trace_counts(&place.json("t.json"), &report);
 
     // What is not asked for is not told; one round knows no error and still is JSON.
     let (stdout, _) = place.succeed("render cornell --size 4x4 --photons 10 --rounds 1 --bounces 9 --paranoid -o a.png --json b.json");
