@@ -344,6 +344,28 @@ fn the_box_is_viewed_and_escape_closes_its_window() {
     assert!(status.success(), "{}", text(&program.wait_with_output().unwrap().stderr));
 }
 
+#[test]
+fn what_a_window_cannot_do_is_refused_before_it_opens() {
+    if no_gpu() {
+        return;
+    }
+    let place = Place::new();
+    place.assert_refused([
+        ("view box --eye 0,0,3", ["--eye", "is an option of scenes"]),
+        ("view box --without direct", ["--without", "is an option of scenes"]),
+        ("view cornell --error nan", ["--error", "must be"]),
+        ("view box --time 0s", ["--time", "must be"]),
+        ("view cornell --eye 1e30,0,0", ["--eye", "from -1e12 to 1e12"]),
+        ("view cornell --eye 0,1,0 --look-at 0,1,0", ["--look-at", "must not be where --eye is"]),
+        ("view cornell --up 0,0,0", ["--up", "must be a direction"]),
+        ("view cornell --fov 180", ["--fov", "at most 179"]),
+        ("view cornell --orthographic 0", ["--orthographic", "above 0"]),
+    ]);
+    // A camera behind a wall.
+    let (_, said) = place.succeed("render cornell -o black.png --size 8x6 --photons 500 --rounds 4 --eye 0,20,3 --look-at 0,30,0");
+    assert!(said.contains("the picture is black"), "{said}");
+}
+
 /// One clear line where there is no display, and where the device cannot show anything on it.
 #[test]
 fn a_window_that_cannot_be_is_refused_in_one_line() {

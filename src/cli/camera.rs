@@ -50,10 +50,11 @@ const MOST_METRES: f64 = 1e12;
 
 fn parse_point(text: &str) -> std::result::Result<DVec3, String> {
     let point = parse_numbers::<f64, 3>(text).map(DVec3::from_array);
+    let is_allowed = |point: &DVec3| point.is_finite() && point.abs().max_element() <= MOST_METRES;
     point
         .ok()
-        .filter(|point| point.is_finite() && point.abs().max_element() <= MOST_METRES)
-        .ok_or_else(|| "must be three numbers with commas between them".into())
+        .filter(is_allowed)
+        .ok_or_else(|| format!("must be three numbers with commas between them, each from -{MOST_METRES:e} to {MOST_METRES:e}"))
 }
 
 impl CameraArgs {

@@ -266,6 +266,11 @@ pub(super) fn run(args: &RenderArgs, typed: &Typed, cancelled: &AtomicBool) -> R
         complain(&format!("warning: {error}"));
     }
 
+    if lit.film.sums.iter().all(|sum| *sum == 0) {
+        complain(
+            "warning: the picture is black: the camera sees nothing that is lit; is it outside of the scene, behind a wall, or does it look away?",
+        );
+    }
     let text = scene_report::text(&scene.name, &lit, job.point, args.messages.explains());
     let mut files = Vec::new();
     let mut shown = String::new();

@@ -11,8 +11,8 @@ use super::scene::{PhotonArgs, SceneArgs, settings};
 use super::typed::Typed;
 use super::values::{BuilderArg, builder_parser, parse_percent, parse_seconds};
 use super::{DeviceArgs, End};
-use crate::error::Result;
-use crate::settings::scene::SceneSettings;
+use crate::error::{Error, Result};
+use crate::settings::scene::{SceneSettings, Stop};
 use crate::settings::{Builder, RoomSettings};
 use crate::view::{self, Request, Subject};
 
@@ -47,23 +47,41 @@ const BOX: &str = "box";
 const SAID_ANEW: [&str; 11] =
     ["--camera", "--eye", "--look-at", "--up", "--fov", "--orthographic", "--size", "--aperture", "--focus", "--without", "--variant"];
 
+/// Options that decide how the paper's box is lit here; it has more of them without a window.
+const OF_BOX: [&str; 3] = ["--photons", "--seed", "--size"];
+
+/// Refuses what would have no effect.
+fn check_box(typed: &Typed) -> Result<()> {
+    let words = typed.words();
+    let of_scenes = words.iter().filter(|word| word.starts_with("--")).find(|word| !OF_BOX.contains(&option_of(word)));
+    let Some(word) = of_scenes else { return Ok(()) };
+    let (option, value) = word.split_once('=').unwrap_or((word, "on"));
+    let allowed = "is an option of scenes; in a window the paper's box takes --photons, --seed, --size and --variant";
+    Err(Error::Setting { option: option.to_owned().leak(), value: value.to_owned(), allowed: allowed.to_owned() })
+}
+
+fn option_of(word: &str) -> &str {
+    word.split('=').next().unwrap_or_default()
+}
+
 pub(super) fn run(args: &ViewArgs, typed: &Typed, cancelled: &AtomicBool) -> Result<End> {
     let reporter = ProgressReporter::new(&args.progress);
     let is_box = args.scene.scene == BOX;
     let builder = args.variant.flatten();
+    let stop = Stop { error: args.error, seconds: args.time, ..Stop::default() };
+    if is_box {
+        check_box(typed)?;
+    }
     let (subject, size) = if is_box {
         let usual = RoomSettings::default();
-        let settings = RoomSettings {
-            builder: builder.unwrap_or(usual.builder),
-            photons: args.light.photons.unwrap_or(usual.photons),
-            seed: args.common.seed.unwrap_or(usual.seed),
-            ..usual
-        };
+        let settings = RoomSettings { builder: builder.unwrap_or(usual.builder), seed: args.common.seed.unwrap_or(usual.seed), ..usual };
+        let photons = args.light.photons.unwrap_or(settings.photons);
+        RoomSettings { stop, photons, ..settings.clone() }.validate()?;
         (Subject::Box(Box::new(settings)), args.camera.size_of_box(&reporter)?)
     } else {
         let chosen = args.light.chosen.open()?;
         let settings = SceneSettings { builder, ..settings(&args.light.request(&args.common), None, chosen.as_ref()) };
-        settings.validate()?;
+        SceneSettings { stop, ..settings.clone() }.validate()?;
         args.camera.check()?;
         let scene = args.scene.open(&reporter)?;
         let (camera, resolved) = args.camera.resolve(&scene, &reporter)?;
@@ -71,7 +89,7 @@ pub(super) fn run(args: &ViewArgs, typed: &Typed, cancelled: &AtomicBool) -> Res
         (subject, args.camera.size.map(|_| resolved))
     };
     reporter.finish();
-    let is_kept = |word: &String| !SAID_ANEW.contains(&word.split('=').next().unwrap_or_default());
+    let is_kept = |word: &String| !SAID_ANEW.contains(&option_of(word));
     let words = typed.words().into_iter().filter(is_kept).filter(|word| !is_box || word != BOX);
     let error = args.error.map(|error| format!("--error={}%", 100.0 * error));
     let time = args.time.map(|seconds| format!("--time={seconds}s"));

@@ -23,6 +23,8 @@ pub struct RunChoices {
     pub builder: Option<Builder>,
     /// Of the global map, per round; the caustic map has as many more or less as it had.
     pub photons: u32,
+    /// What a run has where nobody says; `None` where the user has typed a number.
+    usual_photons: Option<u32>,
     /// Of the usual radius; its square multiplies the photons that a radius holds.
     pub radius_factor: f64,
     pub without: Vec<Effect>,
@@ -44,7 +46,8 @@ impl RunChoices {
         };
         let is_slow = kind == "cpu" && matches!(subject, Subject::Scene { .. });
         let usual = if is_slow { own.min(PHOTONS_ON_CPU) } else { own };
-        RunChoices { builder, photons: photons.unwrap_or(usual), radius_factor: 1.0, without }
+        let usual_photons = photons.is_none().then_some(usual);
+        RunChoices { builder, photons: photons.unwrap_or(usual), usual_photons, radius_factor: 1.0, without }
     }
 
     pub fn toggle(&mut self, effect: Effect) {
@@ -98,6 +101,10 @@ impl RunChoices {
     pub fn options(&self, usual: &SceneSettings) -> Vec<(&'static str, String)> {
         let settings = self.of_scene(usual);
         let mut options: Vec<(&str, String)> = self.builder.map(|builder| ("--variant", builder.name().to_owned())).into_iter().collect();
+        if self.usual_photons != Some(self.photons) {
+            options.push(("--photons", settings.photons.to_string()));
+            options.push(("--caustic-photons", settings.caustic_photons.to_string()));
+        }
         if self.radius_factor != 1.0 {
             options.push(("--neighbours", settings.neighbours.to_string()));
             options.push(("--caustic-neighbours", settings.caustic_neighbours.to_string()));
@@ -108,16 +115,17 @@ impl RunChoices {
         options
     }
 
-    /// The same as options of the box, of so many rounds.
-    pub fn options_of_box(&self, usual: &RoomSettings, rounds: u32) -> Vec<(&'static str, String)> {
+    /// The same as options of the box, of so many rounds, where nothing else ends it.
+    pub fn options_of_box(&self, usual: &RoomSettings, rounds: Option<u32>) -> Vec<(&'static str, String)> {
         let settings = self.of_box(usual);
-        vec![
+        let rounds = rounds.map(|rounds| ("--rounds", rounds.max(1).to_string()));
+        let others = [
             ("--variant", settings.builder.name().to_owned()),
             ("--photons", settings.photons.to_string()),
-            ("--rounds", rounds.max(1).to_string()),
-            ("--radius", format!("{:.6}", settings.radius)),
-            ("--full-light", format!("{:.6}", settings.full_light)),
-        ]
+            ("--radius", settings.radius.to_string()),
+            ("--full-light", settings.full_light.to_string()),
+        ];
+        others.into_iter().chain(rounds).collect()
     }
 }
 
@@ -126,7 +134,7 @@ mod tests {
     use super::*;
 
     fn choices() -> RunChoices {
-        RunChoices { builder: None, photons: 1 << 13, radius_factor: 1.0, without: Vec::new() }
+        RunChoices { builder: None, photons: 1 << 13, usual_photons: Some(1 << 13), radius_factor: 1.0, without: Vec::new() }
     }
 
     #[test]
@@ -138,6 +146,15 @@ mod tests {
         run.toggle(Effect::Direct);
         assert_eq!(run, choices());
         assert_eq!(run.options(&SceneSettings::default()), []);
+    }
+
+    /// Fewer photons leave the box as bright.
+    #[test]
+    fn the_box_is_as_bright_with_other_photons() {
+        let of_box = RoomSettings::default();
+        let run = RunChoices::of(&Subject::Box(Box::new(of_box.clone())), Some(of_box.photons / 5), "cpu");
+        let settings = run.of_box(&of_box);
+        assert_eq!((settings.photons, settings.full_light), (of_box.photons / 5, of_box.full_light / 5.0));
     }
 
     /// A radius of twice the width holds four times the photons; light of the box stays as bright.

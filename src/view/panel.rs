@@ -177,7 +177,7 @@ fn settings(ui: &mut Ui, run: &mut RunChoices, status: &Status) {
     });
     // Each change is another run: it begins when the slider is let go.
     let mut photons = run.photons;
-    let slider = ui.add(Slider::new(&mut photons, 1 << 10..=1 << 24).logarithmic(true).text("photons per round"));
+    let slider = ui.add(Slider::new(&mut photons, 1..=1 << 24).logarithmic(true).text("photons per round"));
     if slider.drag_stopped() || slider.lost_focus() {
         run.photons = photons;
     }
@@ -188,7 +188,11 @@ fn settings(ui: &mut Ui, run: &mut RunChoices, status: &Status) {
             }
         }
         let radii: Vec<String> = status.radii.iter().flatten().map(|radius| format!("{radius:.4} m")).collect();
-        ui.label(if radii.is_empty() { "no map".to_owned() } else { format!("radius {}  ([ ])", radii.join(", ")) });
+        ui.label(if radii.is_empty() {
+            "no map".to_owned()
+        } else {
+            format!("radius x{:.2}: {}  ([ ])", run.radius_factor, radii.join(", "))
+        });
     });
     if !status.effects.is_empty() {
         ui.collapsing("Effects", |ui| {
@@ -242,7 +246,7 @@ fn keys(context: &Context, choices: &mut Choices, status: &Status, requests: &mu
                 choices.run.scale_radius(factor);
             }
         }
-        choices.has_photons ^= input.key_pressed(Key::P);
+        choices.has_photons ^= input.key_pressed(Key::P) && !status.is_box;
         choices.is_open ^= input.key_pressed(Key::H);
         requests.screenshot |= input.key_pressed(Key::F);
         requests.render |= input.key_pressed(Key::R);

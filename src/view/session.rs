@@ -143,7 +143,10 @@ impl<'a> Session<'a> {
         let mut commands = Commands::new(self.gpu, crate::gpu::Constants::new(64), Instant::now())?;
         commands.fill(&picture.pixels, 0, picture.pixels.count(), 0xff1c_1c1c);
         commands.submit()?;
-        self.interface_frame(events, presenter, picture, choices, true)?;
+        // egui measures what it has not drawn before, and draws it in the next frame.
+        for _ in 0..2 {
+            self.interface_frame(events, presenter, picture, choices, true)?;
+        }
         Ok(())
     }
 
@@ -203,6 +206,9 @@ impl<'a> Session<'a> {
         presenter: &mut Presenter,
         choices: &mut Choices,
     ) -> Result<Next> {
+        // What was done to a window that showed nothing yet is forgotten.
+        events.wait(Duration::ZERO);
+        drop(events.take_input());
         let (run, zoom) = (choices.run.clone(), choices.zoom);
         let (mut looked, mut mean) = (None::<Instant>, 1.0);
         let mut rate = Rate::default();
@@ -283,8 +289,10 @@ impl<'a> Session<'a> {
                 Err(error) => format!("{}: cannot be written ({error})", path.display()),
             });
         }
-        if requests.render && self.child.is_none() {
-            self.begin_render(choices);
+        match (requests.render, &self.child) {
+            (true, None) => self.begin_render(choices),
+            (true, Some((_, path))) => self.say(format!("{} is still being rendered", path.display())),
+            _ => {}
         }
         self.look_after_child();
         Ok(())
@@ -346,7 +354,7 @@ impl<'a> Session<'a> {
         let mut add = |option: &str, value: String| words.push(format!("{option}={value}"));
         match &self.request.subject {
             Subject::Scene { settings, .. } => {
-                for (option, value) in camera_options(&self.camera.camera) {
+                for (option, value) in camera_options(&self.camera) {
                     add(option, value);
                 }
                 add("--size", format!("{}x{}", self.status.size[0], self.status.size[1]));
@@ -357,7 +365,8 @@ impl<'a> Session<'a> {
                 add("--exposure", format!("{:.2}", choices.stops));
             }
             Subject::Box(settings) => {
-                let options = choices.run.options_of_box(settings, self.status.rounds);
+                let ends = self.request.command.iter().any(|word| word.starts_with("--error=") || word.starts_with("--time="));
+                let options = choices.run.options_of_box(settings, (!ends).then_some(self.status.rounds));
                 options.into_iter().for_each(|(option, value)| add(option, value));
             }
         }
@@ -377,16 +386,23 @@ fn part_of(shows: u32) -> Option<&'static str> {
     shows.checked_sub(crate::constants::SHOW_DIRECT).and_then(|part| parts.get(part as usize).copied())
 }
 
+/// Nine digits, which tell apart what single precision does.
+fn short(value: f64) -> String {
+    format!("{value:.8e}").parse().map_or_else(|_| value.to_string(), |rounded: f64| rounded.to_string())
+}
+
 /// Options that put a camera where this one is.
-fn camera_options(camera: &Camera) -> Vec<(&'static str, String)> {
-    let point = |point: DVec3| point.to_array().map(|value| format!("{value:.6}")).join(",");
-    let mut options = vec![("--eye", point(camera.eye)), ("--look-at", point(camera.eye + camera.forward)), ("--up", point(camera.up))];
+fn camera_options(moving: &MovingCamera) -> Vec<(&'static str, String)> {
+    let MovingCamera { camera, pivot } = moving;
+    let point = |point: DVec3| point.to_array().map(short).join(",");
+    let target = camera.eye + *pivot * camera.forward;
+    let mut options = vec![("--eye", point(camera.eye)), ("--look-at", point(target)), ("--up", point(camera.up))];
     match camera.projection {
-        Projection::Perspective { vertical_view } => options.push(("--fov", format!("{:.4}", vertical_view.to_degrees()))),
-        Projection::Orthographic { half_height } => options.push(("--orthographic", format!("{:.6}", 2.0 * half_height))),
+        Projection::Perspective { vertical_view } => options.push(("--fov", short(vertical_view.to_degrees()))),
+        Projection::Orthographic { half_height } => options.push(("--orthographic", short(2.0 * half_height))),
     }
     if let Some(Lens { radius, focus }) = camera.lens {
-        options.extend([("--aperture", format!("{:.6}", 2.0 * radius)), ("--focus", format!("{focus:.6}"))]);
+        options.extend([("--aperture", short(2.0 * radius)), ("--focus", short(focus))]);
     }
     options
 }
