@@ -75,7 +75,7 @@ enum Command {
     #[command(after_help = help::RENDER)]
     Render(Box<render::RenderArgs>),
     /// Look at a scene, or at the paper's box, while its picture is refined, and fly through it
-    #[command(after_help = help::VIEW)]
+    #[command(after_help = help::VIEW, mut_arg("scene", |argument| argument.help(format!("{}; or `box`, the paper's", help::scene()))))]
     View(view::ViewArgs),
     /// Bake the irradiance of all surfaces of a scene into lightmaps
     #[command(after_help = help::BAKE)]

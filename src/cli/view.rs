@@ -25,7 +25,7 @@ pub(super) struct ViewArgs {
     #[command(flatten)]
     light: PhotonArgs,
     /// Builder of the photon maps; all give bit-identical results [default: auto]
-    #[arg(long, value_name = "BUILDER", help_heading = "Implementation", value_parser = builder_parser(Builder::ON_GPU, "what is usual"))]
+    #[arg(long, value_name = "BUILDER", help_heading = "Implementation", value_parser = builder_parser(Builder::ON_GPU, "Persistent for scenes, atomic for the box"))]
     variant: Option<BuilderArg>,
     /// Error at which a picture ends that R renders [default: 2 %, or a time that suits the device]
     #[arg(long, value_name = "PERCENT", value_parser = parse_percent, allow_hyphen_values = true, help_heading = "When to stop")]
