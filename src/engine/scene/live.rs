@@ -68,7 +68,7 @@ impl<'a> LiveScene<'a> {
         Ok(LiveScene { run, geometry, plan, device, cancelled, camera: camera.clone() })
     }
 
-    /// One more round, unless all have been; its time.
+    /// One more round, unless all have been.
     pub fn round(&mut self) -> Result<()> {
         if !self.run.has_ended() {
             self.run.round(&mut Control::quiet(self.cancelled))?;
