@@ -153,7 +153,12 @@ fn messages_are_more_or_fewer() {
 fn on_terminal(place: &Place, line: &str, variable: (&str, &str)) -> String {
     let command = format!("{PROGRAM} {line}");
     let mut script = std::process::Command::new("script");
-    script.args(["-qec", &command, "/dev/null"]).current_dir(place.path()).env_remove("NO_COLOR");
+    script
+        .args(["-qec", &command, "/dev/null"])
+        .current_dir(place.path())
+        .env_remove("NO_COLOR")
+        .env_remove("CLICOLOR_FORCE")
+        .env("CI", "true");
     let output = script.env("TERM", "xterm").env(variable.0, variable.1).output().expect("script, of bsdutils, is there");
     assert!(output.status.success(), "{line}: {}", text(&output.stdout));
     text(&output.stdout)

@@ -41,7 +41,7 @@ use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
 
 use clap::error::ErrorKind as ClapErrorKind;
-use clap::{ArgMatches, Args, CommandFactory, FromArgMatches, Parser, Subcommand};
+use clap::{ArgMatches, Args, ColorChoice, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::engine::retry::{Remedy, in_words};
 use crate::engine::run::RunResult;
@@ -226,7 +226,9 @@ pub fn main() -> u8 {
     if arguments[1] == "help" {
         arguments.retain(|argument| argument != "--help" && argument != "-h");
     }
-    let mut command = Cli::command();
+    // clap colours a plain terminal of a machine that says it runs tests, too.
+    let colours = if progress::takes_escapes() { ColorChoice::Auto } else { ColorChoice::Never };
+    let mut command = Cli::command().color(colours);
     command.build();
     let refuse = |reason: &str| {
         complain(reason);

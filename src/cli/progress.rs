@@ -187,7 +187,7 @@ impl Drop for ProgressReporter {
 }
 
 /// Whether the user's terminal takes the escape sequences of a bar: https://no-color.org, and terminals that only print.
-fn takes_escapes() -> bool {
+pub(super) fn takes_escapes() -> bool {
     let is_plain = std::env::var_os("TERM").is_some_and(|kind| kind == "dumb");
     !is_plain && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
 }

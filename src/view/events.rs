@@ -70,6 +70,14 @@ impl Events {
         state.take_egui_input(window)
     }
 
+    /// The same without what its user did, which waits for the next call of `take_input`.
+    pub fn look_at_input(&mut self) -> RawInput {
+        let mut input = self.take_input();
+        let (_, state) = self.seen.window.as_mut().expect("the window was opened");
+        state.egui_input_mut().events = std::mem::take(&mut input.events);
+        input
+    }
+
     /// Does what the user interface asks of the system: pointers, the clipboard.
     pub fn obey(&mut self, output: &mut FullOutput) {
         let (window, state) = self.seen.window.as_mut().expect("the window was opened");

@@ -185,7 +185,8 @@ impl<'a> Session<'a> {
         }
         let mut requests = Requests::default();
         let (interface, status, pivot) = (self.interface.clone(), &self.status, self.camera.pivot);
-        let mut output = interface.run_ui(events.take_input(), |ui| {
+        let input = if is_waiting { events.look_at_input() } else { events.take_input() };
+        let mut output = interface.run_ui(input, |ui| {
             requests = panel::show(ui.ctx(), choices, status, pivot);
             if is_waiting {
                 egui::Area::new("waiting".into()).anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0]).show(ui.ctx(), |ui| {
@@ -206,9 +207,6 @@ impl<'a> Session<'a> {
         presenter: &mut Presenter,
         choices: &mut Choices,
     ) -> Result<Next> {
-        // What was done to a window that showed nothing yet is forgotten.
-        events.wait(Duration::ZERO);
-        drop(events.take_input());
         let (run, zoom) = (choices.run.clone(), choices.zoom);
         let (mut looked, mut mean) = (None::<Instant>, 1.0);
         let mut rate = Rate::default();
