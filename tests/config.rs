@@ -95,7 +95,7 @@ fn options_in_force_are_printed_as_a_file() {
 
 #[test]
 fn files_that_are_wrong_are_refused_in_one_line() {
-    let cases: [(&str, &str, [&str; 3]); 15] = [
+    let cases: [(&str, &str, [&str; 3]); 16] = [
         ("rouds = 3", "render", ["c.toml, line 1: rouds: ", "did you mean rounds?", "photonmill --help"]),
         (
             "\n[render]\nrouds = 3",
@@ -114,7 +114,8 @@ fn files_that_are_wrong_are_refused_in_one_line() {
         ("rounds = 1979-05-27", "render", ["c.toml, line 1: rounds", "number", ""]),
         ("rounds = 3\nrounds = 4", "render", ["c.toml, line 2: is no TOML", "duplicate", ""]),
         ("photons = 3\nmap = \"m.pm\"", "render", ["c.toml, line 1: the argument '--photons <N>'", "--map", ""]),
-        ("config = \"c.toml\"", "render", ["config: no option", "", ""]),
+        ("config = \"c.toml\"", "render", ["c.toml, line 1: config: stands in no file", "command line", ""]),
+        ("[render]\nevery = \"3s\"", "render", ["with the options of c.toml: required: --checkpoint", "", ""]),
         ("", "render --json c.toml", ["--json c.toml: is the file of --config", "", ""]),
     ];
     let place = Place::new();

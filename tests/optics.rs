@@ -122,14 +122,17 @@ fn a_slab_shifts_a_slanting_ray() {
         };
         family.expect_mean(format!("slab at {degrees} degrees, narrow lamp"), &see(&strip(arrives), rounds), (1.0 - f).powi(2));
         if degrees == 80.0 {
-            let twice = see(&strip(arrives + again), 110);
+            // One path in eighteen comes this way.
+            let twice = see(&strip(arrives + again), 14);
             family.expect_mean(format!("slab at {degrees} degrees, reflected inside"), &twice, ((1.0 - f) * f).powi(2));
         }
         for beside in [arrives - 0.06, arrives + 0.06, below * angle.tan()] {
             assert!(see_on(&strip(beside), 1, 32).iter().all(|seen| *seen == 0.0), "{degrees} degrees: light at {beside} m");
         }
     }
-    family.assert_tells_one_per_cent();
+    let is_rare = |what: &str| what.ends_with("reflected inside");
+    family.assert_tells(0.01, |what| !is_rare(what));
+    family.assert_tells(0.03, is_rare);
 }
 
 /// Share of evenly scattered light that a surface lets through from outside: the integral of (1 - F) 2 sin cos.

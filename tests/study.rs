@@ -251,7 +251,7 @@ fn light_that_no_path_finds_is_studied_against_a_long_run() {
     let folder = Place::new();
     let (out, cancelled) = (Folder::open("-o", folder.path()).unwrap(), AtomicBool::new(false));
     let mut tell = |line: &str| cancelled.store(cancelled.load(Ordering::Relaxed) || line.starts_with('['), Ordering::Relaxed);
-    let request = Request { budget: Duration::from_secs(24), asked: vec![0.6], ..request("prism", 1) };
+    let request = Request { budget: Duration::from_secs(12), asked: vec![0.6], ..request("prism", 1) };
     let study = study::run(&gpu, &scene("prism"), request, &out, &cancelled, &mut tell).unwrap();
     let part = &study.parts[0];
     assert!(part.reference.contains("a long run of photonmill itself"), "{}", part.reference);

@@ -52,6 +52,10 @@ impl Origins {
         let option = complaint.trim_start_matches("the argument '").split([' ', ':', '\'']).next().unwrap_or_default();
         match self.lines.get(option) {
             Some(line) => format!("{}: {complaint}", place(&self.path, *line)),
+            // clap does not say of which option.
+            None if complaint.starts_with("required: ") && !self.lines.is_empty() => {
+                format!("with the options of {}: {complaint}", echo(self.path.display()))
+            }
             None => complaint,
         }
     }
@@ -165,6 +169,9 @@ impl<'a> File<'a> {
             let name = key.get_ref().as_ref();
             if value.get_ref().is_table() || names.iter().any(|known| known == name) {
                 continue;
+            }
+            if NOT_IN_FILES.contains(&name.replace('-', "_").as_str()) {
+                return Err(self.refuse(key.span().start, name, "stands in no file; type it on the command line"));
             }
             let meant = similar(name, names.iter().map(String::as_str));
             let help = if of.contains(' ') || of == BOX {

@@ -66,6 +66,6 @@ fn ignored_signals() -> u64 {
 }
 
 #[cfg(not(unix))]
-fn on_signal(handle: impl Fn(i32) + Send + 'static) -> std::result::Result<(), ctrlc::Error> {
+fn on_signal(handle: impl Fn(i32) + Send + 'static) -> Result<(), ctrlc::Error> {
     ctrlc::set_handler(move || handle(SIGINT))
 }

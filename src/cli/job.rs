@@ -105,7 +105,7 @@ impl Job<'_> {
         let Job { scene, geometry, sensor, camera, phases, map, point, .. } = *self;
         let is_picture = matches!(sensor, Sensor::Picture { .. });
         let view = View { geometry, camera, phases };
-        let wanted = self.divided(&mut gpus[0], &view, keeper.resumed(), reporter)?;
+        let wanted = self.divided(&mut gpus[0], &view, keeper.resumed(), reporter, cancelled)?;
         let mut settings = wanted.in_whole_blocks(is_picture);
         let block = settings.rounds_per_block(is_picture);
         let of_map = map.map(MapFile::rounds).filter(|most| settings.rounds > *most);
@@ -162,7 +162,14 @@ impl Job<'_> {
     }
 
     /// Settings whose work is divided where nobody has set how: as in the run that this one goes on with, or as a pilot finds best.
-    fn divided(&self, gpu: &mut Gpu, view: &View, resumed: Option<&SavedRun>, reporter: &ProgressReporter) -> Result<SceneSettings> {
+    fn divided(
+        &self,
+        gpu: &mut Gpu,
+        view: &View,
+        resumed: Option<&SavedRun>,
+        reporter: &ProgressReporter,
+        cancelled: &AtomicBool,
+    ) -> Result<SceneSettings> {
         let Job { settings, free, .. } = *self;
         if let Some(run) = resumed {
             let of_run = |name: &str, own: u32, is_free: bool| {
@@ -181,17 +188,18 @@ impl Job<'_> {
             let tiles = tiles.filter(|_| free.samples).or_else(|| settings.tiles.clone());
             return Ok(SceneSettings { tiles, ..division.set(settings) });
         }
-        self.choose(gpu, view, reporter)
+        self.choose(gpu, view, reporter, cancelled)
     }
 
     /// The settings that a pilot finds best, saved where asked.
-    pub(super) fn choose(&self, gpu: &mut Gpu, view: &View, reporter: &ProgressReporter) -> Result<SceneSettings> {
+    pub(super) fn choose(&self, gpu: &mut Gpu, view: &View, reporter: &ProgressReporter, cancelled: &AtomicBool) -> Result<SceneSettings> {
         let Job { scene, settings, geometry, sensor, free, chosen, save_settings, .. } = *self;
         let mut found = settings.clone();
         let mut rounds = settings.rounds;
         if settings.stop.has_goal() && free != Free::default() {
             reporter.status("looking for the best settings");
-            let pilot = until_done(gpu, &device_failed, |gpu| scene::pilot::choose_for(gpu, scene, view, settings, sensor, free))?;
+            let pilot =
+                until_done(gpu, &device_failed, |gpu| scene::pilot::choose_for(gpu, scene, view, settings, sensor, free, cancelled))?;
             if let Some(pilot) = pilot {
                 reporter.note(&scene_report::pilot(&pilot, &settings.stop, self.point));
                 if self.explain {

@@ -253,7 +253,7 @@ pub(super) fn run(args: &RenderArgs, typed: &Typed, cancelled: &AtomicBool) -> R
     }
     if picture.is_none() && args.picture.transport.keep.shard.is_none() {
         let view = View { geometry, camera: Some(camera), phases: &[] };
-        job.choose(&mut gpus[0], &view, &reporter)?;
+        job.choose(&mut gpus[0], &view, &reporter, cancelled)?;
         reporter.finish();
         return Ok(End::Finished);
     }

@@ -247,7 +247,8 @@ impl PreparedScene {
         let started = Instant::now();
         let warnings = RefCell::new(warnings);
         let failed = |gpu: &Gpu, error: &Error, remedy| warnings.borrow_mut().push(in_words(gpu, error, remedy));
-        let pilot = until_done(&mut gpus[0], &failed, |gpu| pilot::choose_for(gpu, scene, view, &settings, sensor, free))?;
+        let pilot =
+            until_done(&mut gpus[0], &failed, |gpu| pilot::choose_for(gpu, scene, view, &settings, sensor, free, control.cancelled))?;
         let settings = pilot.as_ref().map_or_else(|| settings.clone(), |pilot| pilot.set(&settings));
         let settings = settings.in_whole_blocks(matches!(sensor, Sensor::Picture { .. }));
         if control.cancelled.load(Ordering::Relaxed) {

@@ -6,6 +6,7 @@
 //! rare light, and which tiles vary most.
 
 use std::cell::Cell;
+use std::sync::atomic::AtomicBool;
 
 use super::pilot_rounds::{FEW_SAMPLES, MANY_SAMPLES, OfTile, PIXELS_OF_MAP, Parts, PilotRounds, SAMPLES};
 use super::{View, trial};
@@ -61,22 +62,30 @@ impl Pilot {
 }
 
 /// Chooses the division of the work of a run with these settings; `None` where it has no goal, too.
-pub fn choose_for(gpu: &Gpu, scene: &Scene, view: &View, settings: &SceneSettings, sensor: Sensor, free: Free) -> Result<Option<Pilot>> {
+pub fn choose_for(
+    gpu: &Gpu,
+    scene: &Scene,
+    view: &View,
+    settings: &SceneSettings,
+    sensor: Sensor,
+    free: Free,
+    cancelled: &AtomicBool,
+) -> Result<Option<Pilot>> {
     if free == Free::default() || !settings.stop.has_goal() {
         return Ok(None);
     }
-    choose(gpu, scene, view, &trial::plan(gpu, scene, view, settings, sensor)?, free)
+    choose(gpu, scene, view, &trial::plan(gpu, scene, view, settings, sensor)?, free, cancelled)
 }
 
 /// Chooses the division of a picture's work, for whose settings there is a plan. `None` where nothing is to be chosen, or nothing varies.
-pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Free) -> Result<Option<Pilot>> {
+pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Free, cancelled: &AtomicBool) -> Result<Option<Pilot>> {
     let settings = &plan.settings;
     if free == Free::default() {
         return Ok(None);
     }
     let many = if free.shadow_rays { MANY_SHADOW_RAYS } else { settings.shadow_rays };
     let kind = gpu.facts().kind;
-    let looks = PilotRounds { gpu, scene, view, run: plan, size: pilot_size(kind), spent: Cell::new(0.0) };
+    let looks = PilotRounds { gpu, scene, view, run: plan, size: pilot_size(kind), cancelled, spent: Cell::new(0.0) };
     let of_many = looks.of_few(many)?;
     let Some((parts, mut rounds)) = known(&looks, &of_many, None, kind) else { return Ok(None) };
     // Of a run that takes little longer than another look, paths are not told apart from shadow rays.

@@ -1,6 +1,7 @@
 //! The rounds of a pilot, and what they tell of how a picture's light varies.
 
 use std::cell::Cell;
+use std::sync::atomic::AtomicBool;
 
 use glam::DVec3;
 
@@ -85,6 +86,7 @@ pub struct PilotRounds<'a> {
     pub view: &'a View<'a>,
     pub run: &'a ScenePlan,
     pub size: PilotSize,
+    pub cancelled: &'a AtomicBool,
     /// Milliseconds of the device that they took.
     pub spent: Cell<f64>,
 }
@@ -241,7 +243,7 @@ impl PilotRounds<'_> {
     }
 
     fn light(&self, view: &View, plan: ScenePlan) -> Result<RunResult> {
-        let lit = light(self.gpu, view, plan, &mut Control::default())?;
+        let lit = light(self.gpu, view, plan, &mut Control::quiet(self.cancelled))?.finished()?;
         self.spent.set(self.spent.get() + lit.timings.row("round").and_then(|row| row.gpu_ms).unwrap_or(0.0));
         Ok(lit)
     }

@@ -223,7 +223,7 @@ impl Search<'_> {
         let camera = self.scene.first_camera();
         let view = View { geometry: &self.geometry, camera: Some(&camera), phases: &[] };
         let plan = trial::plan(lab.gpu, self.scene, &view, &usual, self.sensor)?;
-        let pilot = pilot::choose(lab.gpu, self.scene, &view, &plan, Free::ALL)?;
+        let pilot = pilot::choose(lab.gpu, self.scene, &view, &plan, Free::ALL, lab.cancelled)?;
         let settings = pilot.as_ref().map_or_else(|| usual.clone(), |pilot| pilot.set(&usual));
         let found = self.until(lab, &SceneSettings { stop, ..settings }, &[error])?;
         Ok(Chosen {

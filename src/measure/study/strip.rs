@@ -59,7 +59,7 @@ pub fn measure_defaults(
             continue;
         }
         let left = share.saturating_sub(began.elapsed());
-        let chosen = subject.choose(gpu, asked)?;
+        let chosen = subject.choose(gpu, asked, cancelled)?;
         if !curve.points.is_empty() && chosen.expected * request.repeats > left {
             break;
         }
@@ -98,7 +98,7 @@ pub fn strip(gpu: &Gpu, subject: &Subject, part: &Part, request: &Request, cance
     let mut found: Vec<(f64, &Point, Vec<f64>)> = Vec::new();
     if let Some(curve) = &part.default {
         for (point, asked) in curve.points.iter().zip(request.asked.iter().copied()) {
-            let chosen = subject.choose(gpu, asked)?;
+            let chosen = subject.choose(gpu, asked, cancelled)?;
             let Some((shot, _)) = subject.run_to_error(gpu, &chosen, request.seed, LONGEST, cancelled)? else { continue };
             // Few rounds may do for several errors.
             if found.last().is_some_and(|(.., values)| *values == shot.values) {

@@ -159,7 +159,7 @@ impl Subject {
     }
 
     /// What a pilot chooses for an error.
-    pub fn choose(&self, gpu: &Gpu, error: f64) -> Result<Chosen> {
+    pub fn choose(&self, gpu: &Gpu, error: f64, cancelled: &AtomicBool) -> Result<Chosen> {
         let began = Instant::now();
         let stop = Stop { error: Some(error), ..Stop::default() };
         let settings = SceneSettings { rounds: MOST_ROUNDS, stop, ..SceneSettings::default() };
@@ -167,7 +167,7 @@ impl Subject {
         let view = View { geometry: &self.geometry, camera: target.camera(), phases: &target.phases(&self.geometry) };
         let plan = scene::trial::plan(gpu, &self.scene, &view, &settings, target.sensor())?;
         let free = Free { samples: self.camera.is_some(), ..Free::ALL };
-        let pilot = scene::pilot::choose(gpu, &self.scene, &view, &plan, free)?;
+        let pilot = scene::pilot::choose(gpu, &self.scene, &view, &plan, free, cancelled)?;
         let expected = pilot.as_ref().map_or(0.0, |pilot| 1e-9 * pilot.rounds.until(pilot.chosen, error).1);
         Ok(Chosen {
             gpu_ms: pilot.as_ref().map_or(0.0, |pilot| pilot.spent),
@@ -307,7 +307,8 @@ fn own_reference(
     let target = Target::Picture(camera, pixels);
     let view = View { geometry, camera: target.camera(), phases: &[] };
     let plan = scene::trial::plan(gpu, scene, &view, &settings, target.sensor())?;
-    let chosen = scene::pilot::choose(gpu, scene, &view, &plan, Free::ALL)?.map_or(settings.clone(), |pilot| pilot.set(&settings));
+    let chosen =
+        scene::pilot::choose(gpu, scene, &view, &plan, Free::ALL, cancelled)?.map_or(settings.clone(), |pilot| pilot.set(&settings));
     let plan = scene::trial::plan(gpu, scene, &view, &chosen, target.sensor())?;
     let lit = scene::light(gpu, &view, plan, &mut Control::quiet(cancelled))?.finished()?;
     let (film, error) = (&lit.film, lit.error());
