@@ -72,6 +72,8 @@ impl Status {
 pub struct Look {
     pub noise: f64,
     pub bias: Option<f64>,
+    /// At most, of light that no path or photon has met so far.
+    pub unseen: f64,
     pub mean: f64,
     /// The exposure that a picture file would have.
     pub stops: f32,
@@ -130,11 +132,12 @@ impl<'a> Live<'a> {
                 let pixels: Vec<Vec3> = film.means().map(DVec3::as_vec3).collect();
                 let mean = film.surface_means().map(|mean| mean.element_sum() / 3.0).sum::<f64>() / pixels.len().max(1) as f64;
                 let picture = ColourPicture { width: pixels.len() as u32, height: 1, pixels };
-                Ok(Look { noise: error.noise, bias: error.bias.map(|bias| bias.relative), mean, stops: picture.usual_exposure() })
+                let unseen = error.unseen.hypot(error.unknown.relative);
+                Ok(Look { noise: error.noise, bias: error.bias.map(|bias| bias.relative), unseen, mean, stops: picture.usual_exposure() })
             }
             Live::Room(live) => {
                 let (noise, mean) = live.look()?;
-                Ok(Look { noise, bias: None, mean, stops: 0.0 })
+                Ok(Look { noise, bias: None, unseen: 0.0, mean, stops: 0.0 })
             }
         }
     }

@@ -24,6 +24,9 @@ const EFFECT_KEYS: [Key; 12] =
 /// Relative errors of 0.1 %, 0.56 %, 3.2 %, 18 % and 100 %. Twin of `COLOURS` in glsl/kernels/display.comp.
 const ERROR_COLOURS: [[f32; 3]; 5] = [[0.27, 0.0, 0.33], [0.23, 0.32, 0.55], [0.13, 0.57, 0.55], [0.37, 0.79, 0.38], [0.99, 0.91, 0.14]];
 const ERROR_LABELS: [&str; 5] = ["0.1 %", "", "3 %", "", "100 %"];
+/// Less of it changes no digit of the noise that is shown.
+const LEAST_UNSEEN: f64 = 5e-5;
+const MESSAGE_COLOUR: Color32 = Color32::from_rgb(255, 200, 90);
 /// Dots of photons of the global and of the caustic map.
 pub const PHOTON_COLOURS: [[u8; 3]; 2] = [[255, 176, 0], [86, 180, 233]];
 
@@ -38,6 +41,8 @@ pub struct Status {
     /// Standard error of the picture over its mean, and the bias of the radius; infinite where nothing is known yet.
     pub noise: f64,
     pub bias: Option<f64>,
+    /// Light that none of its paths and photons has met is at most this of it.
+    pub unseen: f64,
     /// Of the global and of the caustic map in the latest round, metres.
     pub radii: [Option<f64>; 2],
     pub kept_rounds: usize,
@@ -97,8 +102,12 @@ fn panel(ui: &mut Ui, choices: &mut Choices, status: &Status, requests: &mut Req
     let bias = status.bias.map_or_else(String::new, |bias| format!(", bias {:.2} %", 100.0 * bias));
     ui.label(RichText::new(format!("{} rounds, {:.1} per second", status.rounds, status.rounds_per_second)).strong());
     ui.label(RichText::new(format!("noise {noise}{bias}")).strong());
+    if status.unseen >= LEAST_UNSEEN {
+        let most = if status.unseen.is_finite() { format!("at most {:.1} %", 100.0 * status.unseen) } else { "not known".to_owned() };
+        ui.colored_label(MESSAGE_COLOUR, format!("light that no photon has met yet: {most}"));
+    }
     if !status.message.is_empty() {
-        ui.colored_label(Color32::from_rgb(255, 200, 90), &status.message);
+        ui.colored_label(MESSAGE_COLOUR, &status.message);
     }
     ui.separator();
     for (key, shows, name) in SHOWN {
@@ -122,6 +131,24 @@ fn panel(ui: &mut Ui, choices: &mut Choices, status: &Status, requests: &mut Req
     ui.separator();
     settings(ui, &mut choices.run, status);
     ui.add(Slider::new(&mut choices.zoom, 1..=8).text("window pixels per pixel"));
+    ui.separator();
+    ui.horizontal(|ui| {
+        requests.screenshot |= ui.button("Screenshot  (F)").clicked();
+        requests.render |= ui.button("Render this  (R)").clicked();
+    });
+    ui.horizontal(|ui| {
+        if ui.button("Copy command").clicked() {
+            ui.ctx().copy_text(status.command.clone());
+        }
+        requests.first_camera |= ui.button("First camera  (Home)").clicked();
+    });
+    ui.label(RichText::new(&status.command).monospace());
+    let keys = if status.is_box {
+        "Drag: orbit. Wheel: nearer. H hides this, Esc quits."
+    } else {
+        "Drag: orbit. Right: turn. Middle: shift. Wheel: nearer. W A S D Q E: fly, with Shift faster. H hides this, Esc quits."
+    };
+    ui.label(RichText::new(keys).small());
     ui.separator();
     let section = |title: &str| egui::CollapsingHeader::new(title).default_open(true);
     section("Times of the latest round").show(ui, |ui| {
@@ -148,24 +175,6 @@ fn panel(ui: &mut Ui, choices: &mut Choices, status: &Status, requests: &mut Req
             ui.label(format!("maps of {} rounds kept, {} MiB", status.kept_rounds, status.kept_bytes >> 20));
         }
     });
-    ui.separator();
-    ui.horizontal(|ui| {
-        requests.screenshot |= ui.button("Screenshot  (F)").clicked();
-        requests.render |= ui.button("Render this  (R)").clicked();
-    });
-    ui.horizontal(|ui| {
-        if ui.button("Copy command").clicked() {
-            ui.ctx().copy_text(status.command.clone());
-        }
-        requests.first_camera |= ui.button("First camera  (Home)").clicked();
-    });
-    ui.label(RichText::new(&status.command).monospace().small());
-    let keys = if status.is_box {
-        "Drag: orbit. Wheel: nearer. H hides this, Esc quits."
-    } else {
-        "Drag: orbit. Right: turn. Middle: shift. Wheel: nearer. W A S D Q E: fly, with Shift faster. H hides this, Esc quits."
-    };
-    ui.label(RichText::new(keys).small());
 }
 
 fn settings(ui: &mut Ui, run: &mut RunChoices, status: &Status) {

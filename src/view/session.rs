@@ -105,7 +105,7 @@ impl<'a> Session<'a> {
         let picture = Picture::new(self.gpu, size, window)?;
         self.status.size = size;
         self.status.rounds = 0;
-        self.status.noise = f64::INFINITY;
+        (self.status.noise, self.status.unseen) = (f64::INFINITY, 0.0);
         self.wait_frame(events, presenter, &picture, choices)?;
         match &self.request.subject {
             Subject::Scene { scene, settings, .. } => {
@@ -219,7 +219,7 @@ impl<'a> Session<'a> {
             self.status.take(&mut live);
             if looked.is_none_or(|looked: Instant| looked.elapsed() >= LOOK) {
                 let look = live.look()?;
-                (self.status.noise, self.status.bias, mean) = (look.noise, look.bias, look.mean);
+                (self.status.noise, self.status.bias, self.status.unseen, mean) = (look.noise, look.bias, look.unseen, look.mean);
                 looked = Some(Instant::now());
                 if std::mem::take(&mut self.wants_exposure) {
                     choices.stops = look.stops;

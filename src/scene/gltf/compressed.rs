@@ -5,7 +5,11 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::Path;
 
-use meshopt::{decode_filter_color, decode_filter_exp, decode_filter_oct, decode_filter_quat, decode_index_buffer, decode_index_sequence};
+use meshoptimizer_rs::codec::{
+    decode_filter_color, decode_filter_exp, decode_filter_oct, decode_filter_quat, decode_index_buffer, decode_index_sequence,
+    decode_vertex_buffer,
+};
+use meshoptimizer_rs::{Limits, Workspace};
 use rayon::prelude::*;
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -396,55 +400,22 @@ fn decoded_view(buffer: &[u8], view: &View) -> std::result::Result<Vec<u8>, Stri
     if !is_filtered {
         return Err(format!("has a filter that is not for {stride} bytes an element"));
     }
-    let broken = || format!("cannot be decoded; {REMEDY}");
-    let indices: Vec<u32> = match view.mode {
-        Mode::Attributes => return attributes(encoded, count, stride, view.filter).ok_or_else(broken),
-        Mode::Triangles => decode_index_buffer(encoded, count).map_err(|_| broken())?,
-        Mode::Indices => decode_index_sequence(encoded, count).map_err(|_| broken())?,
+    // What it unpacks to is known to be allowed.
+    let work = &mut Workspace::new(Limits { max_bytes: usize::MAX, max_work: u64::MAX });
+    let decoded = match view.mode {
+        Mode::Attributes => decode_vertex_buffer(count, stride, encoded, work),
+        Mode::Triangles => decode_index_buffer(count, stride, encoded, work),
+        Mode::Indices => decode_index_sequence(count, stride, encoded, work),
     };
-    Ok(match stride {
-        2 => indices.iter().flat_map(|index| (*index as u16).to_le_bytes()).collect(),
-        _ => indices.iter().flat_map(|index| index.to_le_bytes()).collect(),
-    })
-}
-
-/// As many words as the library's decoder asks for, when it is compiled, in an element.
-#[derive(Clone)]
-struct Element<const N: usize>([u32; N]);
-
-impl<const N: usize> Default for Element<N> {
-    fn default() -> Self {
-        Element([0; N])
-    }
-}
-
-fn words<const N: usize>(encoded: &[u8], count: usize) -> Option<Vec<u32>> {
-    let elements = meshopt::decode_vertex_buffer::<Element<N>>(encoded, count).ok()?;
-    Some(elements.into_iter().flat_map(|element| element.0).collect())
-}
-
-/// Every width that the extension allows, up to 256 bytes.
-macro_rules! words_of {
-    ($width:expr, $encoded:expr, $count:expr, $($n:literal)*) => {
-        match $width { $($n => words::<$n>($encoded, $count),)* _ => None }
-    };
-}
-
-/// Elements of `stride` bytes, a multiple of four; `None` if the stream is no such.
-#[rustfmt::skip]
-fn attributes(encoded: &[u8], count: usize, stride: usize, filter: Filter) -> Option<Vec<u8>> {
-    let mut words = words_of!(stride / 4, encoded, count,
-        1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23 24 25 26 27 28 29 30 31 32
-        33 34 35 36 37 38 39 40 41 42 43 44 45 46 47 48 49 50 51 52 53 54 55 56 57 58 59 60 61 62 63 64)?;
-    let decoded: &mut [u8] = bytemuck::cast_slice_mut(&mut words);
-    match (filter, stride) {
-        (Filter::None, _) => {}
-        (Filter::Octahedral, 4) => decode_filter_oct::<i8>(bytemuck::cast_slice_mut(decoded)),
-        (Filter::Octahedral, _) => decode_filter_oct::<i16>(bytemuck::cast_slice_mut(decoded)),
-        (Filter::Quaternion, _) => decode_filter_quat(bytemuck::cast_slice_mut(decoded)),
-        (Filter::Exponential, _) => decode_filter_exp::<1>(bytemuck::cast_slice_mut(decoded)),
-        (Filter::Color, 4) => decode_filter_color::<i8>(bytemuck::cast_slice_mut(decoded)),
-        (Filter::Color, _) => decode_filter_color::<i16>(bytemuck::cast_slice_mut(decoded)),
-    }
-    Some(decoded.to_vec())
+    let filtered = decoded.and_then(|mut decoded| {
+        match view.filter {
+            Filter::None => Ok(()),
+            Filter::Octahedral => decode_filter_oct(&mut decoded, count, stride, work),
+            Filter::Quaternion => decode_filter_quat(&mut decoded, count, stride, work),
+            Filter::Exponential => decode_filter_exp(&mut decoded, count, stride, work),
+            Filter::Color => decode_filter_color(&mut decoded, count, stride, work),
+        }?;
+        Ok(decoded)
+    });
+    filtered.map_err(|_| format!("cannot be decoded; {REMEDY}"))
 }

@@ -1,5 +1,6 @@
 //! A comparison in, a picture of it in false colours out.
 
+use flip_rs::MAGMA;
 use glam::Vec3;
 
 use super::Comparison;
@@ -61,13 +62,11 @@ impl Comparison<'_> {
             Show::Flip => self.flip.as_ref()?.map.iter().map(|flip| f64::from(*flip)).collect(),
         };
         // Magma: equal steps look equally large (van der Walt and Smith 2015).
-        let map = nv_flip::magma_lut().to_vec();
         let of = |(share, is_compared): (f64, &bool)| {
             if !is_compared || share.is_nan() {
                 return NONE;
             }
-            let place = 3 * (255.0 * share.clamp(0.0, 1.0)).round() as usize;
-            [map[place], map[place + 1], map[place + 2]]
+            MAGMA[(255.0 * share.clamp(0.0, 1.0)).round() as usize].map(|channel| (255.0 * channel).round() as u8)
         };
         let codes: Vec<[u8; 3]> = shares.into_iter().zip(&self.pair.is_compared).map(of).collect();
         Some(colour::png_of_codes(self.pair.a.width, self.pair.a.height, &codes))

@@ -1,11 +1,11 @@
 //! Two pictures in, out how visible their difference is to the eye when one flips to the other: FLIP, from 0 to 1 (Andersson et al.,
-//! FLIP: A Difference Evaluator for Alternating Images, 2020), by NVIDIA's own code.
+//! FLIP: A Difference Evaluator for Alternating Images, 2020), by a port of NVIDIA's code, version 1.7.
 //!
 //! Linear pictures are shown at several exposures, of which the worst counts by pixel (Andersson et al., Visualizing Errors in Rendered
 //! High Dynamic Range Images, 2021, HDR-FLIP).
 
+use flip_rs::{DEFAULT_PPD, RgbImage, ldr_flip};
 use glam::{DVec3, Vec3};
-use nv_flip::{DEFAULT_PIXELS_PER_DEGREE, FlipImageRgb8};
 use rayon::prelude::*;
 
 use super::pair::Pair;
@@ -23,7 +23,7 @@ pub struct Flip {
 }
 
 /// Of the display that the eye is thought to see: 0.7 m from one that has 3840 pixels in 0.7 m.
-pub const PIXELS_PER_DEGREE: f32 = DEFAULT_PIXELS_PER_DEGREE;
+pub const PIXELS_PER_DEGREE: f32 = DEFAULT_PPD;
 /// Rows that are computed as one.
 const BAND: usize = 64;
 /// How far the filters of this display reach, pixels: three standard deviations of the widest.
@@ -73,8 +73,9 @@ impl Flip {
 
 /// FLIP of codes by pixel, the reference first.
 fn flip(both: [&[[u8; 3]]; 2], width: usize, height: usize) -> Vec<f32> {
-    let [reference, test] = both.map(|codes| FlipImageRgb8::with_data(width as u32, height as u32, codes.as_flattened()));
-    nv_flip::flip(reference, test, PIXELS_PER_DEGREE).to_vec()
+    let [reference, test] =
+        both.map(|codes| RgbImage::new(width, height, codes.as_flattened().to_vec()).expect("there is a code for each pixel"));
+    ldr_flip(&reference, &test, PIXELS_PER_DEGREE).expect("pictures of one size are compared").into_pixels()
 }
 
 /// What a display shows of a pixel; stops are those of linear values.

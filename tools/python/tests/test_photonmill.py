@@ -389,8 +389,7 @@ print("ready", flush=True)
 # Nothing of Python runs in this thread, which is the one that hears of signals.
 threading.Timer(0.5, lambda: print("under way", flush=True)).start()
 try:
-    # No pilot, which ends before the run does.
-    scene.render(size=32, time=20, rounds=100000)
+    scene.render(size=32, WORK)
 except KeyboardInterrupt:
     print("interrupted", flush=True)
 # What was interrupted is in nobody's way.
@@ -399,8 +398,9 @@ print(scene.render(size=8, rounds=1, photons=1024).rounds, flush=True)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="there are no signals to send")
-def test_ctrl_c_ends_a_run() -> None:
-    child = subprocess.Popen([sys.executable, "-c", CHILD], stdout=subprocess.PIPE, text=True)
+@pytest.mark.parametrize("work", ["time=20, rounds=100000", "error=0.001"], ids=["run", "pilot"])
+def test_ctrl_c_ends_a_run(work: str) -> None:
+    child = subprocess.Popen([sys.executable, "-c", CHILD.replace("WORK", work)], stdout=subprocess.PIPE, text=True)
     try:
         assert child.stdout is not None
         assert child.stdout.readline() == "ready\n"
