@@ -266,7 +266,7 @@ fn the_cpu_builder_is_timed_on_the_host() {
 /// A run makes no pipeline that its plan has no use for, and a second one none at all.
 #[test]
 fn a_run_makes_the_pipelines_of_its_plan_once() {
-    let Some(gpu) = device() else { return };
+    let Some(gpu) = fresh_device() else { return };
     let settings = RoomSettings { builder: Builder::Naive, gather: Gather::Brute, mesh: 8, ..RoomSettings::default() };
     let before = gpu.pipeline_count();
     run(&gpu, &settings);

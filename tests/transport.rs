@@ -377,7 +377,7 @@ fn what_is_dropped_is_not_there() {
     // Both maps of a round use the same buffers in turn, so that the second takes nothing.
     assert!(needed.plan.bytes <= all.plan.bytes && direct.plan.bytes < needed.plan.bytes);
     // Of pipelines only those of the plan, each made once.
-    let fresh = device().unwrap();
+    let fresh = fresh_device().unwrap();
     let before = fresh.pipeline_count();
     let lit = picture(&fresh, &cornell, &SceneSettings { part: Part::Direct, ..small() });
     assert_eq!(lit.pipelines, scene::modules(&lit.plan, fresh.facts()).len());

@@ -11,7 +11,7 @@ use bytemuck::Pod;
 use rayon::prelude::*;
 
 use super::reconvergence::reconverging;
-use super::specialize::decided;
+use super::specialize::{content, decided};
 use super::{AnyBuffer, Context, DeviceFacts, Gpu, call};
 use crate::error::Result;
 use crate::records::Field;
@@ -98,6 +98,21 @@ impl PipelineKey {
     }
 }
 
+/// The pipelines of a device.
+#[derive(Default)]
+pub(super) struct Pipelines {
+    by_key: HashMap<PipelineKey, Arc<Pipeline>>,
+    /// By kernel and content: constants that nothing of what is left of a kernel names make no pipeline of its own.
+    made: HashMap<(&'static str, [u8; 32]), Arc<Pipeline>>,
+}
+
+impl Pipelines {
+    /// Forgets which pipelines stand for a kernel. Those that were made stay for whoever asks for the same program again.
+    pub(super) fn forget(&mut self, is_changed: impl Fn(&str) -> bool) {
+        self.by_key.retain(|key, _| !is_changed(key.kernel));
+    }
+}
+
 pub(super) struct Pipeline {
     pub(super) raw: vk::Pipeline,
     pub(super) layout: vk::PipelineLayout,
@@ -161,37 +176,46 @@ impl Gpu {
     /// The pipeline of a kernel for these constants, made at first use.
     pub(super) fn pipeline(&self, module: &Module, constants: &Constants) -> Result<Arc<Pipeline>> {
         let key = PipelineKey::new(module, constants);
-        if !self.pipelines.borrow().contains_key(&key) {
+        if !self.pipelines.borrow().by_key.contains_key(&key) {
             self.prepare(&[*module], constants)?;
         }
-        Ok(self.pipelines.borrow()[&key].clone())
+        Ok(self.pipelines.borrow().by_key[&key].clone())
     }
 
     /// Makes the pipelines of these kernels now, as many at a time as there are cores, so that no run pays for them later.
     pub fn prepare(&self, modules: &[Module], constants: &Constants) -> Result<()> {
-        let mut missing: Vec<(PipelineKey, Pipeline, Vec<u32>)> = Vec::new();
+        let mut missing: Vec<(PipelineKey, [u8; 32], Pipeline, Vec<u32>)> = Vec::new();
         for module in modules {
             let key = PipelineKey::new(module, constants);
-            if !self.pipelines.borrow().contains_key(&key) && missing.iter().all(|(other, ..)| *other != key) {
-                let words = decided(&self.words_of(module), &key.constants);
-                let words = if module.votes_in_loops { reconverging(&words, self.facts.reconvergence) } else { words };
-                missing.push((key, self.pipeline_layout(module)?, words));
+            if self.pipelines.borrow().by_key.contains_key(&key) || missing.iter().any(|(other, ..)| *other == key) {
+                continue;
+            }
+            let words = decided(&self.words_of(module), &key.constants);
+            let words = if module.votes_in_loops { reconverging(&words, self.facts.reconvergence) } else { words };
+            let content = content(&words, &key.constants);
+            let made = self.pipelines.borrow().made.get(&(module.name, content)).cloned();
+            match made {
+                Some(pipeline) => drop(self.pipelines.borrow_mut().by_key.insert(key, pipeline)),
+                None => missing.push((key, content, self.pipeline_layout(module)?, words)),
             }
         }
         let (device, cache) = (&self.context.device, self.cache.raw);
-        let jobs: Vec<_> = missing.iter().map(|(key, pipeline, words)| (key, pipeline.layout, words)).collect();
+        let jobs: Vec<_> = missing.iter().map(|(key, _, pipeline, words)| (key, pipeline.layout, words)).collect();
         let made: Vec<_> = jobs.par_iter().map(|(key, layout, words)| compile(device, cache, *layout, words, &key.constants)).collect();
-        for ((key, mut pipeline, _), raw) in missing.into_iter().zip(made) {
+        for ((key, content, mut pipeline, _), raw) in missing.into_iter().zip(made) {
             pipeline.raw = raw?;
             self.context.set_name(pipeline.raw, key.kernel);
-            self.pipelines.borrow_mut().insert(key, Arc::new(pipeline));
+            let pipeline = Arc::new(pipeline);
+            let mut pipelines = self.pipelines.borrow_mut();
+            pipelines.made.insert((key.kernel, content), pipeline.clone());
+            pipelines.by_key.insert(key, pipeline);
         }
         Ok(())
     }
 
     /// Pipelines made so far.
     pub fn pipeline_count(&self) -> usize {
-        self.pipelines.borrow().len()
+        self.pipelines.borrow().made.len()
     }
 
     /// SPIR-V of a kernel, or what stands for it in this device.

@@ -19,7 +19,6 @@ mod validation;
 pub mod window;
 
 use std::cell::{Cell, RefCell};
-use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
@@ -79,7 +78,7 @@ pub struct Gpu {
     options: Options,
     idleness: Cell<Idleness>,
     queue: vk::Queue,
-    pipelines: RefCell<HashMap<kernel::PipelineKey, Arc<kernel::Pipeline>>>,
+    pipelines: RefCell<kernel::Pipelines>,
     set_layouts: kernel::SetLayouts,
     cache: kernel::DiskCache,
     context: Arc<Context>,
@@ -237,8 +236,8 @@ impl Gpu {
     /// not named now get their own back. The start-up check is not repeated.
     pub fn replace(&mut self, replaced: Vec<(String, Vec<u32>)>) {
         let before = std::mem::replace(&mut self.options.replaced, replaced);
-        let changed = |kernel| before.iter().chain(&self.options.replaced).any(|(name, _)| name == kernel);
-        self.pipelines.get_mut().retain(|key, _| !changed(key.kernel));
+        let changed = |kernel: &str| before.iter().chain(&self.options.replaced).any(|(name, _)| name == kernel);
+        self.pipelines.get_mut().forget(changed);
     }
 
     pub fn facts(&self) -> &DeviceFacts {

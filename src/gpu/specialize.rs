@@ -6,6 +6,8 @@
 
 use std::collections::{HashMap, HashSet};
 
+use sha2::{Digest, Sha256};
+
 mod op {
     pub const CONSTANT_TRUE: u32 = 41;
     pub const CONSTANT_FALSE: u32 = 42;
@@ -13,13 +15,19 @@ mod op {
     pub const SPEC_CONSTANT_TRUE: u32 = 48;
     pub const SPEC_CONSTANT_FALSE: u32 = 49;
     pub const SPEC_CONSTANT: u32 = 50;
+    pub const SPEC_CONSTANT_COMPOSITE: u32 = 51;
     pub const SPEC_CONSTANT_OP: u32 = 52;
+    pub const FUNCTION: u32 = 54;
+    pub const FUNCTION_END: u32 = 56;
+    pub const FUNCTION_CALL: u32 = 57;
     pub const DECORATE: u32 = 71;
     pub const PHI: u32 = 245;
     pub const SELECTION_MERGE: u32 = 247;
     pub const LABEL: u32 = 248;
     pub const BRANCH: u32 = 249;
     pub const BRANCH_CONDITIONAL: u32 = 250;
+    pub const SWITCH: u32 = 251;
+    pub const ENTRY_POINT: u32 = 15;
 }
 
 pub(super) const HEADER_WORDS: usize = 5;
@@ -129,6 +137,122 @@ fn without_ways(words: &[u32], closed: &HashSet<(u32, u32)>) -> Vec<u32> {
     result
 }
 
+/// Digest of what a driver compiles of a decided module: the blocks that some way leads to, what they name, and the values of
+/// the constants (number and value) among that. Modules with the same digest are the same program.
+pub(super) fn content(words: &[u32], constants: &[(u32, u32)]) -> [u8; 32] {
+    let (globals, functions) = parts(words);
+    let mut hash = Sha256::new();
+    let mut add = |words: &[u32]| hash.update(bytemuck::cast_slice::<u32, u8>(words));
+    // Every word counts as a name, so that a literal may keep a constant that nothing names, and nothing that is named is missed.
+    let mut named: HashSet<u32> = HashSet::new();
+    let entry = globals.iter().find(|instruction| opcode(instruction) == op::ENTRY_POINT).map(|instruction| instruction[2]);
+    let mut called: Vec<u32> = entry.into_iter().collect();
+    let mut next = 0;
+    while let Some(function) = called.get(next).and_then(|id| functions.get(id)) {
+        next += 1;
+        for instruction in reached(function) {
+            add(instruction);
+            named.extend(&instruction[1..]);
+            if opcode(instruction) == op::FUNCTION_CALL && !called.contains(&instruction[3]) {
+                called.push(instruction[3]);
+            }
+        }
+    }
+    // These stand before the constants that they name: the work-group size.
+    globals.iter().filter(|instruction| is_execution_mode(instruction)).for_each(|instruction| named.extend(&instruction[1..]));
+    let given: HashMap<u32, u32> = constants.iter().copied().collect();
+    let numbers: HashMap<u32, u32> = globals
+        .iter()
+        .filter_map(|instruction| match (opcode(instruction), *instruction) {
+            (op::DECORATE, [_, target, SPEC_ID, number]) => Some((*target, *number)),
+            _ => None,
+        })
+        .collect();
+    // What is named stands before what names it.
+    for instruction in globals.iter().rev() {
+        let is_constant = (op::CONSTANT_TRUE..=op::SPEC_CONSTANT_OP).contains(&opcode(instruction));
+        let result = if is_constant { instruction[2] } else { 0 };
+        // All that is no constant, types and decorations above all, counts.
+        if !is_constant || named.contains(&result) || opcode(instruction) == op::SPEC_CONSTANT_COMPOSITE {
+            let is_about_constants = opcode(instruction) == op::DECORATE && instruction[2] == SPEC_ID;
+            if !is_about_constants && !is_text(instruction) {
+                add(instruction);
+                named.extend(&instruction[1..]);
+            }
+            if let Some(value) = numbers.get(&result).and_then(|number| given.get(number)) {
+                add(&[*value]);
+            }
+        }
+    }
+    hash.finalize().into()
+}
+
+/// What stands before the first function, and the functions by their ids.
+fn parts(words: &[u32]) -> (Vec<&[u32]>, HashMap<u32, Vec<&[u32]>>) {
+    let mut globals = Vec::new();
+    let mut functions: HashMap<u32, Vec<&[u32]>> = HashMap::new();
+    let mut current = None;
+    for instruction in instructions(words) {
+        if opcode(instruction) == op::FUNCTION {
+            current = Some(instruction[2]);
+        }
+        match current {
+            None => globals.push(instruction),
+            Some(id) => functions.entry(id).or_default().push(instruction),
+        }
+    }
+    (globals, functions)
+}
+
+/// Instructions of a function, in their order, without the blocks that no way leads to.
+fn reached<'a>(function: &[&'a [u32]]) -> Vec<&'a [u32]> {
+    let mut block = 0;
+    let mut ways: HashMap<u32, Vec<u32>> = HashMap::new();
+    for instruction in function {
+        match (opcode(instruction), *instruction) {
+            (op::LABEL, [_, label]) => {
+                // The first block is where a call leads.
+                let first = ways.is_empty().then_some(*label);
+                block = *label;
+                ways.entry(0).or_default().extend(first);
+                ways.entry(block).or_default();
+            }
+            (op::BRANCH, [_, to]) => ways.entry(block).or_default().push(*to),
+            (op::BRANCH_CONDITIONAL, [_, _, to, other, ..]) => ways.entry(block).or_default().extend([*to, *other]),
+            // Literals among the targets are no labels, or keep a block that nothing leads to.
+            (op::SWITCH, [_, _, targets @ ..]) => ways.entry(block).or_default().extend(targets),
+            _ => {}
+        }
+    }
+    let mut reached: HashSet<u32> = HashSet::from([0]);
+    let mut rest = vec![0];
+    while let Some(block) = rest.pop() {
+        rest.extend(ways.get(&block).into_iter().flatten().filter(|to| reached.insert(**to)));
+    }
+    let mut is_reached = true;
+    let mut kept = Vec::new();
+    for instruction in function {
+        match (opcode(instruction), *instruction) {
+            (op::LABEL, [_, label]) => is_reached = reached.contains(label),
+            (op::FUNCTION_END, _) => is_reached = true,
+            _ => {}
+        }
+        if is_reached {
+            kept.push(*instruction);
+        }
+    }
+    kept
+}
+
+fn is_execution_mode(instruction: &[u32]) -> bool {
+    matches!(opcode(instruction), 16 | 331)
+}
+
+/// Names and lines for debuggers, which change no program.
+fn is_text(instruction: &[u32]) -> bool {
+    (2..=8).contains(&opcode(instruction))
+}
+
 pub(super) fn instructions(words: &[u32]) -> impl Iterator<Item = &[u32]> {
     let mut rest = &words[HEADER_WORDS..];
     std::iter::from_fn(move || {
@@ -221,6 +345,30 @@ mod tests {
             );
             assert!(instructions(&found).all(|instruction| !matches!(opcode(instruction), op::SELECTION_MERGE | op::BRANCH_CONDITIONAL)));
         }
+    }
+
+    /// Whatever no block that is reached names changes no content; all else does.
+    #[test]
+    fn the_content_is_what_is_left() {
+        let condition = "%condition = OpSpecConstantOp %bool IEqual %number %two";
+        let digest = |words: &[u32], constants: &[(u32, u32)]| content(&decided(words, constants), constants);
+        let whole = |condition: &str| {
+            let mut words = module(condition);
+            // An entry point, where it has to stand: behind the memory model.
+            let place = HEADER_WORDS + instructions(&words).take(2).map(<[u32]>::len).sum::<usize>();
+            let function = instructions(&words).find(|instruction| opcode(instruction) == op::FUNCTION).unwrap()[2];
+            words.splice(place..place, [first_word(op::ENTRY_POINT, 4), 5, function, 0]);
+            words
+        };
+        let words = whole(condition);
+        let same = digest(&words, &[(3, 1), (7, 0)]);
+        assert_eq!(digest(&words, &[(3, 1), (7, 1)]), same, "nothing names %flag");
+        assert_eq!(digest(&words, &[(3, 4), (7, 1)]), same, "no block that is left names %number");
+        assert_ne!(digest(&words, &[(3, 2)]), same, "the other way");
+        let open = "%undefined = OpUndef %bool\n%condition = OpSpecConstantOp %bool LogicalEqual %undefined %flag";
+        let words = whole(open);
+        assert_ne!(digest(&words, &[(7, 0)]), digest(&words, &[(7, 1)]), "the condition names %flag");
+        assert_eq!(digest(&words, &[(3, 0)]), digest(&words, &[(3, 1)]), "and not %number");
     }
 
     #[test]

@@ -29,6 +29,7 @@ pub mod sources;
 use std::cmp::Ordering;
 use std::fmt::Display;
 use std::ops::Deref;
+use std::sync::Mutex;
 
 use photonmill::engine::nonfinite_values::NonfiniteValues;
 use photonmill::engine::room::resources::RoomResources;
@@ -39,13 +40,25 @@ use photonmill::scene::room::Wall;
 use prelude::*;
 
 /// A device under the validation layer, which must not have said a word by the end of the test, nor may anything be held.
-pub struct Device(Gpu);
+pub struct Device {
+    gpu: Option<Gpu>,
+    /// Of tests that may use it after this one; `None` where no other may.
+    idle: Option<&'static Idle>,
+}
+
+/// Devices that no test uses at the moment, with the pipelines that tests have made: a software device compiles for longer than
+/// it runs.
+type Idle = Mutex<Vec<Gpu>>;
+
+static IDLE: Idle = Mutex::new(Vec::new());
+/// Of those that split work by the plan alone.
+static IDLE_COUNTING: Idle = Mutex::new(Vec::new());
 
 impl Deref for Device {
     type Target = Gpu;
 
     fn deref(&self) -> &Gpu {
-        &self.0
+        self.gpu.as_ref().expect("it goes with the test")
     }
 }
 
@@ -57,23 +70,36 @@ impl Drop for Device {
         }
         self.check_validation().unwrap();
         assert_eq!((self.held_memory().device_bytes, self.held_memory().staging_bytes), (0, 0), "buffers are left");
+        if let (Some(idle), Some(gpu)) = (self.idle, self.gpu.take()) {
+            idle.lock().unwrap().push(gpu);
+        }
     }
 }
 
-/// The device of the tests; `None` where `PHOTONMILL_NO_GPU=1` asks to go without. Each test has one of its own: what idle ones
-/// would keep for it, gigabytes on a software device, saves no time.
+/// The device of the tests; `None` where `PHOTONMILL_NO_GPU=1` asks to go without. No other test uses it at the same time.
 pub fn device() -> Option<Device> {
-    device_with(Options::default())
+    shared(&IDLE, Options::default())
 }
 
 /// The same for tests that count dispatches, which then do not depend on how busy the machine is.
 pub fn counting_device() -> Option<Device> {
-    device_with(Options { by_plan: true, ..Options::default() })
+    shared(&IDLE_COUNTING, Options { by_plan: true, ..Options::default() })
+}
+
+/// A device that tests use one after another, or that no test has used before.
+fn shared(idle: &'static Idle, options: Options) -> Option<Device> {
+    let used = idle.lock().unwrap().pop();
+    used.or_else(|| open(options)).map(|gpu| Device { gpu: Some(gpu), idle: Some(idle) })
+}
+
+/// A device that has made no pipeline yet.
+pub fn fresh_device() -> Option<Device> {
+    device_with(Options::default())
 }
 
 /// The same with some of its abilities masked off.
 pub fn device_with(options: Options) -> Option<Device> {
-    open(options).map(Device)
+    open(options).map(|gpu| Device { gpu: Some(gpu), idle: None })
 }
 
 /// Whether `PHOTONMILL_NO_GPU=1` asks to go without a device.
