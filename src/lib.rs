@@ -54,7 +54,7 @@
 //! output < bake < measure, render < cli;  output < view < cli;  scene < verify::judge;  engine < verify::selfcheck;  output < verify::compare < cli
 //! ```
 //!
-//! `tests/architecture.rs` checks it.
+//! `tests/program/architecture.rs` checks it.
 
 pub mod bake;
 pub mod cli;

@@ -1,5 +1,5 @@
 // The lobes of layered surfaces: sampled, and as they weigh light from where the sample goes.
-// Dispatched by tests/lobe_sampling.rs. One thread = one sample; each case has equally many.
+// Dispatched by tests/materials/lobe_sampling.rs. One thread = one sample; each case has equally many.
 #extension GL_EXT_control_flow_attributes : require
 #include "records.glsl"
 

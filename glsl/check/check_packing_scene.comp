@@ -1,5 +1,5 @@
 // Photons of scenes of triangles, normals and directions, boxes of a node and the bits of one hit, packed and unpacked.
-// Dispatched by tests/packing.rs. One thread = one case, which stands beside what Rust packed of it.
+// Dispatched by tests/engine/packing.rs. One thread = one case, which stands beside what Rust packed of it.
 #include "records.glsl"
 
 layout(set = 1, binding = 0, scalar) readonly buffer Cases { PackingCase cases[]; };

@@ -43,7 +43,7 @@ pub enum BiasFrom {
 
 /// How far the law c r^2 may be off, either way: the true bias over what is extrapolated.
 ///
-/// Of light without noise (`tests/bias.rs`) it is 1.00 where light is a parabola, 1.12 along the edge of a lit surface,
+/// Of light without noise (`tests/engine/bias.rs`) it is 1.00 where light is a parabola, 1.12 along the edge of a lit surface,
 /// 1.05, 1.2 and 1.6 on bumps of a deviation of r, r/2 and r/4, and 1.82 along the edge of a shadow. Of scenes it was 1.2 to
 /// 1.5 at radii of 0.15 of the scene, and 2.0 of a caustic narrower than that. Whatever is much narrower than r at both radii is not seen
 /// at all.

@@ -56,7 +56,7 @@ pub struct Binding {
     pub writes: bool,
 }
 
-/// A struct as a kernel sees it; compared with its Rust twin by `tests/layout.rs`.
+/// A struct as a kernel sees it; compared with its Rust twin by `tests/engine/layout.rs`.
 #[derive(Debug, Clone, Copy)]
 pub struct ReflectedStruct {
     pub name: &'static str,

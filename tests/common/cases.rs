@@ -1,5 +1,5 @@
 //! Known failures of renderers, and the tests that show that they do not happen here: the table of the guide's page on
-//! hard cases, which `tests/hard_cases.rs` checks.
+//! hard cases, which `tests/light/hard_cases.rs` checks.
 
 /// One known failure.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,4 +1,4 @@
-//! Small scenes whose light is known, each as a check of a device: a test holds it, and `tests/red.rs` shows that it
+//! Small scenes whose light is known, each as a check of a device: a test holds it, and `tests/engine/planted_faults.rs` shows that it
 //! complains.
 
 use std::f64::consts::FRAC_PI_3;
@@ -8,7 +8,7 @@ use glam::dvec3;
 use super::estimate_check;
 use super::lit::light;
 use super::prelude::*;
-use crate::unknown::room_without_floor;
+use crate::engine::unseen_light::room_without_floor;
 use photonmill::engine::scene::{RunResult, Target, View, render, trial};
 
 /// The red channel of a point or pixel, sure to three parts in a hundred and right to its error.

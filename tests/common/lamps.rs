@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::dvec3;
 
 use super::prelude::*;
-use crate::unknown::room_without_floor;
+use crate::engine::unseen_light::room_without_floor;
 use photonmill::engine::scene::{self, RunResult, Target, View, trial};
 
 fn lamp_of(radiance: f32) -> Material {

@@ -1,5 +1,5 @@
-//! Layered materials whose light is known, each as a check of a device: `tests/plates.rs` and `tests/sheets.rs` hold it, and
-//! `tests/red.rs` shows that it complains.
+//! Layered materials whose light is known, each as a check of a device: `tests/materials/plates.rs` and `tests/sheets.rs` hold it, and
+//! `tests/engine/planted_faults.rs` shows that it complains.
 
 use super::estimate_check;
 use super::plates::{COSINES, Place, Plates};

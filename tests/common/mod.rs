@@ -179,7 +179,7 @@ pub fn on_back_wall(x: f32, y: f32, photon: u32) -> Photon {
 }
 
 /// Builders whose photons are checked against closed forms: one of the device, as all of those store the same photons to the
-/// bit (tests/photons.rs), and the CPU's.
+/// bit (tests/engine/photons.rs), and the CPU's.
 pub const JUDGED: [Builder; 2] = [Builder::Atomic, Builder::Cpu];
 
 /// Photons of a chunk of which an invocation of the persistent builder takes several.
@@ -276,7 +276,7 @@ pub fn in_order(mut photons: Vec<Photon>) -> Vec<Photon> {
     photons
 }
 
-/// `Err` holds the complaint: a sentence, or a [`Complaint`] where `tests/red.rs` asks for its kind.
+/// `Err` holds the complaint: a sentence, or a [`Complaint`] where `tests/engine/planted_faults.rs` asks for its kind.
 pub type Check<C = String> = Result<(), C>;
 
 /// What a check has found wrong. A planted fault must be noticed as what it is: what merely breaks a run would leave

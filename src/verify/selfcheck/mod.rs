@@ -45,7 +45,7 @@ pub struct Finding {
 
 /// Standard errors that a case may be off: a false alarm in 1.7 million cases where the error is known, in 6000 where
 /// it is that of 16 runs (Student's t). With fixed seeds a device that passes once passes always. Every case
-/// notices an error of 1 % (`tests/closed_form.rs`).
+/// notices an error of 1 % (`tests/light/closed_form.rs`).
 pub const Z_LIMIT: f64 = 5.0;
 /// Where nothing is random the error is that of single precision over many operations.
 const ROUNDING: f64 = 1e-5;

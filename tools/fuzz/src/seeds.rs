@@ -61,8 +61,8 @@ pub fn scene() -> (Scene, Geometry) {
 }
 
 /// A part of eight blocks of a picture of four pixels, as far as what it holds must fit.
-fn part_of_picture(share: Share) -> SavedRun {
-    let ((scene, geometry), settings) = (scene(), SceneSettings::default());
+fn part_of_picture(share: Share, keeps_parts: bool) -> SavedRun {
+    let ((scene, geometry), settings) = (scene(), SceneSettings { keeps_parts, ..SceneSettings::default() });
     let sensor = Sensor::Picture { width: 2, height: 2 };
     let plan = ScenePlan::new(&scene, &geometry, &settings, sensor, &Limits::of_host()).expect("it can be planned").film;
     let (mut done, mut latest) = (Blocks::default(), LatestBlocks::default());
@@ -86,6 +86,8 @@ fn part_of_picture(share: Share) -> SavedRun {
         differences: Differences((0..difference_count(4) as u64).map(|k| k % 3).collect()),
         one_hits,
         part_totals: vec![3; 4],
+        // Three of the four parts; what a pixel has beyond them is the fourth.
+        parts: keeps_parts.then(|| vec![blocks; 4 * (PART_VALUES as usize - 3)]),
         anomalies,
         class_counts: vec![1; 2 * RADIUS_CLASSES as usize],
         stored: [1, 0, 1],
@@ -95,14 +97,18 @@ fn part_of_picture(share: Share) -> SavedRun {
     SavedRun { identity, share, wanted: 8, done, sensor: Some(sensor), fates: vec![fates; 2], film: film.into() }
 }
 
-/// Whole runs, a shard of each, and pairs of shards, one behind the other.
+/// Whole runs, a shard of each, and pairs of shards, one behind the other. Pictures are with and without the parts of their light.
 pub fn runs() -> Vec<Vec<u8>> {
     let of_box = |share| part_of_box(share, None).expect("the box can be run").to_bytes();
-    let of_picture = |share| part_of_picture(share).to_bytes();
+    let of_picture = |share| part_of_picture(share, false).to_bytes();
+    let with_parts = |share| part_of_picture(share, true).to_bytes();
     let shard = |number| Share { number, of: 2 };
-    let whole = Share::default();
     let pair = |of: &dyn Fn(Share) -> Vec<u8>| [of(shard(0)), of(shard(1))].concat();
-    vec![of_box(whole), of_picture(whole), of_box(shard(0)), of_picture(shard(0)), pair(&of_box), pair(&of_picture)]
+    let of_each: [&dyn Fn(Share) -> Vec<u8>; 3] = [&of_box, &of_picture, &with_parts];
+    let mut runs: Vec<Vec<u8>> = of_each.into_iter().flat_map(|of| [of(Share::default()), of(shard(0)), pair(of)]).collect();
+    // Merged, they have no parts.
+    runs.push([with_parts(shard(0)), of_picture(shard(1))].concat());
+    runs
 }
 
 /// A file of photons of two rounds.

@@ -6,13 +6,16 @@ use std::sync::LazyLock;
 
 use libfuzzer_sys::{fuzz_mutator, fuzz_target, fuzzer_mutate};
 use photonmill::engine::saved::{SavedFilm, SavedRun};
-use photonmill::output::colour::{Format, Tone};
+use photonmill::engine::scene::SceneFilm;
+use photonmill::output::colour::Tone;
 use photonmill::output::merge_report;
-use photonmill::output::show::Show;
+use photonmill::output::metadata::{KEY, Metadata, Repeat, errors};
+use photonmill::output::show::{Layer, Show};
 use photonmill::plan::sensor::Sensor;
 use photonmill_fuzz::change::Random;
 use photonmill_fuzz::sealed::{Run, mutate, two_files};
 use photonmill_fuzz::{mutation, refused, seeds};
+use serde_json::Value;
 
 static SEEDS: LazyLock<Vec<Vec<u8>>> = LazyLock::new(seeds::runs);
 
@@ -43,13 +46,40 @@ fn use_run(run: &SavedRun) {
         assert!(!merge_report::text(run, 1, None).is_empty());
         return seeds::part_of_box(run.share, Some(run.clone())).map_or_else(|error| refused(&error), drop);
     };
-    assert!(!merge_report::text(run, 1, Some(film)).is_empty() && !merge_report::json(run, film, &[]).is_empty());
+    assert!(!merge_report::text(run, 1, Some(film)).is_empty());
+    let report: Value = serde_json::from_slice(&merge_report::json(run, film, &[])).expect("a report is JSON");
     for pixel in 0..film.pixels() {
         let _ = (film.mean(pixel), film.standard_error(pixel));
     }
     if let Some(Sensor::Picture { width, height }) = run.sensor {
-        let show = Show { size: (width, height), exposure: None, tone: Tone::default() };
-        let _ = ([Format::Png, Format::Exr].map(|format| show.picture(film, format)), show.errors(film));
+        let show = Show { size: (width, height), exposure: None, tone: Tone::default(), layers: Layer::ALL.into(), denoised: None };
+        let metadata = metadata(run, film, report[KEY].as_str().expect("a report says which version wrote it"));
+        for file in [show.exr(film, &[], Some(&metadata)), show.png(film, |_| metadata.clone()).0] {
+            assert_eq!(Metadata::read(&file).as_ref(), Ok(&metadata), "a picture says how it was made");
+        }
+        show.errors(film);
+    }
+}
+
+/// What `merge` writes into its pictures, as far as it comes from the run.
+fn metadata(run: &SavedRun, film: &SceneFilm, version: &str) -> Metadata {
+    let confidence = film.plan.confidence;
+    let [error, error_bound] = errors(&film.error(confidence), confidence);
+    Metadata {
+        photonmill: version.to_owned(),
+        devices: run.identity.device.iter().cloned().collect(),
+        scene: run.identity.scene.clone(),
+        scene_hash: None,
+        seed: run.identity.settings.get("seed").and_then(Value::as_u64).unwrap_or_default(),
+        rounds: film.rounds,
+        error,
+        error_bound,
+        confidence,
+        denoiser: None,
+        units: String::new(),
+        command: String::new(),
+        settings: run.identity.settings.clone(),
+        repeat: Repeat::Not(String::new()),
     }
 }
 

@@ -27,11 +27,10 @@ static SCENE: LazyLock<(Scene, Geometry)> = LazyLock::new(seeds::scene);
 
 fuzz_target!(|bytes: &[u8]| {
     std::fs::write(&*FILE, bytes).expect("the file can be written");
-    let outcome = MapFile::open("--map", &FILE).and_then(|map| {
+    let outcome = MapFile::open("--map", &FILE).map(|map| {
         assert!(!photon_map::text(&map.header).is_empty() && !photon_map::json(&map.header).is_empty());
         // Photons may have been changed, and be of no use to this scene.
         [export(&map), gather(&map)].into_iter().filter_map(Result::err).for_each(|error| refused(&error));
-        Ok(())
     });
     if let Err(error) = outcome {
         refused(&error);

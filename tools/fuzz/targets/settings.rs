@@ -15,8 +15,11 @@ use photonmill::scene::open_box::open_box;
 use photonmill::scene::{Scene, built_in};
 use photonmill::settings::scene::{Effect, Filter, Illumination, Kernel, Part, SceneSettings};
 use photonmill::settings::stop::{Measure, Stop};
+use photonmill::settings::tile_samples::{MAX_SAMPLES, TILE, TileSamples};
 use photonmill::settings::{Builder, EmissionLaw, Gather, Math, PhongDirection, Preset, RoomSettings, Sums};
+use photonmill_fuzz::change::Random;
 use photonmill_fuzz::{panics_are_caught, refused};
+use serde_json::json;
 
 static SCENES: LazyLock<Vec<(Scene, Geometry)>> = LazyLock::new(|| {
     let scenes = ["open-box-phong", "cornell", "cornell-spheres", "glass-slab", "sky-over-plane", "mirror-corridor"];
@@ -85,8 +88,25 @@ fn plan_triangles(request: &Triangles) -> photonmill::error::Result<()> {
     assert!(plan.bytes <= limits.memory_bytes, "{} bytes", plan.bytes);
     assert!(plan.film.is_sound(), "{:?}", plan.film);
     plan.maps().for_each(|map| check_map(&plan, map, &limits));
-    assert!(plan.pixels_at_once(plan.rays_per_pixel()) > 0);
+    // Without a pixel there is nothing to do.
+    let at_once = [plan.camera_paths_at_once(), plan.points_at_once(), plan.photons_per_dispatch()];
+    assert!(at_once.iter().all(|count| *count > 0) || sensor.pixels() == 0, "{at_once:?}");
+    check_extra_samples(&plan);
     Ok(())
+}
+
+/// Samples of tiles that have more: a list of pixels behind what each pixel has in it.
+fn check_extra_samples(plan: &ScenePlan) {
+    let (extra, pixels) = (&plan.extra_samples, plan.sensor.pixels());
+    assert!(extra.most <= MAX_SAMPLES && plan.samples() <= extra.most, "{} and {} samples", plan.samples(), extra.most);
+    if extra.table.is_empty() {
+        assert_eq!(extra.count, 0);
+        return;
+    }
+    let (of_pixels, list) = extra.table.split_at(2 * pixels as usize + 2);
+    assert!(list.len() == extra.count as usize && list.iter().all(|pixel| *pixel < pixels), "{} extra samples", extra.count);
+    let ends = of_pixels[..2 * pixels as usize].chunks_exact(2).map(|of_pixel| of_pixel[0] + of_pixel[1]);
+    assert!(ends.max().unwrap_or(0) <= extra.count, "a pixel has samples beyond {}", extra.count);
 }
 
 fn check_map(plan: &ScenePlan, map: &MapPlan, limits: &Limits) {
@@ -163,17 +183,21 @@ impl<'a> Arbitrary<'a> for Triangles {
             block: if u.arbitrary()? { Some(count(u, 4)?) } else { None },
             bounces: count(u, usual.bounces)?,
             seed: u.arbitrary()?,
+            neighbours: count(u, usual.neighbours)?,
+            caustic_neighbours: count(u, usual.caustic_neighbours)?,
             radius: if u.arbitrary()? { Some(number(u, 0.05)?) } else { None },
             caustic_radius: if u.arbitrary()? { Some(number(u, 0.05)?) } else { None },
             alpha: number(u, usual.alpha)?,
             kernel: *u.choose(&[Kernel::Box, Kernel::Cone, Kernel::Epanechnikov])?,
             edge_correction: u.arbitrary()?,
             samples: count(u, usual.samples)?,
+            tiles: if u.arbitrary()? { Some(tiles(u, sensor)?) } else { None },
             shadow_rays: count(u, usual.shadow_rays)?,
             final_gather: u.arbitrary()?,
             aim: u.arbitrary()?,
             illumination: *u.choose(&[Illumination::Split, Illumination::Photons])?,
             part: *u.choose(&[Part::All, Part::Direct, Part::Specular, Part::Caustic, Part::Indirect])?,
+            keeps_parts: u.arbitrary()?,
             filter: *u.choose(&[Filter::Box, Filter::Tent, Filter::Gaussian])?,
             builder: if u.arbitrary()? { Some(*u.choose(&Builder::ON_GPU)?) } else { None },
             math: *u.choose(&[Math::Fast, Math::Strict])?,
@@ -186,6 +210,21 @@ impl<'a> Arbitrary<'a> for Triangles {
         };
         Ok(Triangles { scene: u.choose_index(SCENES.len())?, sensor, settings })
     }
+}
+
+/// Tiles as a file of settings may have them: mostly those of the picture, where that is small.
+fn tiles(u: &mut Unstructured, sensor: Sensor) -> Result<TileSamples> {
+    let (width, height) = sensor.size();
+    let (columns, rows) = if width.max(height) <= 64 && u.ratio(7, 8)? {
+        (width.div_ceil(TILE), height.div_ceil(TILE))
+    } else {
+        (u.int_in_range(0..=16)?, u.int_in_range(0..=16)?)
+    };
+    let letters = *u.choose(&["0", "01", "0123", "0123456789", "01x"])?;
+    let mut random = Random(u.arbitrary()?);
+    let mut row = || (0..columns).map(|_| char::from(random.pick(letters.as_bytes()))).collect::<String>();
+    let rows: Vec<String> = (0..rows).map(|_| row()).collect();
+    Ok(serde_json::from_value(json!(rows)).expect("rows are text"))
 }
 
 /// The usual value, a power of two or its neighbour, or any.

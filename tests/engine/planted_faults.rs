@@ -5,22 +5,22 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, LazyLock, Mutex};
 use std::time::Duration;
 
-use crate::closed_form::closed_form_check;
 use crate::common::Kind::*;
 use crate::common::layered::{self, Mixtures};
 use crate::common::prelude::*;
 use crate::common::{MANY_PHOTONS, aimed, bits, estimate_check, known, lamps, noticed_as, planted, sheets};
-use crate::dispersion;
-use crate::film::pairs_count_on;
-use crate::hard_cases::readme_and_guide;
-use crate::ledger::closed_fates;
-use crate::media;
-use crate::openings::light_through_a_window;
-use crate::paranoid::{box_is_finite, scene_is_finite};
-use crate::skies::{facing_all_ways, photons_and_rays};
-use crate::strict::{film_agrees, photons_agree, rounding_check};
-use crate::translucent;
-use crate::transport::{appends_agree, crowd_check};
+use crate::engine::film::pairs_count_on;
+use crate::engine::ledger::closed_fates;
+use crate::engine::paranoid::{box_is_finite, scene_is_finite};
+use crate::engine::strict::{film_agrees, photons_agree, rounding_check};
+use crate::light::closed_form::closed_form_check;
+use crate::light::hard_cases::readme_and_guide;
+use crate::light::openings::light_through_a_window;
+use crate::light::skies::{facing_all_ways, photons_and_rays};
+use crate::light::transport::{appends_agree, crowd_check};
+use crate::materials::dispersion;
+use crate::materials::media;
+use crate::materials::translucent;
 use photonmill::engine::room::film;
 use photonmill::measure::compaction;
 
@@ -763,9 +763,9 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         DimRoom(ratio) => lamps::dim_room(gpu, ratio, true),
         HiddenLamp => lamps::hidden_lamp(gpu, 1e4, true),
         TinyPlates => known::tiny_plates(gpu),
-        LampBehindHole => crate::unknown::hidden_lamp(gpu),
-        SecondOpening => crate::openings::second_opening(gpu),
-        DimPhotons => crate::unknown::dim_photons(gpu),
+        LampBehindHole => crate::engine::unseen_light::hidden_lamp(gpu),
+        SecondOpening => crate::light::openings::second_opening(gpu),
+        DimPhotons => crate::engine::unseen_light::dim_photons(gpu),
         VertexColours => known::vertex_colours(gpu),
         ManyLamps(side) => lamps::many_lamps(gpu, side, true),
         MissedLamp => lamps::missed_lamp(gpu),

@@ -2,7 +2,7 @@
 
 use crate::common::estimate_check;
 use crate::common::prelude::*;
-use crate::unknown::room_without_floor;
+use crate::engine::unseen_light::room_without_floor;
 use glam::dvec3;
 use photonmill::engine::scene::{RunResult, Target, render};
 

@@ -1,6 +1,6 @@
 //! Closed forms (`photonmill::verify::selfcheck`) on the device, and those of direct light that need a scene of their own.
-//! `tests/closed_rooms.rs` has light that is scattered to and fro, `tests/optics.rs` mirrors and glass,
-//! `tests/radiosity.rs` the paper's box.
+//! `tests/light/closed_rooms.rs` has light that is scattered to and fro, `tests/light/optics.rs` mirrors and glass,
+//! `tests/light/radiosity.rs` the paper's box.
 
 use std::sync::atomic::AtomicBool;
 
@@ -61,7 +61,7 @@ fn the_cpu_builder_is_checked_without_a_device() {
 
 #[test]
 fn every_scene_of_a_closed_form_has_a_case() {
-    let source = include_str!("../src/verify/selfcheck/closed_forms.rs");
+    let source = include_str!("../../src/verify/selfcheck/closed_forms.rs");
     NAMES.iter().for_each(|name| assert!(source.contains(&format!("\"{name}\"")), "{name}"));
 }
 

@@ -1,5 +1,5 @@
 //! Hard cases of geometry: whatever is done to a scene that should not change its light does not, and no light is lost
-//! or leaks. `tests/hard_materials.rs`, `tests/random_numbers.rs` and `tests/extremes.rs` do the same for materials,
+//! or leaks. `tests/materials/hard_materials.rs`, `tests/engine/random_numbers.rs` and `tests/light/extremes.rs` do the same for materials,
 //! random numbers, and for sums, estimates and sizes.
 //!
 //! The tests at the end hold the table of all hard cases (`tests/common/cases.rs`) against the sources, README and the guide.

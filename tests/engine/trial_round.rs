@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use crate::common::known;
 use crate::common::lit::light;
 use crate::common::prelude::*;
-use crate::unknown::room_without_floor;
+use crate::engine::unseen_light::room_without_floor;
 use glam::dvec3;
 use photonmill::engine::scene::{self, Target, View, trial};
 use photonmill::output::scene_report;

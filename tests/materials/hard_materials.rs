@@ -3,7 +3,7 @@
 
 use crate::common::known;
 use crate::common::prelude::*;
-use crate::hard_cases::{POINTS, settings};
+use crate::light::hard_cases::{POINTS, settings};
 use photonmill::verify::selfcheck::Estimate;
 use photonmill::verify::selfcheck::measure::{irradiance, radiance};
 

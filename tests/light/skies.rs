@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::common::estimate_check;
 use crate::common::lit::{BOTH, assert_builders_agree, mean_red, received, red};
 use crate::common::prelude::*;
-use crate::unknown::room_without_floor;
+use crate::engine::unseen_light::room_without_floor;
 use glam::dvec3;
 use photonmill::engine::scene::{RunResult, Target, render};
 use photonmill::scene::sky::Sky;

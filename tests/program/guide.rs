@@ -55,8 +55,8 @@ const NOT_RUN: [(&str, &str); 17] = [
     ("tools/bench/run ", "writes into the repository"),
     ("tools/bench_peers", "installs other programs"),
     ("tools/fuzz/run ", "needs a nightly toolchain"),
-    ("tools/faults", "takes half an hour; `tests/faults.rs` has short forms"),
-    ("tools/package", "`tests/package.rs` runs it"),
+    ("tools/faults", "takes half an hour; `tests/engine/failures.rs` has short forms"),
+    ("tools/package", "`tests/program/package.rs` runs it"),
     ("tools/soak ", "takes an hour"),
     ("tools/sanitize", "needs a nightly toolchain"),
     ("tools/sample_models ", "needs a collection of files"),
@@ -68,13 +68,16 @@ const NOT_RUN: [(&str, &str); 17] = [
 
 /// Commands of which only the options are checked, and why.
 const PARSED: [(&str, &str); 7] = [
-    ("photonmill view ", "opens a window; `tests/view.rs` has a display for it"),
-    ("photonmill render scene.glb -o picture.exr --display ", "needs a viewer; `tests/display.rs` has one"),
-    ("photonmill render scene.glb -o picture.exr --denoise", "needs Open Image Denoise; `tests/denoise.rs` has something in its place"),
-    ("photonmill gallery ", "makes pipelines for every picture; `tests/gallery.rs` runs it"),
-    ("photonmill paper ", "takes a minute at any size; `tests/bench.rs` and `tests/cli.rs` run its parts"),
-    ("photonmill study ", "compiles pipelines for every choice; `tests/study.rs` runs small studies"),
-    ("photonmill bench", "takes a minute at any size; `tests/bench.rs` runs all of it"),
+    ("photonmill view ", "opens a window; `tests/program/view.rs` has a display for it"),
+    ("photonmill render scene.glb -o picture.exr --display ", "needs a viewer; `tests/program/display.rs` has one"),
+    (
+        "photonmill render scene.glb -o picture.exr --denoise",
+        "needs Open Image Denoise; `tests/files/denoise.rs` has something in its place",
+    ),
+    ("photonmill gallery ", "makes pipelines for every picture; `tests/program/gallery.rs` runs it"),
+    ("photonmill paper ", "takes a minute at any size; `tests/program/bench.rs` and `tests/program/cli.rs` run its parts"),
+    ("photonmill study ", "compiles pipelines for every choice; `tests/program/study.rs` runs small studies"),
+    ("photonmill bench", "takes a minute at any size; `tests/program/bench.rs` runs all of it"),
 ];
 
 /// Sets options to values that make a run short. An option that is not there is added.
@@ -393,10 +396,10 @@ fn targets_in_the_guide_are_those_of_bench() {
     table_is("src/guide/performance.md", "targets", &format!("{head}{rows}\n"));
 }
 
-/// The table of the same page is checked by `tests/hard_cases.rs`.
+/// The table of the same page is checked by `tests/light/hard_cases.rs`.
 #[test]
 fn planted_faults_are_counted() {
-    let (page, red) = (read("src/guide/hard_cases.md"), read("tests/red.rs"));
+    let (page, red) = (read("src/guide/hard_cases.md"), read("tests/engine/planted_faults.rs"));
     let count = red.split_once("const FAULTS: [Fault; ").unwrap().1.split_once(']').unwrap().0;
     assert!(page.contains(&format!("plants {count} faults")), "{count} faults are planted");
 }

@@ -2,7 +2,6 @@
 //! other in a circle, the device layer knows no photon, and the CPU's twin and the judge know no engine.
 
 use crate::common::prelude::*;
-use crate::common::program::entries;
 use crate::common::sources::{files, read, root};
 
 /// From left to right; what stands side by side does not know each other. The longest name decides for a file.
@@ -281,16 +280,20 @@ fn files_that_are_named_exist() {
     }
 }
 
-/// A file of tests that no program names would never run.
+/// A file of tests that no module names would never run.
 #[test]
 fn every_file_of_tests_is_run() {
-    let [modules, programs] = ["tests/main.rs", "Cargo.toml"].map(read);
-    let names: Vec<String> = entries(&root("tests")).into_iter().filter_map(|file| Some(file.strip_suffix(".rs")?.to_owned())).collect();
-    assert!(names.len() > 30, "{names:?}");
-    for name in names {
-        let is_run = modules.contains(&format!("\nmod {name};\n")) || programs.contains(&format!("path = \"tests/{name}.rs\""));
-        assert!(is_run, "tests/{name}.rs is in neither tests/main.rs nor Cargo.toml");
+    let programs = read("Cargo.toml");
+    let mut modules = 0;
+    for (path, _) in files("tests", &[".rs"]) {
+        let (folder, file) = path.rsplit_once('/').expect("it lies in tests");
+        let name = file.strip_suffix(".rs").expect("it is a file of Rust");
+        let list = if folder == "tests" { "tests/main.rs".to_owned() } else { format!("{folder}/mod.rs") };
+        let is_named = name == "mod" || read(&list).contains(&format!("\npub mod {name};\n"));
+        assert!(is_named || programs.contains(&format!("path = \"{path}\"")), "{path} is in neither {list} nor Cargo.toml");
+        modules += usize::from(is_named);
     }
+    assert!(modules > 60, "{modules} modules");
 }
 
 #[test]
@@ -357,8 +360,8 @@ fn the_check_complains_about_arrows_to_the_right() {
     assert!(complains("gpu::buffer", "use crate::photon::Photon;"));
     assert!(complains("plan::buffers", "fn f() { crate::gpu::check::run() }"));
     assert!(complains("scene", "use crate::{error::Result, gpu::{Buffer, Gpu}};"));
-    assert!(complains("cpu", "use crate::engine::room::resources::RoomResources;"));
-    assert!(complains("verify::judge::path", "use crate::engine::scene::View;"));
+    assert!(complains("cpu", "use crate::engine::device::room::resources::RoomResources;"));
+    assert!(complains("verify::judge::path", "use crate::engine::device::scene::View;"));
     assert!(complains("records", "use crate::scene::room::RoomScene;"));
     assert!(complains("engine::room::trace", "use crate::{\n    error::Result,\n    output,\n};"));
     assert!(complains("engine::room", "use super::scene::View;"));
@@ -367,7 +370,7 @@ fn the_check_complains_about_arrows_to_the_right() {
     assert!(complains("engine::run", "use super::room::trace::chunk;"));
 
     assert!(!complains("engine::room::trace", "use crate::{error::{Error, Result}, engine::tallies, plan::{self, RoomPlan}};"));
-    assert!(!complains("plan", "//! See [`crate::engine::room`].\n/* crate::gpu */ const A: &str = \"crate::gpu\";"));
+    assert!(!complains("plan", "//! See [`crate::engine::device::room`].\n/* crate::gpu */ const A: &str = \"crate::gpu\";"));
     assert!(!complains("engine::choose_builder", "use super::room;\nuse crate::gpu;"));
     assert!(!complains("gpu::kernel", "use super::{Buffer, device};\nuse crate::error;"));
 }

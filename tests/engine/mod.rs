@@ -1,0 +1,30 @@
+//! Photons, films, runs and their errors: what both worlds share, and the paper's box.
+
+pub mod bias;
+pub mod blocks;
+pub mod counts;
+pub mod cpu;
+pub mod device;
+pub mod failures;
+pub mod film;
+pub mod layout;
+pub mod ledger;
+pub mod limits;
+pub mod memory;
+pub mod packing;
+pub mod paper_model;
+pub mod paranoid;
+pub mod photons;
+pub mod pilot;
+pub mod planted_faults;
+pub mod primitives;
+pub mod random_numbers;
+pub mod sampling;
+pub mod settings_ranges;
+pub mod several_devices;
+pub mod stop;
+pub mod strict;
+pub mod tree;
+pub mod trial_round;
+pub mod units;
+pub mod unseen_light;
