@@ -360,8 +360,8 @@ fn the_check_complains_about_arrows_to_the_right() {
     assert!(complains("gpu::buffer", "use crate::photon::Photon;"));
     assert!(complains("plan::buffers", "fn f() { crate::gpu::check::run() }"));
     assert!(complains("scene", "use crate::{error::Result, gpu::{Buffer, Gpu}};"));
-    assert!(complains("cpu", "use crate::engine::device::room::resources::RoomResources;"));
-    assert!(complains("verify::judge::path", "use crate::engine::device::scene::View;"));
+    assert!(complains("cpu", "use crate::engine::room::resources::RoomResources;"));
+    assert!(complains("verify::judge::path", "use crate::engine::scene::View;"));
     assert!(complains("records", "use crate::scene::room::RoomScene;"));
     assert!(complains("engine::room::trace", "use crate::{\n    error::Result,\n    output,\n};"));
     assert!(complains("engine::room", "use super::scene::View;"));
@@ -370,7 +370,7 @@ fn the_check_complains_about_arrows_to_the_right() {
     assert!(complains("engine::run", "use super::room::trace::chunk;"));
 
     assert!(!complains("engine::room::trace", "use crate::{error::{Error, Result}, engine::tallies, plan::{self, RoomPlan}};"));
-    assert!(!complains("plan", "//! See [`crate::engine::device::room`].\n/* crate::gpu */ const A: &str = \"crate::gpu\";"));
+    assert!(!complains("plan", "//! See [`crate::engine::room`].\n/* crate::gpu */ const A: &str = \"crate::gpu\";"));
     assert!(!complains("engine::choose_builder", "use super::room;\nuse crate::gpu;"));
     assert!(!complains("gpu::kernel", "use super::{Buffer, device};\nuse crate::error;"));
 }
