@@ -27,6 +27,7 @@ use photonmill::plan::sensor::Sensor;
 use photonmill::plan::{Limits, RoomPlan, photons_of};
 use photonmill::rng::Rng;
 use photonmill::scene::geometry::Geometry;
+use photonmill::scene::material::Layers;
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::sky::Sky;
 use photonmill::scene::{Material, Reading, Scene, built_in};
@@ -46,7 +47,7 @@ mod gltf_file;
 mod rich_file;
 
 const BLENDER: &[u8] = include_bytes!("scenes/blender.glb");
-/// The same mutations each time.
+/// The same mutations each time; `tools/fuzz/run` goes on with others for as long as it is let.
 const SEED: u64 = 1;
 
 /// What became of a file.
@@ -100,16 +101,8 @@ fn check_scene(scene: &Scene) {
     }
     for material in &scene.materials {
         let Material { name, layers, base_colour, emission, .. } = material;
-        let shares = [
-            layers.metallic,
-            layers.roughness,
-            layers.specular,
-            layers.transmission,
-            layers.diffuse_transmission,
-            layers.iridescence,
-            layers.anisotropy,
-            layers.coat,
-        ];
+        let Layers { metallic, roughness, specular, transmission, diffuse_transmission, iridescence, anisotropy, coat, .. } = *layers;
+        let shares = [metallic, roughness, specular, transmission, diffuse_transmission, iridescence, anisotropy, coat];
         let more = [layers.coat_roughness, layers.sheen_roughness].into_iter().chain(base_colour.to_array());
         let more =
             more.chain(layers.sheen_colour.to_array()).chain(layers.medium.map_or([1.0; 3], |medium| medium.transmittance.to_array()));
@@ -274,7 +267,7 @@ fn survive(what: &str, count: usize, mut make: impl FnMut(&mut Random) -> Vec<u8
 fn mutated_values_of_a_file_by_hand_are_planned_or_refused() {
     let seed = square();
     assert_eq!(plan_value("as it is", &seed), Fate::Planned(3), "the others lie on these");
-    survive("gltf", 4000, move |random| {
+    survive("gltf", 1500, move |random| {
         let mut value = seed.clone();
         (0..=random.below(3)).for_each(|_| change(&mut value, random));
         value.to_string().into_bytes()
@@ -294,7 +287,7 @@ fn blender() -> (Value, Vec<u8>) {
 #[test]
 fn mutated_values_of_a_blender_file_are_planned_or_refused() {
     let (value, binary) = blender();
-    survive("values of a glb", 500, move |random| {
+    survive("values of a glb", 200, move |random| {
         let mut value = value.clone();
         (0..=random.below(2)).for_each(|_| change(&mut value, random));
         pack(&value, &binary)
@@ -306,7 +299,7 @@ fn mutated_values_of_a_blender_file_are_planned_or_refused() {
 fn mutated_numbers_of_a_blender_file_are_planned_or_refused() {
     let (value, binary) = blender();
     let words = [0.0f32, -0.0, 1.0, 1e-38, 1e-45, 1e-20, -1e10, 1e18, 3e38, f32::INFINITY].map(f32::to_bits);
-    survive("numbers of a glb", 500, move |random| {
+    survive("numbers of a glb", 200, move |random| {
         let mut binary = binary.clone();
         for _ in 0..=random.below(12) {
             let word = random.below(binary.len() / 4 - 1) * 4;
@@ -323,7 +316,7 @@ fn mutated_numbers_of_a_blender_file_are_planned_or_refused() {
 
 #[test]
 fn mutated_bytes_of_a_blender_file_are_planned_or_refused() {
-    survive("bytes of a glb", 800, |random| {
+    survive("bytes of a glb", 400, |random| {
         let mut bytes = BLENDER.to_vec();
         for _ in 0..=random.below(3) {
             let place = random.below(bytes.len());
@@ -339,31 +332,13 @@ fn mutated_bytes_of_a_blender_file_are_planned_or_refused() {
     });
 }
 
-/// A glb's lengths are the file's word, not the truth.
-#[test]
-fn wrong_lengths_of_a_glb_are_refused() {
-    for (at, lengths) in [(8, [0u32, 1, 11, 12, 19, 20, u32::MAX]), (12, [0, 1, 3, 7, 1 << 20, u32::MAX - 3, u32::MAX])] {
-        for length in lengths {
-            let mut bytes = BLENDER.to_vec();
-            bytes[at..at + 4].copy_from_slice(&length.to_le_bytes());
-            let what = format!("length {length} at {at}");
-            let fate = in_time(&what, move || plan(tempfile::tempdir().unwrap().path(), "a.glb", &bytes));
-            assert!(matches!(fate, Fate::Refused(_)), "{what}: {fate:?}");
-        }
-    }
-    for length in 0..24 {
-        let fate = in_time(&format!("{length} bytes"), move || plan(tempfile::tempdir().unwrap().path(), "a.glb", &BLENDER[..length]));
-        assert!(matches!(fate, Fate::Refused(_)), "{length} bytes: {fate:?}");
-    }
-}
-
 type Change = fn(&mut Value);
 
-/// Members that the specification asks for and a file leaves out.
+/// Members that the specification asks for and a file leaves out, and nodes within themselves, through which a walk without memory
+/// takes 2^depth steps.
 #[test]
-fn members_that_are_missing_are_refused() {
+fn documents_without_sense_are_refused() {
     let cases: &[(&str, Change)] = &[
-        ("an image in a buffer view without its type", |v| drop(v["images"][0].as_object_mut().unwrap().remove("mimeType"))),
         ("an image without a source", |v| v["images"][0] = json!({"name": "nothing"})),
         ("a perspective camera without its numbers", |v| v["cameras"][0] = json!({"type": "perspective"})),
         ("a camera of the other kind", |v| v["cameras"][0]["type"] = json!("orthographic")),
@@ -373,35 +348,21 @@ fn members_that_are_missing_are_refused() {
         ("a texture without a picture", |v| drop(v["textures"][0].as_object_mut().unwrap().remove("source"))),
         ("sparse values without any", |v| v["accessors"][0]["sparse"] = json!({"count": 3})),
         ("a scene that is not there", |v| v["scene"] = json!(4)),
+        ("a chain of double links", |v| {
+            v["nodes"] = (1..61).map(|k| if k < 60 { json!({"children": [k, k]}) } else { json!({}) }).collect();
+            v["scenes"][0]["nodes"] = json!([0]);
+        }),
+        ("a node three times within itself", |v| v["nodes"][0]["children"] = json!([0, 0, 0])),
     ];
-    let mut wrong = Vec::new();
     for (what, change) in cases {
         let mut value = square();
         change(&mut value);
-        let fate = catch_unwind(AssertUnwindSafe(|| plan_value(what, &value)));
-        // A picture that a browser would guess the type of may be read.
-        let is_guessed = what.contains("without its type") && matches!(fate, Ok(Fate::Planned(_)));
-        if !is_guessed && !matches!(fate, Ok(Fate::Refused(_))) {
-            wrong.push(*what);
-        }
+        assert_refused(what, &value);
     }
-    assert!(wrong.is_empty(), "not refused: {wrong:?}");
-}
-
-/// glTF's nodes are a tree. Where each node lists its successor twice, a walk without memory takes 2^depth
-/// steps.
-#[test]
-fn nodes_with_two_parents_end() {
+    // A picture that a browser would guess the type of may be read.
     let mut value = square();
-    let depth = 60;
-    let nodes: Vec<Value> = (0..depth).map(|k| if k + 1 < depth { json!({"children": [k + 1, k + 1]}) } else { json!({}) }).collect();
-    value["nodes"] = json!(nodes);
-    value["scenes"][0]["nodes"] = json!([0]);
-    assert_refused("a chain of double links", &value);
-
-    let mut value = square();
-    value["nodes"][0]["children"] = json!([0, 0, 0]);
-    assert_refused("a node three times within itself", &value);
+    value["images"][0].as_object_mut().unwrap().remove("mimeType");
+    plan_value("an image in a buffer view without its type", &value);
 }
 
 /// A few bytes that claim much.
@@ -444,40 +405,29 @@ fn textures_that_share_a_picture_share_its_memory() {
     assert_memory();
 }
 
-/// The mean of a texture over a triangle whose coordinates lie far apart.
+/// Texture coordinates that lie far apart, lights far from the scene, and scenes so small or large that a light's strength in their own
+/// unit leaves the range of f32.
 #[test]
-fn texture_coordinates_of_any_size_are_planned_or_refused() {
+fn numbers_out_of_range_are_planned_or_refused() {
     for far in [1e4, 1e9, 1e18, 1e19, 1e30, 3e38] {
         for second in [0.0, -far] {
             let value = square_with([second, 0., far, 0., 1., 1., 0., -far]);
             plan_value(&format!("coordinates from {second} to {far}"), &value);
         }
     }
-}
-
-/// Lights far from the scene, and scenes so small or large that a light's strength in their own unit leaves
-/// the range of f32.
-#[test]
-fn lights_out_of_range_are_planned_or_refused() {
-    let mut wrong = Vec::new();
     for factor in [1e-37, 1e-30, 1e-19, 1e-10, 1e10, 1e19, 1e29] {
         let mut value = square();
         value["nodes"][0]["scale"] = json!([factor, factor, factor]);
         value["nodes"][0].as_object_mut().unwrap().remove("translation");
-        if catch_unwind(AssertUnwindSafe(|| plan_value(&format!("scaled by {factor}"), &value))).is_err() {
-            wrong.push(format!("scale {factor}"));
-        }
+        plan_value(&format!("scaled by {factor}"), &value);
     }
     for distance in [1e6, 1e18, 3e38] {
         let mut value = square();
         value["nodes"][2]["translation"] = json!([0, distance, 0]);
         value["nodes"][4]["translation"] = json!([distance, 0, 0]);
         value["nodes"][1]["translation"] = json!([0, 0, distance]);
-        if catch_unwind(AssertUnwindSafe(|| plan_value(&format!("lights at {distance} m"), &value))).is_err() {
-            wrong.push(format!("distance {distance}"));
-        }
+        plan_value(&format!("lights at {distance} m"), &value);
     }
-    assert!(wrong.is_empty(), "{wrong:?}");
 }
 
 /// Triangles that lie on one another leave a hierarchy nothing to part them by.
@@ -508,12 +458,11 @@ fn a_billion_chunks_are_planned_at_once() {
 /// A name may hold anything; a complaint stays one line.
 #[test]
 fn names_with_line_breaks_do_not_break_the_line() {
-    let mut value = square();
-    value["nodes"][0]["name"] = json!("wall\nof\r\nmany\u{1b}[31m lines");
-    value["accessors"][1]["count"] = json!(3);
-    assert_one_line("a name of several lines", &value);
-
     let cases: &[(&str, Change)] = &[
+        ("a name of several lines", |v| {
+            v["nodes"][0]["name"] = json!("wall\nof\r\nmany\u{1b}[31m lines");
+            v["accessors"][1]["count"] = json!(3);
+        }),
         ("a version", |v| v["asset"]["version"] = json!("1\n0")),
         ("an extension", |v| v["extensionsRequired"] = json!(["EXT\nof\r\nlines"])),
         ("a file", |v| v["buffers"][0]["uri"] = json!("no%0Awhere.bin")),
@@ -522,14 +471,8 @@ fn names_with_line_breaks_do_not_break_the_line() {
     for (what, change) in cases {
         let mut value = square();
         change(&mut value);
-        assert_one_line(what, &value);
-    }
-}
-
-fn assert_one_line(what: &str, value: &Value) {
-    match plan_value(what, value) {
-        Fate::Refused(line) => assert!(!line.chars().any(char::is_control), "{what}: {line:?}"),
-        fate => panic!("{what} must be refused: {fate:?}"),
+        let Fate::Refused(line) = plan_value(what, &value) else { panic!("{what} must be refused") };
+        assert!(!line.chars().any(char::is_control), "{what}: {line:?}");
     }
 }
 
@@ -588,6 +531,10 @@ fn every_use_of_a_large_picture_counts() {
         let Fate::Refused(line) = fate(kinds, samplers) else { panic!("{kinds:?} must be refused") };
         assert!(line.contains("texels, the most that are read"), "{line}");
     }
+    // A few bytes whose picture would take 3 GiB.
+    let value = square_with_jpeg(|jpeg| claim(jpeg, 0x4000, 0x4000));
+    let Fate::Refused(line) = plan_value("16384 by 16384 texels", &value) else { panic!("must be refused") };
+    assert!(line.contains("texels"), "{line}");
     assert_memory();
 }
 
@@ -599,39 +546,6 @@ fn long_pictures_are_planned() {
         value["images"][0] = json!({"uri": data_uri("image/png", &encoded(&RgbImage::new(width, height), ImageFormat::Png))});
         assert_eq!(plan_value(&format!("{width} by {height} texels"), &value), Fate::Planned(3));
     }
-    assert_memory();
-}
-
-/// Members of the wrong kind are refused, or are as if they said nothing; they end nothing.
-#[test]
-fn members_of_the_wrong_kind_are_refused_or_say_nothing() {
-    let places = [
-        "/materials/0/normalTexture/extensions/KHR_texture_transform",
-        "/materials/0/extensions/KHR_materials_sheen/sheenRoughnessTexture/extensions/KHR_texture_transform",
-        "/materials/0/extensions/KHR_materials_sheen/sheenRoughnessTexture",
-        "/materials/0/extensions/KHR_materials_clearcoat",
-        "/materials/0/extensions/KHR_materials_clearcoat/clearcoatNormalTexture",
-        "/materials/1/extensions/KHR_materials_volume",
-        "/materials/1/extensions/KHR_materials_volume/attenuationColor",
-        "/materials/2/extensions/KHR_materials_pbrSpecularGlossiness",
-        "/materials/3/extensions/KHR_materials_unlit",
-        "/materials/0/extensions",
-    ];
-    for place in places {
-        for new in [json!([]), json!({}), json!(null), json!("much"), json!(-1), json!([1, 2, 3, 4, 5, 6, 7, 8]), json!({"index": 99})] {
-            let mut value = square();
-            *value.pointer_mut(place).unwrap() = new.clone();
-            plan_value(&format!("{new} at {place}"), &value);
-        }
-    }
-}
-
-/// A few bytes that claim a picture whose numbers would take 3 GiB: it is refused for its size before it is unfolded.
-#[test]
-fn pictures_that_claim_too_much_are_refused_before_they_are_decoded() {
-    let value = square_with_jpeg(|jpeg| claim(jpeg, 0x4000, 0x4000));
-    let Fate::Refused(line) = plan_value("16384 by 16384 texels", &value) else { panic!("must be refused") };
-    assert!(line.contains("texels"), "{line}");
     assert_memory();
 }
 
@@ -662,11 +576,11 @@ fn skies_of_any_bytes_are_read_or_refused() {
             })
         };
         assert!(read(&whole));
-        let cut = (0..whole.len()).step_by(7).filter(|length| read(&whole[..*length])).count();
-        assert!(cut < whole.len() / 14, "{name}: {cut}");
+        let cut = (0..whole.len()).step_by(19).filter(|length| read(&whole[..*length])).count();
+        assert!(cut < whole.len() / 38, "{name}: {cut}");
         let mut random = Random(SEED);
         let mut sound = 0;
-        for _ in 0..400 {
+        for _ in 0..200 {
             let mut content = whole.clone();
             for _ in 0..1 + random.below(3) {
                 // Half of them in the head, where sizes stand.
@@ -696,7 +610,7 @@ fn extensions_with_changed_members_are_read_or_refused() {
     ];
     let mut random = Random(SEED);
     let mut read = 0;
-    for case in 0..1200 {
+    for case in 0..600 {
         let mut value = files[case % files.len()].clone();
         for _ in 0..1 + random.below(2) {
             change(&mut value, &mut random);
@@ -717,7 +631,7 @@ fn extensions_with_changed_members_are_read_or_refused() {
             }
         }));
     }
-    assert!((200..1150).contains(&read), "{read}");
+    assert!((100..575).contains(&read), "{read}");
     assert_memory();
 }
 
@@ -833,7 +747,7 @@ fn checkpoints_of_any_header_are_refused_or_of_use() {
         let (header, arrays) = whole[24..whole.len() - 32].split_at(length);
         let mut random = Random(SEED);
         let (mut taken, mut refused) = (0, 0);
-        for _ in 0..1500 {
+        for _ in 0..600 {
             let bytes = with_header(header, &mut random, |header| {
                 let mut bytes = [&whole[..16], &(header.len() as u64).to_le_bytes(), header, arrays].concat();
                 let checksum = Sha256::digest(&bytes);
@@ -851,7 +765,7 @@ fn checkpoints_of_any_header_are_refused_or_of_use() {
                 }
             }
         }
-        assert!(taken > 100 && refused > 100, "{taken} taken, {refused} refused");
+        assert!(taken > 40 && refused > 40, "{taken} taken, {refused} refused");
     }
 }
 
@@ -880,7 +794,7 @@ fn photon_maps_of_any_header_are_refused_or_of_use() {
     let start = tail - u64::from_le_bytes(whole[tail..tail + 8].try_into().unwrap()) as usize;
     let mut random = Random(SEED);
     let (mut taken, mut refused) = (0, 0);
-    for _ in 0..1500 {
+    for _ in 0..600 {
         let bytes = with_header(&whole[start..tail], &mut random, |header| {
             [&whole[..start], header, &(header.len() as u64).to_le_bytes(), &Sha256::digest(header), &whole[..16]].concat()
         });
@@ -903,5 +817,5 @@ fn photon_maps_of_any_header_are_refused_or_of_use() {
             }
         }
     }
-    assert!(taken > 100 && refused > 100, "{taken} taken, {refused} refused");
+    assert!(taken > 40 && refused > 40, "{taken} taken, {refused} refused");
 }

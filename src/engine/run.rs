@@ -258,7 +258,7 @@ impl<'a, W: World> Run<'a, W> {
             bias: None,
             dispatches,
             submissions,
-            pipelines: device.map_or(0, |(gpu, before)| gpu.pipeline_count() - before),
+            pipelines: device.map_or(0, |(gpu, before)| gpu.work().pipelines - before),
             nonfinite_values,
             timings: recorder.finish(),
             plan: plan.clone(),
@@ -296,7 +296,7 @@ pub fn commands<'gpu>(
     started: Instant,
 ) -> Result<(Commands<'gpu>, usize)> {
     check_math(gpu, math)?;
-    let pipelines_before = gpu.pipeline_count();
+    let pipelines_before = gpu.work().pipelines;
     gpu.prepare(modules, &constants)?;
     let mut commands = Commands::new(gpu, constants, started)?;
     commands.timings().count("run");

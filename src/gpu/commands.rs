@@ -12,7 +12,7 @@ use bytemuck::Pod;
 use super::clock::{self, LEAST_WARM_UP};
 use super::pace::Pace;
 use super::timestamps::{TimedScope, Timestamps};
-use super::{AnyBuffer, Buffer, Constants, Context, DeviceFacts, Gpu, Kernel, Memory, call};
+use super::{AnyBuffer, Buffer, Constants, Context, DeviceFacts, Gpu, Kernel, Memory, Work, call};
 use crate::error::{Error, Result};
 use crate::records::DispatchArgs;
 use crate::timings::{Clock, Handled, Span, Timings};
@@ -234,17 +234,24 @@ impl<'gpu> Commands<'gpu> {
             if module.push_bytes != 0 {
                 device.cmd_push_constants(command_buffer, pipeline.layout, vk::ShaderStageFlags::COMPUTE, 0, bytemuck::bytes_of(push));
             }
-            match extent {
+            let groups = match extent {
                 Extent::Items(items) => {
                     let DispatchArgs { x, y, z } = self.fold(items.div_ceil(u64::from(self.constants.group_size)));
                     device.cmd_dispatch(command_buffer, x, y, z);
+                    u64::from(x) * u64::from(y)
                 }
                 Extent::Groups(x, y) => {
                     assert!(x <= self.gpu.facts.work_group_count_x && y <= self.gpu.facts.work_group_count_y, "{x} x {y} groups");
                     device.cmd_dispatch(command_buffer, x, y, 1);
+                    u64::from(x) * u64::from(y)
                 }
-                Extent::Indirect(args) => device.cmd_dispatch_indirect(command_buffer, args.any().raw(), 0),
-            }
+                Extent::Indirect(args) => {
+                    device.cmd_dispatch_indirect(command_buffer, args.any().raw(), 0);
+                    0
+                }
+            };
+            let invocations = groups * u64::from(self.constants.group_size);
+            self.gpu.add_work(Work { dispatches: 1, invocations, ..Work::default() });
         }
         self.dispatch_count += 1;
         Ok(())

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::reconvergence::reconverging;
 use super::specialize::{content, decided};
-use super::{AnyBuffer, Context, DeviceFacts, Gpu, call};
+use super::{AnyBuffer, Context, DeviceFacts, Gpu, Work, call};
 use crate::error::Result;
 use crate::records::Field;
 
@@ -207,15 +207,11 @@ impl Gpu {
             self.context.set_name(pipeline.raw, key.kernel);
             let pipeline = Arc::new(pipeline);
             let mut pipelines = self.pipelines.borrow_mut();
+            self.add_work(Work { pipelines: 1, ..Work::default() });
             pipelines.made.insert((key.kernel, content), pipeline.clone());
             pipelines.by_key.insert(key, pipeline);
         }
         Ok(())
-    }
-
-    /// Pipelines made so far.
-    pub fn pipeline_count(&self) -> usize {
-        self.pipelines.borrow().made.len()
     }
 
     /// SPIR-V of a kernel, or what stands for it in this device.

@@ -72,11 +72,21 @@ pub struct Options {
     pub replaced: Vec<(String, Vec<u32>)>,
 }
 
+/// What a device has been asked to do so far, by counts, which no clock disturbs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Work {
+    pub pipelines: usize,
+    pub dispatches: u64,
+    /// Of dispatches whose size the host knows.
+    pub invocations: u64,
+}
+
 /// An open device, of one thread at a time.
 pub struct Gpu {
     facts: DeviceFacts,
     options: Options,
     idleness: Cell<Idleness>,
+    work: Cell<Work>,
     queue: vk::Queue,
     pipelines: RefCell<kernel::Pipelines>,
     set_layouts: kernel::SetLayouts,
@@ -210,6 +220,7 @@ impl Gpu {
             facts,
             options: options.clone(),
             idleness: Cell::new(Idleness::new(Instant::now())),
+            work: Cell::default(),
             queue,
             pipelines: RefCell::default(),
             set_layouts: kernel::SetLayouts::new(&context),
@@ -242,6 +253,19 @@ impl Gpu {
 
     pub fn facts(&self) -> &DeviceFacts {
         &self.facts
+    }
+
+    pub fn work(&self) -> Work {
+        self.work.get()
+    }
+
+    fn add_work(&self, more: Work) {
+        let Work { pipelines, dispatches, invocations } = self.work.get();
+        self.work.set(Work {
+            pipelines: pipelines + more.pipelines,
+            dispatches: dispatches + more.dispatches,
+            invocations: invocations + more.invocations,
+        });
     }
 
     /// Opens the device anew, as is needed where it was lost. Nothing that was made with it is of use then.

@@ -187,10 +187,12 @@ pub(super) fn content(words: &[u32], constants: &[(u32, u32)]) -> [u8; 32] {
     hash.finalize().into()
 }
 
+type Instructions<'a> = Vec<&'a [u32]>;
+
 /// What stands before the first function, and the functions by their ids.
-fn parts(words: &[u32]) -> (Vec<&[u32]>, HashMap<u32, Vec<&[u32]>>) {
+fn parts(words: &[u32]) -> (Instructions<'_>, HashMap<u32, Instructions<'_>>) {
     let mut globals = Vec::new();
-    let mut functions: HashMap<u32, Vec<&[u32]>> = HashMap::new();
+    let mut functions: HashMap<u32, Instructions> = HashMap::new();
     let mut current = None;
     for instruction in instructions(words) {
         if opcode(instruction) == op::FUNCTION {
@@ -205,7 +207,7 @@ fn parts(words: &[u32]) -> (Vec<&[u32]>, HashMap<u32, Vec<&[u32]>>) {
 }
 
 /// Instructions of a function, in their order, without the blocks that no way leads to.
-fn reached<'a>(function: &[&'a [u32]]) -> Vec<&'a [u32]> {
+fn reached<'a>(function: &[&'a [u32]]) -> Instructions<'a> {
     let mut block = 0;
     let mut ways: HashMap<u32, Vec<u32>> = HashMap::new();
     for instruction in function {

@@ -102,9 +102,24 @@ pub fn scene(kind: &str) -> Scene {
     }
 }
 
+/// What some of these scenes need, all have: one set of kernels serves them all.
+const EFFECTS: [Effect; 11] = [
+    Effect::Bvh,
+    Effect::SmoothNormals,
+    Effect::SpecularChains,
+    Effect::Textures,
+    Effect::TwoSided,
+    Effect::MeshLights,
+    Effect::PointLights,
+    Effect::SpotLights,
+    Effect::DiscLights,
+    Effect::DirectionalLights,
+    Effect::Environment,
+];
+
 pub fn settings(photons: u32, aim: bool) -> SceneSettings {
     let caustic = SceneSettings { part: Part::Caustic, caustic_radius: Some(0.2), alpha: 1.0, ..by_rounds() };
-    SceneSettings { caustic_photons: photons, aim, bounces: 12, rounds: 1, ..caustic }
+    SceneSettings { caustic_photons: photons, aim, bounces: 12, rounds: 1, with: EFFECTS.into(), ..caustic }
 }
 
 /// Runs of other seeds on either side.
@@ -117,23 +132,26 @@ pub fn mean_and_error(values: &[f64]) -> (f64, f64) {
 }
 
 /// Adds the light of all photons and that of aimed ones: over the floor, in each channel that differs, and at each point
-/// that has more than a fifth of the brightest. The runs have `photons` and `aimed` ones each.
-pub fn compare(gpu: &Gpu, kind: &str, [photons, aimed]: [u32; 2], family: &mut Family) {
+/// that has more than a fifth of the brightest. The runs have so many photons of all directions and so many aimed ones each. Returns
+/// how many times as large the error of the whole would be by as many photons that are not aimed.
+pub fn compare(gpu: &Gpu, kind: &str, photons: [u32; 2], family: &mut Family) -> f64 {
     let (scene, points) = (scene(kind), grid(0.0, DVec3::Y, 4));
     let of = |photons, aim, first| irradiances(gpu, &scene, &settings(photons, aim), &points, first..first + RUNS);
-    let (all, aimed) = (of(photons, false, 1), of(aimed, true, 100));
+    let (all, aimed) = (of(photons[0], false, 1), of(photons[1], true, 100));
     let mut expect = |what: String, value: &dyn Fn(&[DVec3]) -> f64| {
         let [(expected, expected_error), (found, error)] =
             [&all, &aimed].map(|runs| mean_and_error(&runs.iter().map(|run| value(run)).collect::<Vec<_>>()));
         family.expect_estimate(what, found, error.hypot(expected_error), RUNS as u32, expected);
+        expected_error / error * f64::from(photons[0]).sqrt() / f64::from(photons[1]).sqrt()
     };
-    expect(format!("{kind}: whole"), &|run| run.iter().map(|light| light.x).sum());
+    let gain = expect(format!("{kind}: whole"), &|run| run.iter().map(|light| light.x).sum());
     expect(format!("{kind}: blue"), &|run| run.iter().map(|light| light.z).sum());
     let brightness = |place: usize| all.iter().map(|run| run[place].x).sum::<f64>();
     let brightest = (0..points.len()).map(brightness).fold(0.0, f64::max);
     for place in (0..points.len()).filter(|place| brightness(*place) > 0.2 * brightest) {
         expect(format!("{kind}: point {place}"), &|run| run[place].x);
     }
+    gain
 }
 
 /// Whether aimed photons bring as much light, to some per cent.

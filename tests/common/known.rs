@@ -10,6 +10,30 @@ use super::lit::light;
 use super::prelude::*;
 use crate::engine::unseen_light::room_without_floor;
 use photonmill::engine::scene::{RunResult, Target, View, render, trial};
+use photonmill::verify::selfcheck::Estimate;
+
+/// Settings that keep every kind of light and what many scenes need, also where a scene lacks it, which changes no bit
+/// (`tests/light/transport.rs`): so scenes share kernels, and a software device compiles them once.
+pub fn kept(settings: SceneSettings) -> SceneSettings {
+    let with = [
+        Effect::MeshLights,
+        Effect::PointLights,
+        Effect::SpotLights,
+        Effect::DirectionalLights,
+        Effect::DiscLights,
+        Effect::Environment,
+        Effect::Bvh,
+        Effect::TwoSided,
+    ];
+    SceneSettings { with: [&settings.with[..], &with].concat(), ..settings }
+}
+
+/// Mean of points in one run, whose rounds are its independent values. Points share photons: as if their errors were one.
+pub fn mean_irradiance(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, points: &[(DVec3, DVec3)]) -> Estimate {
+    let lit = received(gpu, scene, settings, points);
+    let error = standard_errors(&lit).iter().map(|error| error.x).sum::<f64>() / points.len() as f64;
+    Estimate { mean: mean_red(&lit), standard_error: error }
+}
 
 /// The red channel of a point or pixel, sure to three parts in a hundred and right to its error.
 fn check_mean(what: &str, lit: &RunResult, place: usize, expected: f64, tolerance: f64) -> Check<Complaint> {
@@ -245,8 +269,9 @@ pub fn none_returns(what: &str, lit: &RunResult) -> Check<Complaint> {
 
 /// Direct light of a picture of so many pixels a side, by the tree and by the list of all triangles.
 fn by_tree_and_list(gpu: &Gpu, scene: &Scene, camera: &Camera, side: u32) -> [RunResult; 2] {
-    let usual = || SceneSettings { rounds: 1, part: Part::Direct, ..by_rounds() };
-    let by_tree = SceneSettings { with: vec![Effect::Bvh], ..usual() };
+    let with = || vec![Effect::MeshLights, Effect::DirectionalLights, Effect::TwoSided];
+    let usual = || SceneSettings { rounds: 1, part: Part::Direct, with: with(), ..by_rounds() };
+    let by_tree = SceneSettings { with: [with(), vec![Effect::Bvh]].concat(), ..usual() };
     let by_list = SceneSettings { without: vec![Effect::Bvh], ..usual() };
     let [tree, list] = [by_tree, by_list].map(|settings| seen(gpu, scene, &settings, camera, [side; 2]));
     assert!(tree.plan.keeps(Effect::Bvh) && !list.plan.keeps(Effect::Bvh));
@@ -307,12 +332,18 @@ fn coarse_sphere(material: Material, segments: u32, light: LightKind) -> Scene {
     }
 }
 
+/// Mirrors and glass share kernels.
+fn of_coarse_spheres(settings: SceneSettings) -> SceneSettings {
+    let with = vec![Effect::SpecularChains, Effect::Environment, Effect::MeshLights, Effect::DirectionalLights];
+    SceneSettings { with, ..settings }
+}
+
 /// Under a sky that is 1 everywhere a coarse sphere that keeps all light is not to be seen at any pixel, as the sky is behind every
 /// path however smooth normals turn it.
 pub fn coarse_sphere_in_a_furnace(gpu: &Gpu, material: Material, segments: u32) -> Check<Complaint> {
     let scene = coarse_sphere(material, segments, LightKind::Environment { radiance: Vec3::ONE });
     let camera = Camera::looking_at("front", DVec3::new(0.3, 0.4, 4.0), DVec3::ZERO, DVec3::Y, 0.55);
-    let settings = SceneSettings { samples: 1, rounds: 16, photons: 1000, ..by_rounds() };
+    let settings = of_coarse_spheres(SceneSettings { samples: 1, rounds: 16, photons: 1000, ..by_rounds() });
     let lit = seen(gpu, &scene, &settings, &camera, [48, 48]);
     let pixels = (0..lit.film.pixels()).map(|pixel| lit.film.mean(pixel).x);
     let darkest = pixels.fold(f64::INFINITY, f64::min);
@@ -325,7 +356,7 @@ pub fn coarse_sphere_in_a_furnace(gpu: &Gpu, material: Material, segments: u32) 
 pub fn coarse_sphere_in_the_sun(gpu: &Gpu, material: Material, segments: u32) -> Check<Complaint> {
     let sun = LightKind::Directional { direction: DVec3::new(0.2, -1.0, 0.3).normalize(), irradiance: Vec3::ONE };
     let scene = coarse_sphere(material, segments, sun);
-    let settings = SceneSettings { photons: 50_000, rounds: 1, illumination: Illumination::Photons, ..by_rounds() };
+    let settings = of_coarse_spheres(SceneSettings { photons: 50_000, rounds: 1, illumination: Illumination::Photons, ..by_rounds() });
     let lit = received(gpu, &scene, &settings, &[(DVec3::new(3.005, -3.0, 3.005), DVec3::Y)]);
     let ledger = lit.fates[0].ledger();
     assert!(ledger.closes(), "{ledger}");
@@ -342,7 +373,8 @@ pub fn coarse_sphere_in_the_sun(gpu: &Gpu, material: Material, segments: u32) ->
 }
 
 /// Photons that such a sphere passes on light the ground about it as paths from the ground do, which turn the other way.
-pub fn ground_by_a_coarse_sphere(gpu: &Gpu, material: Material, segments: u32) -> Check<Complaint> {
+/// The judge has this many paths a point: with the fewer of them a tenth of the light is noticed.
+pub fn ground_by_a_coarse_sphere(gpu: &Gpu, material: Material, segments: u32, paths: u32) -> Check<Complaint> {
     let mut scene = coarse_sphere(material, segments, LightKind::Environment { radiance: Vec3::splat(1e-6) });
     scene.materials.push(Material { emission: Vec3::splat(10.0), ..matt(0.0) });
     let (x, z) = (DVec3::X, DVec3::Z);
@@ -350,15 +382,16 @@ pub fn ground_by_a_coarse_sphere(gpu: &Gpu, material: Material, segments: u32) -
     scene.meshes.push(Mesh::parallelogram("lamp", DVec3::new(-4.0, 3.0, -4.0), x * 8.0, z * 8.0, 2));
     let places = [-2.0, -1.0, 0.0, 1.0, 2.0];
     let points: Vec<_> = places.iter().flat_map(|x| places.map(|z| (DVec3::new(*x, -1.2, z), DVec3::Y))).collect();
-    let settings = SceneSettings { caustic_photons: 200_000, caustic_radius: Some(0.2), rounds: 8, part: Part::Caustic, ..by_rounds() };
+    let caustic = SceneSettings { caustic_photons: 5 * paths, caustic_radius: Some(0.2), rounds: 8, part: Part::Caustic, ..by_rounds() };
+    let settings = of_coarse_spheres(caustic);
     let lit = received(gpu, &scene, &settings, &points);
-    let truth = Judge::new(&scene, 64).irradiance_at(&points, 40_000, 1);
+    let truth = Judge::new(&scene, 64).irradiance_at(&points, paths, 1);
     let count = points.len() as f64;
     let expected = truth.iter().map(|point| point.mean.caustic.x).sum::<f64>() / count;
     let error = (0..points.len()).map(|place| red(&lit, place).1.powi(2)).sum::<f64>();
     let error = (error + truth.iter().map(|point| point.standard_error.caustic.x.powi(2)).sum::<f64>()).sqrt() / count;
     println!("{segments} segments: {} on the ground, {expected} +- {error} expected", mean_red(&lit));
-    assert!(error < 0.02 * expected, "{error} of {expected}");
+    assert!(error < if paths < 10_000 { 0.04 } else { 0.02 } * expected, "{error} of {expected}");
     estimate_check("the ground", mean_red(&lit), expected, error)
 }
 

@@ -49,30 +49,34 @@ pub fn points() -> Vec<(DVec3, DVec3)> {
     floor.chain(right).chain(back).collect()
 }
 
-/// Irradiance at points, with a plan by a trial that may be changed, or without one.
-pub fn lit(
-    gpu: &Gpu,
-    scene: &Scene,
-    settings: &SceneSettings,
-    points: &[(DVec3, DVec3)],
-    change: Option<&dyn Fn(&mut ScenePlan)>,
-) -> RunResult {
-    let geometry = Geometry::new(scene).unwrap();
+/// What a device would do for points: by what a trial sees of the lights, or without one.
+pub fn planned(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, points: &[(DVec3, DVec3)], by_sight: bool) -> (Geometry, ScenePlan) {
     let target = Target::Points(points);
+    if !by_sight {
+        return scene_plan(gpu, scene, settings, target.sensor()).unwrap();
+    }
+    let geometry = Geometry::new(scene).unwrap();
     let view = View { geometry: &geometry, camera: None, phases: &target.phases(&geometry) };
-    let plan = match change {
-        Some(change) => {
-            let mut plan = trial::plan(gpu, scene, &view, settings, target.sensor()).unwrap();
-            change(&mut plan);
-            plan
-        }
-        None => ScenePlan::new(scene, &geometry, settings, target.sensor(), &engine::limits(gpu.facts())).unwrap(),
-    };
-    super::lit::light(gpu, &view, plan)
+    let plan = trial::plan(gpu, scene, &view, settings, target.sensor()).unwrap();
+    (geometry, plan)
 }
 
-pub fn direct(rounds: u32) -> SceneSettings {
-    SceneSettings { rounds, part: Part::Direct, paranoid: true, ..by_rounds() }
+/// Irradiance at points by such a plan.
+pub fn lit_as(gpu: &Gpu, (geometry, plan): (Geometry, ScenePlan), points: &[(DVec3, DVec3)]) -> RunResult {
+    super::lit::light(gpu, &View { geometry: &geometry, camera: None, phases: &Target::Points(points).phases(&geometry) }, plan)
+}
+
+pub fn lit(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, points: &[(DVec3, DVec3)], by_sight: bool) -> RunResult {
+    lit_as(gpu, planned(gpu, scene, settings, points, by_sight), points)
+}
+
+/// Rooms with and without a screen, and of few triangles or many, have one set of kernels.
+pub fn usual() -> SceneSettings {
+    SceneSettings { with: vec![Effect::Bvh, Effect::TwoSided], paranoid: true, ..by_rounds() }
+}
+
+fn direct(rounds: u32) -> SceneSettings {
+    SceneSettings { rounds, part: Part::Direct, ..usual() }
 }
 
 /// Whether the first points of a run have the light of another run within both errors, and no more than so many times its variance,
@@ -94,10 +98,9 @@ pub fn same_light_and_noise(what: &str, found: &RunResult, expected: &RunResult,
 
 /// Direct light of a room beside one whose lamp is so many times as strong, compared with that of the room alone.
 pub fn dim_room(gpu: &Gpu, ratio: f32, by_sight: bool) -> Check<Complaint> {
-    let change: &dyn Fn(&mut ScenePlan) = &|_| {};
-    let alone = lit(gpu, &rooms(&[1.0]), &direct(128), &points(), None);
+    let alone = lit(gpu, &rooms(&[1.0]), &direct(128), &points(), false);
     let both = [points(), points().into_iter().map(|(at, normal)| (at + ROOM, normal)).collect()].concat();
-    let found = lit(gpu, &rooms(&[1.0, ratio]), &direct(128), &both, by_sight.then_some(change));
+    let found = lit(gpu, &rooms(&[1.0, ratio]), &direct(128), &both, by_sight);
     same_light_and_noise(&format!("a room beside one of {ratio:e}"), &found, &alone, 3.0)
 }
 
@@ -118,9 +121,8 @@ pub fn cut_lamp(side: u32) -> Scene {
 
 /// Direct light of a lamp of many pieces, compared with that of the lamp as one.
 pub fn many_lamps(gpu: &Gpu, side: u32, by_sight: bool) -> Check<Complaint> {
-    let change: &dyn Fn(&mut ScenePlan) = &|_| {};
-    let whole = lit(gpu, &cut_lamp(1), &direct(128), &points(), None);
-    let found = lit(gpu, &cut_lamp(side), &direct(128), &points(), by_sight.then_some(change));
+    let whole = lit(gpu, &cut_lamp(1), &direct(128), &points(), false);
+    let found = lit(gpu, &cut_lamp(side), &direct(128), &points(), by_sight);
     same_light_and_noise(&format!("{side} x {side} lamps"), &found, &whole, 2.0)
 }
 
@@ -129,18 +131,12 @@ pub fn missed_lamp(gpu: &Gpu) -> Check<Complaint> {
     let lamps = [-1.0, 1.0].map(|x| square_lamp(dvec3(x, 2.9, 0.5), 0.6, 1)).to_vec();
     let scene = scene_of([dark_room(DVec3::ZERO), lamps].concat(), vec![matt(0.5), lamp_of(1.0)], vec![]);
     let floor: Vec<_> = points().into_iter().take(25).collect();
-    let by_power = lit(gpu, &scene, &direct(256), &floor, None);
-    let missed = lit(
-        gpu,
-        &scene,
-        &direct(256),
-        &floor,
-        Some(&|plan| {
-            let lights = Arc::make_mut(plan.trial.as_mut().and_then(|trial| trial.lights.as_mut()).expect("a trial learned of lights"));
-            assert_eq!(lights.clusters, 4);
-            lights.shares = [0.5, 1.0, 1.0, 1.0, 0.0, 0.0, 0.5, 1.0].repeat(lights.shares.len() / 8);
-        }),
-    );
+    let by_power = lit(gpu, &scene, &direct(256), &floor, false);
+    let (geometry, mut plan) = planned(gpu, &scene, &direct(256), &floor, true);
+    let lights = Arc::make_mut(plan.trial.as_mut().and_then(|trial| trial.lights.as_mut()).expect("a trial learned of lights"));
+    assert_eq!(lights.clusters, 4);
+    lights.shares = [0.5, 1.0, 1.0, 1.0, 0.0, 0.0, 0.5, 1.0].repeat(lights.shares.len() / 8);
+    let missed = lit_as(gpu, (geometry, plan), &floor);
     // One place in four asks for it, so that it has far more noise.
     same_light_and_noise("a lamp that the trial missed", &missed, &by_power, f64::INFINITY)
 }
@@ -155,10 +151,10 @@ pub fn screened(mut rooms: Scene) -> Scene {
 
 /// All light of the first of these rooms, from defaults but for fewer photons, compared with that of the room alone.
 pub fn scattered_light(gpu: &Gpu, ratio: f32, by_sight: bool) -> Check<Complaint> {
-    let settings = SceneSettings { photons: 1 << 15, paranoid: true, ..by_rounds() };
+    let settings = SceneSettings { photons: 1 << 15, ..usual() };
     let all = |scene: &Scene| match by_sight {
         true => scene::render(gpu, scene, &settings, Target::Points(&points())).unwrap(),
-        false => lit(gpu, scene, &settings, &points(), None),
+        false => lit(gpu, scene, &settings, &points(), false),
     };
     let [alone, found] = [all(&rooms(&[1.0])), all(&rooms(&[1.0, ratio]))];
     let unknown = found.film.unknown(0.95);
@@ -176,10 +172,9 @@ pub fn scattered_light(gpu: &Gpu, ratio: f32, by_sight: bool) -> Check<Complaint
 /// A lamp that lights no point itself, but the ceiling that lights them, beside a room whose lamp is so many times as strong.
 pub fn hidden_lamp(gpu: &Gpu, ratio: f32, by_sight: bool) -> Check<Complaint> {
     let floor: Vec<_> = points().into_iter().take(25).collect();
-    let settings = SceneSettings { photons: 1 << 14, rounds: 24, radius: Some(0.4), part: Part::Indirect, ..by_rounds() };
-    let change: &dyn Fn(&mut ScenePlan) = &|_| {};
-    let alone = lit(gpu, &screened(rooms(&[1.0])), &settings, &floor, None);
-    let found = lit(gpu, &screened(rooms(&[1.0, ratio])), &settings, &floor, by_sight.then_some(change));
+    let settings = SceneSettings { photons: 1 << 14, rounds: 24, radius: Some(0.4), part: Part::Indirect, ..usual() };
+    let alone = lit(gpu, &screened(rooms(&[1.0])), &settings, &floor, false);
+    let found = lit(gpu, &screened(rooms(&[1.0, ratio])), &settings, &floor, by_sight);
     same_light_and_noise(&format!("a hidden lamp beside one of {ratio:e}"), &found, &alone, 4.0)
 }
 
@@ -209,7 +204,7 @@ pub fn bright_spot(gpu: &Gpu, wrap: Wrap, illumination: Illumination) -> Check<C
     let (texture, mesh) = (&scene.textures[0], &scene.meshes[1]);
     let points: Vec<_> = [(0.1, 0.0), (-0.9, 0.4), (0.6, 0.8)].map(|(x, z)| (dvec3(x, 0.0, z), DVec3::Y)).into();
     let settings = SceneSettings { illumination, photons: 1 << 14, rounds: 64, radius: Some(0.1), alpha: 1.0, ..by_rounds() };
-    let found = lit(gpu, &scene, &settings, &points, None);
+    let found = lit(gpu, &scene, &settings, &points, false);
     // Between four places a texel samples are linear.
     let steps = 1024;
     let (origin, u, v) = (mesh.positions[0], mesh.positions[1] - mesh.positions[0], mesh.positions[3] - mesh.positions[0]);

@@ -25,6 +25,7 @@ pub mod reference;
 pub mod rich_file;
 pub mod sheets;
 pub mod sources;
+pub mod work;
 
 use std::cmp::Ordering;
 use std::fmt::Display;
@@ -34,6 +35,7 @@ use std::sync::Mutex;
 use photonmill::engine::nonfinite_values::NonfiniteValues;
 use photonmill::engine::room::resources::RoomResources;
 use photonmill::engine::room::{self, RunResult, estimate, index};
+use photonmill::gpu::Work;
 use photonmill::records::RandomKey;
 use photonmill::rng::{self, Streams};
 use photonmill::scene::room::Wall;
@@ -42,6 +44,8 @@ use prelude::*;
 /// A device under the validation layer, which must not have said a word by the end of the test, nor may anything be held.
 pub struct Device {
     gpu: Option<Gpu>,
+    /// What it had done before this test.
+    before: Work,
     /// Of tests that may use it after this one; `None` where no other may.
     idle: Option<&'static Idle>,
 }
@@ -62,15 +66,24 @@ impl Deref for Device {
     }
 }
 
+impl Device {
+    /// From now on runs this SPIR-V in place of the kernels' own, until the test ends.
+    pub fn replace(&mut self, replaced: Vec<(String, Vec<u32>)>) {
+        self.gpu.as_mut().expect("it goes with the test").replace(replaced);
+    }
+}
+
 impl Drop for Device {
     fn drop(&mut self) {
+        work::of_device(self.before, self.work());
         // A test that fails already says why.
         if std::thread::panicking() {
             return;
         }
         self.check_validation().unwrap();
         assert_eq!((self.held_memory().device_bytes, self.held_memory().staging_bytes), (0, 0), "buffers are left");
-        if let (Some(idle), Some(gpu)) = (self.idle, self.gpu.take()) {
+        if let (Some(idle), Some(mut gpu)) = (self.idle, self.gpu.take()) {
+            gpu.replace(Vec::new());
             idle.lock().unwrap().push(gpu);
         }
     }
@@ -89,7 +102,7 @@ pub fn counting_device() -> Option<Device> {
 /// A device that tests use one after another, or that no test has used before.
 fn shared(idle: &'static Idle, options: Options) -> Option<Device> {
     let used = idle.lock().unwrap().pop();
-    used.or_else(|| open(options)).map(|gpu| Device { gpu: Some(gpu), idle: Some(idle) })
+    used.or_else(|| open(options)).map(|gpu| Device { before: gpu.work(), gpu: Some(gpu), idle: Some(idle) })
 }
 
 /// A device that has made no pipeline yet.
@@ -99,7 +112,7 @@ pub fn fresh_device() -> Option<Device> {
 
 /// The same with some of its abilities masked off.
 pub fn device_with(options: Options) -> Option<Device> {
-    open(options).map(|gpu| Device { gpu: Some(gpu), idle: None })
+    open(options).map(|gpu| Device { before: Work::default(), gpu: Some(gpu), idle: None })
 }
 
 /// Whether `PHOTONMILL_NO_GPU=1` asks to go without a device.
@@ -111,6 +124,7 @@ pub fn no_gpu() -> bool {
 pub fn open(options: Options) -> Option<Gpu> {
     if no_gpu() {
         eprintln!("SKIPPED: PHOTONMILL_NO_GPU=1, so nothing that needs a GPU was tested here");
+        work::of_skipped();
         return None;
     }
     let options = Options { device: std::env::var("PHOTONMILL_DEVICE").ok(), validate: true, ..options };

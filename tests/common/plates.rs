@@ -64,13 +64,6 @@ impl Plates {
         (place, self.scene.meshes.last_mut().expect("one was added"))
     }
 
-    /// One of these in each row.
-    pub fn add_to_all(&mut self, material: &Material) {
-        for row in 0..COSINES.len() {
-            self.add(row, material.clone());
-        }
-    }
-
     /// Means and standard errors of what is seen in the middle of each plate, in the order in which they were added.
     pub fn seen(&self, gpu: &Gpu, settings: &SceneSettings) -> (Vec<DVec3>, Vec<DVec3>) {
         let size = [2 * self.columns - 1, 2 * COSINES.len() - 1];

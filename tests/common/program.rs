@@ -1,16 +1,58 @@
 //! The program as a user starts it: a command line in a folder of its own, and what it leaves there.
 
+use std::io::{BufRead, BufReader, Lines, Read};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::process::{Child, ChildStderr, Command, Output, Stdio};
+use std::sync::mpsc::{self, Sender};
+use std::time::Duration;
 
 use serde_json::Value;
 
-use super::no_gpu;
+use super::{no_gpu, work};
 
 pub const PROGRAM: &str = env!("CARGO_BIN_EXE_photonmill");
 
+/// What has not happened by then does not happen, however busy the machine.
+pub const PATIENCE: Duration = Duration::from_secs(600);
+
 /// A folder of its own in which the program runs.
 pub struct Place(tempfile::TempDir);
+
+/// A run that goes on until a signal ends it, or the end of its test.
+pub struct Running {
+    child: Child,
+    lines: Lines<BufReader<ChildStderr>>,
+    /// Kills what hangs; ends when this is dropped.
+    _guard: Sender<()>,
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+impl Running {
+    /// The next line on stderr that holds a word.
+    #[track_caller]
+    pub fn line_with(&mut self, word: &str) -> String {
+        let found = self.lines.by_ref().map_while(Result::ok).find(|line| line.contains(word));
+        found.unwrap_or_else(|| panic!("the run ends without a line with {word}"))
+    }
+
+    pub fn signal(&self, name: &str) {
+        assert!(Command::new("kill").args([&format!("-{name}"), &self.child.id().to_string()]).status().unwrap().success());
+    }
+
+    /// Its exit code, what else it says on stderr, and all of stdout.
+    pub fn end(mut self) -> (Option<i32>, Vec<String>, String) {
+        let rest = self.lines.by_ref().map_while(Result::ok).collect();
+        let mut stdout = String::new();
+        self.child.stdout.take().expect("it is piped").read_to_string(&mut stdout).unwrap();
+        (self.child.wait().unwrap().code(), rest, stdout)
+    }
+}
 
 /// The words of a command line, of which '...' is one.
 fn words(line: &str) -> Vec<&str> {
@@ -46,10 +88,31 @@ impl Place {
     }
 
     pub fn command(&self, line: &str) -> Command {
-        let mut command = Command::new(PROGRAM);
+        self.prepared(Command::new(PROGRAM), line)
+    }
+
+    fn prepared(&self, mut command: Command, line: &str) -> Command {
+        work::of_program();
         // `tools/test` takes lavapipe's threads away; a user has them, and the order of additions then differs from run to run.
         command.env_remove("LP_NUM_THREADS").current_dir(self.path()).args(words(line)).stdin(Stdio::null());
         command
+    }
+
+    /// Starts a run that a signal is to end.
+    pub fn start(&self, line: &str) -> Running {
+        let mut command = Command::new("env");
+        // The program leaves alone what it was started to ignore, and tests that nohup or a script's & starts ignore some signals.
+        command.args(["--default-signal=INT,TERM,HUP", PROGRAM]);
+        let mut child = self.prepared(command, line).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("env is there");
+        let (guard, ended) = mpsc::channel();
+        let id = child.id().to_string();
+        std::thread::spawn(move || {
+            if ended.recv_timeout(PATIENCE) == Err(mpsc::RecvTimeoutError::Timeout) {
+                let _ = Command::new("kill").args(["-KILL", &id]).status();
+            }
+        });
+        let lines = BufReader::new(child.stderr.take().expect("it is piped")).lines();
+        Running { child, lines, _guard: guard }
     }
 
     pub fn run(&self, line: &str) -> Output {

@@ -3,7 +3,7 @@
 //!
 //! Every form factor is that of a point and of the part of a rectangle that it sees, exact to rounding: what stands in between
 //! is cut away as polygons, and the rest is summed by Lambert's formula over its edges. So the form factors from a point of a
-//! closed room add up to 1, which tests ask for. Surfaces are cut into patches of constant radiosity, finer near what is small,
+//! closed room add up to 1, and a cavity is evenly lit, which a test asks for. Surfaces are cut into patches of constant radiosity, finer near what is small,
 //! and irradiance is gathered from them at the points that are asked about.
 
 use std::f64::consts::{PI, TAU};
@@ -280,12 +280,6 @@ pub fn direct(room: &[Rectangle], at: DVec3, normal: DVec3) -> DVec3 {
     let view = Viewpoint::new(room, at, normal);
     let lamps = room.iter().filter(|lamp| lamp.emission != DVec3::ZERO);
     lamps.map(|lamp| PI * view.form_factor(lamp) * lamp.emission).sum()
-}
-
-/// Sum of the form factors from a point to all that faces it: 1 in a closed room.
-pub fn closure(room: &[Rectangle], at: DVec3, normal: DVec3) -> f64 {
-    let view = Viewpoint::new(room, at, normal);
-    room.iter().map(|other| view.form_factor(other)).sum()
 }
 
 /// Patches with their direct light, as fine near small things as these call for, and wherever much light differs within a patch.

@@ -1,7 +1,7 @@
 //! Sheets that let some light pass straight: gaps of alpha and thin smooth walls.
 
 use super::estimate_check;
-use super::layered::{dull, layered, metal, plastic};
+use super::layered::{dull, layered, metal, plastic, row_of_texels};
 use super::prelude::*;
 use photonmill::engine::scene::RunResult;
 use photonmill::scene::material::{Coverage, Layers};
@@ -120,12 +120,20 @@ fn scene_with(stacks: &[Stack], floor: Material, towards: DVec3, lights: Vec<Lig
     scene
 }
 
-/// The sun through every stack: by shadow rays, of which nothing is random, or by photons.
+/// The sun through every stack: by shadow rays, of which nothing is random, or by photons. What lands on the floors does not ask what
+/// becomes of it: they are black, and the one without a sheet is a smooth metal up to its middle.
 pub fn sun_through_sheets(gpu: &Gpu, illumination: Illumination) -> Check<Complaint> {
     let stacks = stacks();
     let cosine = SUN.normalize().y;
     let irradiance = Vec3::splat((1.0 / cosine) as f32);
-    let scene = scene_with(&stacks, matt(0.0), SUN, vec![LightKind::Directional { direction: -SUN.normalize(), irradiance }]);
+    let sun = LightKind::Directional { direction: -SUN.normalize(), irradiance };
+    let mut scene = scene_with(&stacks, dull(0.0), SUN, vec![sun]);
+    scene.textures.push(row_of_texels(&[[0, 0, 255, 255], [0, 255, 0, 255]], Filter::Nearest));
+    let metallic_roughness_texture = Some(TextureUse::of(1, 0));
+    scene.materials.push(layered(Vec3::ONE, &Layers { metallic_roughness_texture, ..metal(1.0) }));
+    let edge = &mut scene.meshes[0];
+    edge.material = scene.materials.len() - 1;
+    edge.uvs[0] = edge.positions.iter().map(|at| DVec2::new(0.51 + at.x / (0.8 * PITCH), 0.5)).collect();
     let settings = SceneSettings { shadow_rays: 1, illumination, part: Part::Direct, ..mapped(100_000, 8, 8, 0.35) };
     let lit = received(gpu, &scene, &settings, &points(&stacks));
     compare(&format!("{illumination:?}"), &stacks, &lit, &(0..stacks.len()).collect::<Vec<_>>(), cosine)

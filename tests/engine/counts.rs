@@ -67,9 +67,10 @@ fn the_box_costs_what_it_did() {
 #[test]
 fn a_scene_costs_what_it_did() {
     let Some(gpu) = counting_device() else { return };
-    let scene = built_in::by_name("cornell-spheres").unwrap();
+    let scene = scene("cornell-spheres");
     let geometry = Geometry::new(&scene).unwrap();
-    let settings = SceneSettings { photons: 1000, caustic_photons: 500, bounces: 5, rounds: 2, math: Math::Strict, ..by_rounds() };
+    let settings =
+        SceneSettings { photons: 1000, caustic_photons: 500, bounces: 5, rounds: 2, math: Math::Strict, paranoid: true, ..by_rounds() };
     let sensor = Sensor::Picture { width: 16, height: 12 };
     let plan = ScenePlan::new(&scene, &geometry, &settings, sensor, &engine::limits(gpu.facts())).unwrap();
     let device_bytes = plan.bytes;
@@ -77,7 +78,7 @@ fn a_scene_costs_what_it_did() {
     let events = [0, 1].map(|map: usize| Counts::of(&lit.fates[map], 1).events as u64);
     // Where one dispatch may leave camera paths under way, the host looks how many, each round.
     let (goes_on, paths) = (lit.plan.chains_go_on(), lit.plan.camera_path_capacity().max(1));
-    assert_eq!((lit.dispatches, lit.submissions, lit.pipelines), (88, if goes_on { 6 } else { 3 }, 14));
+    assert_eq!((lit.dispatches, lit.submissions, lit.pipelines), (88, if goes_on { 7 } else { 4 }, 14));
     let bytes = device_bytes - 2 * paths * size_of::<CameraPath>() as u64;
     assert_eq!((events, bytes), ([3483, 2439], 4_530_860));
 }

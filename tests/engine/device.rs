@@ -268,12 +268,12 @@ fn the_cpu_builder_is_timed_on_the_host() {
 fn a_run_makes_the_pipelines_of_its_plan_once() {
     let Some(gpu) = fresh_device() else { return };
     let settings = RoomSettings { builder: Builder::Naive, gather: Gather::Brute, mesh: 8, ..RoomSettings::default() };
-    let before = gpu.pipeline_count();
+    let before = gpu.work().pipelines;
     run(&gpu, &settings);
     // Emission, one bounce, one gather.
-    assert_eq!(gpu.pipeline_count() - before, 3);
+    assert_eq!(gpu.work().pipelines - before, 3);
     run(&gpu, &settings);
-    assert_eq!(gpu.pipeline_count() - before, 3);
+    assert_eq!(gpu.work().pipelines - before, 3);
 }
 
 #[test]

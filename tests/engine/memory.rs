@@ -49,28 +49,24 @@ fn the_papers_line_takes_what_its_plan_says() {
 fn scenes_take_what_their_plan_says() {
     let Some(gpu) = device() else { return };
     let limits = engine::limits(gpu.facts());
-    for name in ["cornell-spheres", "open-box-phong", "sky-over-plane"] {
-        let scene: Scene = built_in::by_name(name).unwrap();
+    let small = SceneSettings { photons: 777, caustic_photons: 555, bounces: 5, rounds: 2, chunk: Some(500), ..by_rounds() };
+    let gathers = SceneSettings { final_gather: true, ..small.clone() };
+    let all_from_photons = SceneSettings { illumination: Illumination::Photons, ..small.clone() };
+    let picture = Sensor::Picture { width: 7, height: 5 };
+    // Each kind of buffer in one of them: what the maps, lobes and lights of a scene need, and what each way to light it does.
+    for (name, settings, sensor, phases) in [
+        ("cornell-spheres", gathers, picture, 0),
+        ("open-box-phong", all_from_photons, picture, 0),
+        ("sky-over-plane", small, Sensor::Receivers { count: 9 }, 2),
+    ] {
+        let scene = scene(name);
         let geometry = Geometry::new(&scene).unwrap();
-        for illumination in BOTH {
-            let small = SceneSettings { photons: 777, caustic_photons: 555, bounces: 5, rounds: 2, ..by_rounds() };
-            let final_gather = illumination == Illumination::Split;
-            let settings = SceneSettings { chunk: Some(500), illumination, final_gather, ..small };
-            let sensor = Sensor::Picture { width: 7, height: 5 };
-            let plan = ScenePlan::new(&scene, &geometry, &settings, sensor, &limits).unwrap();
-            let stated = plan.bytes;
-            let view = View { geometry: &geometry, camera: scene.cameras.first(), phases: &[] };
-            let (bytes, _) = taken(&gpu, || lit::light(&gpu, &view, plan));
-            assert_holds(name, check("a picture", bytes, stated, &[]));
-        }
-        let receivers = [vec![Default::default(); 9], vec![Default::default(); 9]];
-        let settings = SceneSettings { photons: 300, rounds: 2, ..by_rounds() };
-        let plan = ScenePlan::new(&scene, &geometry, &settings, Sensor::Receivers { count: 9 }, &limits).unwrap();
-        let stated = plan.bytes_of(2);
-        let view = View { geometry: &geometry, camera: None, phases: &receivers };
-        let mut control = Control::default();
-        let (bytes, _) = taken(&gpu, || engine::scene::light(&gpu, &view, plan, &mut control).unwrap());
-        assert_holds(name, check("two sets of receivers", bytes, stated, &[]));
+        let plan = ScenePlan::new(&scene, &geometry, &settings, sensor, &limits).unwrap();
+        let stated = plan.bytes_of(phases.max(1));
+        let receivers = vec![vec![Default::default(); 9]; phases];
+        let camera = scene.cameras.first().filter(|_| phases == 0);
+        let (bytes, _) = taken(&gpu, || lit::run(&gpu, &View { geometry: &geometry, camera, phases: &receivers }, plan));
+        assert_holds(name, check("a scene", bytes, stated, &[]));
     }
 }
 

@@ -28,22 +28,11 @@ fn each_once(found: &[Photon], photon_count: u32, bounces: u32) -> Check {
     Ok(())
 }
 
-/// The builders on the device store one set; returns it.
-fn builders_agree(gpu: &Gpu, settings: &RoomSettings) -> Vec<Photon> {
-    these_builders_agree(gpu, &Builder::ON_GPU, settings)
-}
-
-/// The same of some of them and the naive one.
-fn these_builders_agree(gpu: &Gpu, builders: &[Builder], settings: &RoomSettings) -> Vec<Photon> {
+/// Some builders on the device store what the naive one does; returns it.
+fn builders_agree(gpu: &Gpu, builders: &[Builder], settings: &RoomSettings) -> Vec<Photon> {
     let of = |builder| photons(gpu, &RoomSettings { builder, ..settings.clone() });
     let expected = of(Builder::Naive);
-    let what = |builder| {
-        let RoomSettings { photons, rng, emission, shininess, group_size, chunk, .. } = settings;
-        format!(
-            "{builder:?}, {photons} photons, {rng:?}, {emission:?}, shininess {:?}, groups of {group_size}, chunks of {chunk:?}",
-            shininess[0]
-        )
-    };
+    let what = |builder| format!("{:?}", RoomSettings { builder, ..settings.clone() });
     assert_holds(what(Builder::Naive), each_once(&expected, settings.photons, settings.bounces));
     for &builder in builders {
         let found = of(builder);
@@ -56,12 +45,11 @@ fn these_builders_agree(gpu: &Gpu, builders: &[Builder], settings: &RoomSettings
 #[test]
 fn builders_store_the_same_photons_at_every_count() {
     let Some(gpu) = device() else { return };
-    for rng in GENERATORS {
-        for photons in COUNTS {
-            let stored = builders_agree(&gpu, &RoomSettings { photons, rng, ..RoomSettings::default() });
-            // Empty maps would agree with each other; a handful of photons may all be absorbed.
-            assert!(photons < 63 || stored.len() as u32 > photons, "{rng:?}, {photons} photons stored {}", stored.len());
-        }
+    for (place, photons) in COUNTS.into_iter().enumerate() {
+        let rng = GENERATORS[place % GENERATORS.len()];
+        let stored = builders_agree(&gpu, &Builder::ON_GPU, &RoomSettings { photons, rng, ..RoomSettings::default() });
+        // Empty maps would agree with each other; a handful of photons may all be absorbed.
+        assert!(photons < 63 || stored.len() as u32 > photons, "{rng:?}, {photons} photons stored {}", stored.len());
     }
 }
 
@@ -70,17 +58,17 @@ fn builders_store_the_same_photons_at_every_count() {
 #[test]
 fn a_persistent_invocation_takes_photon_after_photon() {
     let Some(gpu) = device() else { return };
-    for rng in [Rng::Philox, Rng::Sobol, Rng::Mt] {
-        let many = RoomSettings { photons: MANY_PHOTONS, chunk: Some(MANY_PHOTONS), rng, ..RoomSettings::default() };
-        let endless =
-            RoomSettings { photons: 257, bounces: if rng == Rng::Mt { 74 } else { 320 }, reflectance: 1.0, rng, ..RoomSettings::default() };
-        let closed = closed_box(&endless, 1.0);
-        for (scene, settings) in [(open_box(&many), &many), (closed, &endless)] {
-            let of = |builder| photons_on_gpu(&gpu, &scene, &RoomSettings { builder, ..settings.clone() }).unwrap();
-            let found = of(Builder::Persistent);
-            assert_holds(format!("{rng:?}, {} bounces", settings.bounces), same_photons(&found, &of(Builder::Atomic)));
-            assert!(settings.bounces == 15 || found.len() == 257 * settings.bounces as usize, "{} photons", found.len());
-        }
+    let agreed = |scene: &RoomScene, settings: &RoomSettings| {
+        let of = |builder| photons_on_gpu(&gpu, scene, &RoomSettings { builder, ..settings.clone() }).unwrap();
+        let found = of(Builder::Persistent);
+        assert_holds(format!("{settings:?}"), same_photons(&found, &of(Builder::Atomic)));
+        found.len()
+    };
+    let many = RoomSettings { photons: MANY_PHOTONS, chunk: Some(MANY_PHOTONS), rng: Rng::Mt, ..RoomSettings::default() };
+    agreed(&open_box(&many), &many);
+    for (rng, bounces) in [(Rng::Philox, 320), (Rng::Sobol, 320), (Rng::Mt, 74)] {
+        let endless = RoomSettings { photons: 257, bounces, reflectance: 1.0, rng, ..RoomSettings::default() };
+        assert_eq!(agreed(&closed_box(&endless, 1.0), &endless), 257 * bounces as usize, "{rng:?}");
     }
     let longer = RoomSettings { builder: Builder::Persistent, bounces: 321, rng: Rng::Philox, ..RoomSettings::default() };
     let refused = longer.validate().unwrap_err().to_string();
@@ -111,12 +99,12 @@ fn builders_store_the_same_photons_for_every_effect() {
         for photons in [65, 1000] {
             let (rng, emission, shininess) = (GENERATORS[row[1]], emissions[row[2]], walls[row[3]]);
             let settings = RoomSettings { photons, rng, emission, shininess, ..RoomSettings::default() };
-            these_builders_agree(&gpu, &[Builder::ON_GPU[row[0]]], &settings);
+            builders_agree(&gpu, &[Builder::ON_GPU[row[0]]], &settings);
         }
     }
     let sampled = RoomSettings { phong_direction: PhongDirection::Sampled, shininess: [Some(2.0); 5], ..RoomSettings::default() };
-    builders_agree(&gpu, &sampled);
-    builders_agree(&gpu, &RoomSettings { light_power: [3.0, 0.5], ..RoomSettings::default() });
+    builders_agree(&gpu, &Builder::ON_GPU, &sampled);
+    builders_agree(&gpu, &Builder::ON_GPU, &RoomSettings { light_power: [3.0, 0.5], ..RoomSettings::default() });
 }
 
 #[test]
@@ -125,8 +113,8 @@ fn group_sizes_and_chunks_change_no_photon() {
     let settings = RoomSettings { photons: 1001, ..RoomSettings::default() };
     // One that carries its state in the path, and one that has none.
     let rngs = [Rng::Rand48, Rng::Philox];
-    let group_sizes: Vec<u32> = [32, 64, 128, 256, 512, 1024].into_iter().filter(|size| *size <= gpu.facts().work_group_size).collect();
-    let chunks = [None, Some(65), Some(500), Some(1000), Some(1001), Some(5000)];
+    let group_sizes: Vec<u32> = [32, 128, 1024].into_iter().filter(|size| *size <= gpu.facts().work_group_size).collect();
+    let chunks = [None, Some(65), Some(1000), Some(5000)];
     let of = |rng| photons(&gpu, &RoomSettings { rng, ..settings.clone() });
     let expected = rngs.map(of);
     for row in pairwise(&[Builder::ON_GPU.len(), group_sizes.len(), chunks.len(), rngs.len()]) {
@@ -136,14 +124,11 @@ fn group_sizes_and_chunks_change_no_photon() {
         assert_holds(&what, each_once(&found, settings.photons, settings.bounces));
         assert_holds(&what, same_photons(&found, &expected[row[3]]));
     }
-    for (rng, expected) in rngs.into_iter().zip(expected) {
-        let settings = RoomSettings { rng, ..settings.clone() };
-        for (counters, group_size) in [(2, 32), (8, 64), (8, 128), (64, 32)] {
-            let settings = RoomSettings { counters: Some(counters), group_size, builder: Builder::Atomic, ..settings.clone() };
-            for chunk in [None, Some(500)] {
-                let found = photons(&gpu, &RoomSettings { chunk, ..settings.clone() });
-                assert_holds(format!("{rng:?}, {counters} counters, groups of {group_size}, {chunk:?}"), same_photons(&found, &expected));
-            }
+    for (counters, group_size, chunk) in [(2, 32, None), (8, 128, Some(500)), (64, 32, Some(500))] {
+        for (rng, expected) in rngs.iter().zip(&expected) {
+            let striped = RoomSettings { counters: Some(counters), group_size, builder: Builder::Atomic, ..settings.clone() };
+            let found = photons(&gpu, &RoomSettings { rng: *rng, chunk, ..striped });
+            assert_holds(format!("{rng:?}, {counters} counters, groups of {group_size}, {chunk:?}"), same_photons(&found, expected));
         }
     }
 }
@@ -154,7 +139,7 @@ fn the_order_of_appending_changes_no_photon() {
     for builder in Builder::ON_GPU {
         let settings = RoomSettings { builder, photons: 20_001, ..RoomSettings::default() };
         let expected = photons(&gpu, &settings);
-        for run in 1..10 {
+        for run in 1..4 {
             assert_holds(format!("{builder:?}, run {run}"), same_photons(&photons(&gpu, &settings), &expected));
         }
     }
@@ -232,19 +217,14 @@ impl Disagreement {
 #[test]
 fn the_cpu_builder_agrees_photon_by_photon() {
     let Some(gpu) = device() else { return };
-    for rng in GENERATORS {
-        for (emission, shininess) in [(EmissionLaw::Uniform, [None; 5]), (EmissionLaw::Cosine, [Some(2.0); 5])] {
-            let settings = RoomSettings { photons: 200_001, rng, emission, shininess, threads: 2, ..RoomSettings::default() };
-            let disagreement = Disagreement::between(&photons(&gpu, &settings), &photons_on_cpu(&settings));
-            assert!(disagreement.distances.len() > 290_000);
-            println!(
-                "{rng:?}, {emission:?}: {} flipped, distance up to {:e}, weights up to {:e}",
-                disagreement.flipped,
-                disagreement.distances.last().unwrap(),
-                disagreement.weights.last().unwrap()
-            );
-            assert_holds(format!("{rng:?}, {emission:?}"), disagreement.check(settings.photons));
-        }
+    for (place, rng) in GENERATORS.into_iter().enumerate() {
+        let (emission, shininess) = [(EmissionLaw::Uniform, [None; 5]), (EmissionLaw::Cosine, [Some(2.0); 5])][place % 2];
+        let settings = RoomSettings { photons: 100_001, rng, emission, shininess, threads: 2, ..RoomSettings::default() };
+        let disagreement = Disagreement::between(&photons(&gpu, &settings), &photons_on_cpu(&settings));
+        assert!(disagreement.distances.len() > 145_000);
+        let [distance, weight] = [&disagreement.distances, &disagreement.weights].map(|sorted| sorted.last().unwrap());
+        println!("{rng:?}, {emission:?}: {} flipped, distance up to {distance:e}, weights up to {weight:e}", disagreement.flipped);
+        assert_holds(format!("{rng:?}, {emission:?}"), disagreement.check(settings.photons));
     }
 }
 
@@ -268,7 +248,7 @@ fn threads_change_no_photon_of_the_cpu_builder() {
 #[test]
 fn no_two_photons_draw_the_same_numbers() {
     for rng in GENERATORS {
-        let settings = RoomSettings { rng, photons: 30_001, rounds: 4, ..RoomSettings::default() };
+        let settings = RoomSettings { rng, photons: 10_001, rounds: 3, ..RoomSettings::default() };
         let emission_draws =
             |streams, round, photon| draws_of(streams, round, photon, 0).iter().map(|draw| draw.to_bits()).collect::<Vec<u32>>();
         let streams = streams_of(&settings);
@@ -277,7 +257,7 @@ fn no_two_photons_draw_the_same_numbers() {
         for round in 0..settings.rounds {
             for photon in 0..settings.photons {
                 let draws = emission_draws(streams, round, photon);
-                // Four draws of 24 bits hold no birthday among 120 004 photons but with chance 1e-19.
+                // Four draws of 24 bits hold no birthday among 30 003 photons but with chance 1e-20.
                 assert!(seen.insert(draws.clone()), "{rng:?}: round {round} photon {photon} repeats {draws:?}");
                 let repeated = draws.iter().zip(&before).filter(|(now, then)| now == then).count();
                 assert!(repeated < 2, "{rng:?}: round {round} photon {photon} repeats {repeated} draws of its neighbour");

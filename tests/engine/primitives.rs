@@ -131,41 +131,38 @@ fn index_check(plan: &RoomPlan, cells: &[u32], sorted: &[Photon], map: &[Photon]
 #[test]
 fn the_index_holds_every_photon_in_its_cell() {
     let Some(gpu) = device() else { return };
-    for builder in Builder::ON_GPU {
-        for (photon_count, radius, group_size) in
-            [(2, 0.05, 128), (129, 0.05, 32), (5000, 0.05, 128), (5001, 0.001, 256), (20_001, 0.5, 64)]
-        {
-            let settings =
-                RoomSettings { builder, photons: photon_count, radius, group_size, chunk: Some(photon_count), ..RoomSettings::default() };
-            let scene = open_box(&settings);
-            let plan = plan_for(&gpu, &scene, &settings);
-            assert_eq!(plan.chunks_per_round, 1);
-            let mut commands = Commands::new(&gpu, constants(&plan), Instant::now()).unwrap();
-            let resources = RoomResources::new(&gpu, &mut commands, &scene, &plan).unwrap();
-            let buffers = resources.index.as_ref().expect("a grid gather has an index");
-            trace::chunk(&mut commands, &resources, &plan, 0, &plan.chunk(0)).unwrap();
-            index::build(&mut commands, &resources, &plan, photon_count).unwrap();
-            let map = photons(&gpu, &settings);
-            let begins = commands.read(&buffers.cells, plan.grid.cells() as usize + 1).unwrap();
-            assert_eq!(begins[0], 0);
-            // A cell ends where the next one begins.
-            let cells = begins[1..].to_vec();
-            let sorted = commands.read(&buffers.sorted_photons, map.len()).unwrap();
-            let sorted: Vec<Photon> = sorted.into_iter().map(|photon| photon.photon(Origin::default(), &scene.room_record())).collect();
-            assert_holds(format!("{builder:?}, {photon_count} photons, radius {radius}"), index_check(&plan, &cells, &sorted, &map));
+    let cases = [(5000, 0.05, 128), (2, 0.05, 128), (129, 0.05, 32), (5001, 0.001, 256), (20_001, 0.5, 64)];
+    for (builder, (photon_count, radius, group_size)) in Builder::ON_GPU.into_iter().zip(cases.into_iter().cycle()) {
+        let settings =
+            RoomSettings { builder, photons: photon_count, radius, group_size, chunk: Some(photon_count), ..RoomSettings::default() };
+        let scene = open_box(&settings);
+        let plan = plan_for(&gpu, &scene, &settings);
+        assert_eq!(plan.chunks_per_round, 1);
+        let mut commands = Commands::new(&gpu, constants(&plan), Instant::now()).unwrap();
+        let resources = RoomResources::new(&gpu, &mut commands, &scene, &plan).unwrap();
+        let buffers = resources.index.as_ref().expect("a grid gather has an index");
+        trace::chunk(&mut commands, &resources, &plan, 0, &plan.chunk(0)).unwrap();
+        index::build(&mut commands, &resources, &plan, photon_count).unwrap();
+        let map = photons(&gpu, &settings);
+        let begins = commands.read(&buffers.cells, plan.grid.cells() as usize + 1).unwrap();
+        assert_eq!(begins[0], 0);
+        // A cell ends where the next one begins.
+        let cells = begins[1..].to_vec();
+        let sorted = commands.read(&buffers.sorted_photons, map.len()).unwrap();
+        let sorted: Vec<Photon> = sorted.into_iter().map(|photon| photon.photon(Origin::default(), &scene.room_record())).collect();
+        assert_holds(format!("{builder:?}, {photon_count} photons, radius {radius}"), index_check(&plan, &cells, &sorted, &map));
 
-            if photon_count == 5000 {
-                let mut swapped = sorted.clone();
-                swapped.swap(10, sorted.len() - 10);
-                assert_complains("photons in each other's cells", index_check(&plan, &cells, &swapped, &map));
-                let mut doubled = sorted.clone();
-                doubled[10] = doubled[11];
-                assert_complains("a photon in place of another", index_check(&plan, &cells, &doubled, &map));
-                let mut shifted = cells.clone();
-                let busy = (1..cells.len()).find(|&cell| cells[cell] > cells[cell - 1]).unwrap();
-                shifted[busy] -= 1;
-                assert_complains("a cell that ends early", index_check(&plan, &shifted, &sorted, &map));
-            }
+        if photon_count == 5000 {
+            let mut swapped = sorted.clone();
+            swapped.swap(10, sorted.len() - 10);
+            assert_complains("photons in each other's cells", index_check(&plan, &cells, &swapped, &map));
+            let mut doubled = sorted.clone();
+            doubled[10] = doubled[11];
+            assert_complains("a photon in place of another", index_check(&plan, &cells, &doubled, &map));
+            let mut shifted = cells.clone();
+            let busy = (1..cells.len()).find(|&cell| cells[cell] > cells[cell - 1]).unwrap();
+            shifted[busy] -= 1;
+            assert_complains("a cell that ends early", index_check(&plan, &shifted, &sorted, &map));
         }
     }
 }
@@ -431,25 +428,23 @@ fn indirect_dispatches_are_folded_below_the_limit() {
     }
 }
 
-/// One group less than a full row of them, a full row, and more: photons of the folded rows are traced
-/// like the others.
+/// A full row of groups and more: photons of the folded rows are traced like the others.
 #[test]
 fn rounds_around_a_full_row_of_groups_lose_no_photon() {
     let Some(gpu) = device() else { return };
     let row = 65_535 * 32;
-    for builder in Builder::ON_GPU {
-        // The builders dispatch alike, so one of them tries every count.
-        let counts = if builder == Builder::Ballot { &[row - 1, row, row + 1, row + 33][..] } else { &[row + 33] };
-        for &photon_count in counts {
-            let of_one_bounce = RoomSettings { bounces: 1, mesh: 1, rng: Rng::Philox, ..RoomSettings::default() };
-            let settings = RoomSettings { builder, photons: photon_count, group_size: 32, ..of_one_bounce };
-            let folded = run(&gpu, &settings);
-            assert_eq!(folded.plan.chunks_per_round, 1, "{photon_count} photons do not fit one dispatch here");
+    for photons in [row, row + 33] {
+        let of_one_bounce = RoomSettings { bounces: 1, mesh: 1, rng: Rng::Philox, ..RoomSettings::default() };
+        let settings = RoomSettings { builder: Builder::Ballot, photons, group_size: 32, ..of_one_bounce };
+        let split = run(&gpu, &RoomSettings { chunk: Some(1_000_003), ..settings.clone() });
+        // The builders dispatch alike, so one of them tries both counts.
+        for builder in Builder::ON_GPU.into_iter().filter(|builder| photons > row || *builder == Builder::Ballot) {
+            let folded = run(&gpu, &RoomSettings { builder, ..settings.clone() });
+            assert_eq!(folded.plan.chunks_per_round, 1, "{photons} photons do not fit one dispatch here");
             let ledger = folded.ledger();
-            assert!(ledger.closes() && ledger.emitted == u64::from(photon_count), "{ledger:?}");
-            let split = run(&gpu, &RoomSettings { chunk: Some(1_000_003), ..settings.clone() });
-            assert_eq!(split.fates, folded.fates);
-            assert_holds("film", equal_sums("a folded round", &folded.film.sums, &split.film.sums));
+            assert!(ledger.closes() && ledger.emitted == u64::from(photons), "{ledger:?}");
+            assert_eq!(split.fates, folded.fates, "{builder:?}");
+            assert_holds(format!("{builder:?}"), equal_sums("a folded round", &folded.film.sums, &split.film.sums));
         }
     }
 }

@@ -82,25 +82,13 @@ fn directions_and_points_follow_their_densities() {
 #[test]
 fn lobes_of_every_width_follow_their_density() {
     let Some(gpu) = device() else { return };
-    for math in BOTH {
-        for (seed, exponent) in [0.0, 0.01, 0.5, 1.0, 5.0, 50.0, 1e4, 48_826.0, 1e6, 1e8].into_iter().enumerate() {
-            let cases: Vec<SamplingCase> =
-                words(seed as u32).map(|words| SamplingCase { exponent: exponent as f32, ..case(words) }).collect();
-            let directions = mapped(&ask(&gpu, math, Filter::Box, &cases), |at| at.lobe);
-            directions.iter().for_each(|direction| assert_holds(exponent, is_unit("lobe", *direction, 4.0 * ULP)));
-            assert_holds(format!("{math:?}"), lobe_check(&format!("lobe {exponent}"), &directions, exponent));
-            assert_complains("an exponent 5 % off", lobe_check("fault", &directions, 1.05 * (exponent + 1.0) - 1.0));
-            // By moments: E[sin^2] = 2 / (n + 3), E[sin^4] = 8 / ((n + 3) (n + 5)).
-            let sine_squared: f64 = directions.iter().map(|wi| wi.as_dvec3().truncate().length_squared()).sum::<f64>() / f64::from(SAMPLES);
-            let mean = 2.0 / (exponent + 3.0);
-            let variance = 8.0 / ((exponent + 3.0) * (exponent + 5.0)) - mean * mean;
-            let error = (variance / f64::from(SAMPLES)).sqrt();
-            assert_holds(format!("{math:?}"), z_check(&format!("squared sine of lobe {exponent}"), sine_squared, mean, error));
-            assert_complains(
-                "a squared sine of an exponent 5 % off",
-                z_check("fault", sine_squared, 2.0 / (1.05 * (exponent + 1.0) + 2.0), error),
-            );
-        }
+    for (seed, exponent) in [0.0, 0.01, 0.5, 1.0, 5.0, 50.0, 1e4, 48_826.0, 1e6, 1e8].into_iter().enumerate() {
+        let math = BOTH[seed % 2];
+        let cases: Vec<SamplingCase> = words(seed as u32).map(|words| SamplingCase { exponent: exponent as f32, ..case(words) }).collect();
+        let directions = mapped(&ask(&gpu, math, Filter::Box, &cases), |at| at.lobe);
+        directions.iter().for_each(|direction| assert_holds(exponent, is_unit("lobe", *direction, 4.0 * ULP)));
+        assert_holds(format!("{math:?}"), lobe_check(&format!("lobe {exponent}"), &directions, exponent));
+        assert_complains("an exponent 5 % off", lobe_check("fault", &directions, 1.05 * (exponent + 1.0) - 1.0));
     }
 }
 
@@ -213,29 +201,28 @@ fn spherical_triangles_are_sampled_evenly() {
         ("still more nearly", corners([(0.0, 1e-3), (0.33, 1e-3), (0.67, 1e-3)])),
         ("with a side of nearly half a turn", corners([(0.0, 0.01), (0.497, 0.01), (0.7, 1.0)])),
     ];
-    for math in BOTH {
-        for (seed, (what, triangle)) in triangles.into_iter().enumerate() {
-            let exact = triangle.map(|corner| corner.as_dvec3().normalize());
-            let [a, b, c] = triangle;
-            let cases: Vec<SamplingCase> = words(seed as u32).step_by(2).map(|words| SamplingCase { a, b, c, ..case(words) }).collect();
-            let samples = ask(&gpu, math, Filter::Box, &cases);
-            let directions = mapped(&samples, |at| at.in_triangle);
-            let off = (f64::from(samples[0].solid_angle) - solid_angle(exact)).abs();
-            println!("{math:?}, {what}: {:.4} sr, {off:.1e} off", solid_angle(exact));
-            assert!(off < 6e-6, "{math:?}, {what}: {} instead of {} sr", samples[0].solid_angle, solid_angle(exact));
-            // Opposite of the second corner little is left of what is made perpendicular to it. Where a light is sampled only
-            // the point that the direction leads to counts.
-            directions.iter().for_each(|direction| assert_holds(format!("{math:?}"), is_unit(what, *direction, 2048.0 * ULP)));
-            assert_holds(format!("{math:?}"), spherical_triangle_check(what, exact, &directions));
-            // Evenly by area of the flat triangle is not evenly by solid angle.
-            let flat: Vec<Vec3> = samples.iter().map(|at| (a + at.triangle.x * (b - a) + at.triangle.y * (c - a)).normalize()).collect();
-            if what != "a small one" {
-                assert_complains(&format!("{what} by area"), spherical_triangle_check("fault", exact, &flat));
-            }
-            let [a, b, c] = exact;
-            let wrong = [a, b, (c + 0.1 * b).normalize()];
-            assert_complains(&format!("a corner of {what} moved"), spherical_triangle_check("fault", wrong, &directions));
+    for (seed, (what, triangle)) in triangles.into_iter().enumerate() {
+        let math = BOTH[seed % 2];
+        let exact = triangle.map(|corner| corner.as_dvec3().normalize());
+        let [a, b, c] = triangle;
+        let cases: Vec<SamplingCase> = words(seed as u32).step_by(2).map(|words| SamplingCase { a, b, c, ..case(words) }).collect();
+        let samples = ask(&gpu, math, Filter::Box, &cases);
+        let directions = mapped(&samples, |at| at.in_triangle);
+        let off = (f64::from(samples[0].solid_angle) - solid_angle(exact)).abs();
+        println!("{math:?}, {what}: {:.4} sr, {off:.1e} off", solid_angle(exact));
+        assert!(off < 6e-6, "{math:?}, {what}: {} instead of {} sr", samples[0].solid_angle, solid_angle(exact));
+        // Opposite of the second corner little is left of what is made perpendicular to it. Where a light is sampled only
+        // the point that the direction leads to counts.
+        directions.iter().for_each(|direction| assert_holds(format!("{math:?}"), is_unit(what, *direction, 2048.0 * ULP)));
+        assert_holds(format!("{math:?}"), spherical_triangle_check(what, exact, &directions));
+        // Evenly by area of the flat triangle is not evenly by solid angle.
+        let flat: Vec<Vec3> = samples.iter().map(|at| (a + at.triangle.x * (b - a) + at.triangle.y * (c - a)).normalize()).collect();
+        if what != "a small one" {
+            assert_complains(&format!("{what} by area"), spherical_triangle_check("fault", exact, &flat));
         }
+        let [a, b, c] = exact;
+        let wrong = [a, b, (c + 0.1 * b).normalize()];
+        assert_complains(&format!("a corner of {what} moved"), spherical_triangle_check("fault", wrong, &directions));
     }
 }
 
@@ -301,21 +288,18 @@ fn filter_check(what: &str, filter: Filter, offsets: &[(f64, f64)]) -> Check {
 #[test]
 fn pixels_are_sampled_as_their_filters_weigh() {
     let Some(gpu) = device() else { return };
-    for math in BOTH {
-        for filter in [Filter::Box, Filter::Tent, Filter::Gaussian] {
-            let what = format!("{filter:?} filter");
-            let offsets = |cases: &[SamplingCase]| -> Vec<(f64, f64)> {
-                let samples = ask(&gpu, math, filter, cases);
-                samples.iter().map(|at| (f64::from(at.filter_offset.x), f64::from(at.filter_offset.y))).collect()
-            };
-            let found = offsets(&words(4).map(case).collect::<Vec<_>>());
-            assert_holds(format!("{math:?}"), filter_check(&what, filter, &found));
-            let wider: Vec<(f64, f64)> = found.iter().map(|(x, y)| (x * 0.98, y * 0.98)).collect();
-            assert_complains("a filter 2 % too narrow", filter_check("fault", filter, &wider));
-            let reach = if filter == Filter::Box { 0.5 } else { 2.0 };
-            for (x, y) in offsets(&edge_words().map(case).collect::<Vec<_>>()) {
-                assert!(x.hypot(y) <= 1.415 * reach && x.abs() <= reach && y.abs() <= reach, "{math:?}, {what}: {x}, {y}");
-            }
+    for (math, filter) in [(Math::Fast, Filter::Box), (Math::Strict, Filter::Tent), (Math::Fast, Filter::Gaussian)] {
+        let what = format!("{math:?}, {filter:?} filter");
+        let offsets = |cases: &[SamplingCase]| -> Vec<(f64, f64)> {
+            mapped(&ask(&gpu, math, filter, cases), |at| (at.filter_offset.x.into(), at.filter_offset.y.into()))
+        };
+        let found = offsets(&words(4).map(case).collect::<Vec<_>>());
+        assert_holds(&what, filter_check(&what, filter, &found));
+        let wider: Vec<(f64, f64)> = found.iter().map(|(x, y)| (x * 0.98, y * 0.98)).collect();
+        assert_complains("a filter 2 % too narrow", filter_check("fault", filter, &wider));
+        let reach = if filter == Filter::Box { 0.5 } else { 2.0 };
+        for (x, y) in offsets(&edge_words().map(case).collect::<Vec<_>>()) {
+            assert!(x.hypot(y) <= 1.415 * reach && x.abs() <= reach && y.abs() <= reach, "{what}: {x}, {y}");
         }
     }
 }

@@ -2,6 +2,7 @@
 //! time; and predictions of the end.
 
 use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 use crate::common::prelude::*;
 use photonmill::engine::error_bound::error_bound;
@@ -34,6 +35,9 @@ const SCENES: [&str; 9] = [
     "mirror-corridor",
 ];
 
+/// Some of these: a lamp that is a surface, and one that is not.
+const FEW: [&str; 2] = ["cornell", "disc-over-plane"];
+
 /// A fixed radius: the error in question is noise.
 fn settings(error: f64, seed: u64) -> SceneSettings {
     let stop = Stop { error: Some(error), confidence: CONFIDENCE, ..Stop::default() };
@@ -61,11 +65,15 @@ fn true_errors(runs: &[Claim]) -> Vec<f64> {
     runs.iter().map(off).collect()
 }
 
+/// A picture's claim of its noise alone.
+fn claim_of_noise(film: &SceneFilm) -> Claim {
+    (film.surface_means().collect(), film.error(CONFIDENCE).bound(CONFIDENCE), film.measure().relative_to_mean(1.0))
+}
+
 /// A picture's claim of its noise, of what surfaces scatter, and of what is too rare to have been seen.
 fn claim(lit: &scene::RunResult) -> Claim {
-    let error = lit.film.error(CONFIDENCE);
-    let claimed = error.bound(CONFIDENCE).hypot(error.unseen);
-    (lit.film.surface_means().collect(), claimed, lit.film.measure().relative_to_mean(1.0))
+    let (means, bound, unit) = claim_of_noise(&lit.film);
+    (means, bound.hypot(lit.film.error(CONFIDENCE).unseen), unit)
 }
 
 /// How often the true error is within `claim` times what a run claims.
@@ -104,10 +112,10 @@ fn without_differences(mut plan: ScenePlan) -> ScenePlan {
 }
 
 /// A picture by a run that knows of no bias, and where asked takes what its rounds have shown for all that there is.
-fn of_noise(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, as_far_as_shown: bool) -> scene::RunResult {
+fn of_noise(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, size: u32, as_far_as_shown: bool) -> scene::RunResult {
     let geometry = Geometry::new(scene).unwrap();
     let view = View { geometry: &geometry, camera: Some(&scene.first_camera()), phases: &[] };
-    let plan = without_differences(trial::plan(gpu, scene, &view, settings, square_picture(SIZE)).unwrap());
+    let plan = without_differences(trial::plan(gpu, scene, &view, settings, square_picture(size)).unwrap());
     let rare_radiance = if as_far_as_shown { 0.0 } else { plan.film.rare_radiance };
     let film = FilmPlan { rare_radiance, ..plan.film.clone() };
     scene::light(gpu, &view, ScenePlan { film, ..plan }, &mut Control::default()).unwrap()
@@ -122,11 +130,8 @@ fn claims_hold(scenes: &[&'static str], seeds: u64) {
         let all: Vec<_> = scenes.iter().map(|name| (*name, threads.spawn(|| claims_of(name, seeds)))).collect();
         all.into_iter().map(|(name, runs)| (name, runs.join().unwrap())).collect()
     });
-    let (mut coverages, mut widths) = (Vec::new(), Vec::new());
-    for (name, runs) in claims {
-        judge_scene(name, &runs, &true_errors(&runs), &mut coverages, &mut widths);
-    }
-    judge_scenes(&coverages, &widths);
+    let judged: Vec<[f64; 2]> = claims.iter().map(|(name, runs)| judge_scene(name, runs, &true_errors(runs))).collect();
+    judge_scenes(&judged);
 }
 
 fn claims_of(name: &str, seeds: u64) -> Vec<Claim> {
@@ -136,7 +141,7 @@ fn claims_of(name: &str, seeds: u64) -> Vec<Claim> {
     // rounds have shown.
     let is_rare = name == "caustic-sphere";
     let settings = |error, seed| SceneSettings { aim: !is_rare, ..settings(error, seed) };
-    let run = |settings: &SceneSettings| of_noise(&gpu, &scene, settings, is_rare);
+    let run = |settings: &SceneSettings| of_noise(&gpu, &scene, settings, SIZE, is_rare);
     // Of lamps in mirrors and glass, so many that what none has shown is small beside what they have.
     let rounds = if name == "cornell-spheres" { 1500 } else { 60 };
     let wanted = watched_error(&run(&SceneSettings { rounds, stop: Stop::default(), ..settings(1.0, 0) })).min(1.0);
@@ -150,20 +155,20 @@ fn claims_of(name: &str, seeds: u64) -> Vec<Claim> {
     (1..=seeds).map(one).collect()
 }
 
-fn judge_scene(name: &str, runs: &[Claim], true_errors: &[f64], coverages: &mut Vec<f64>, widths: &mut Vec<f64>) {
+/// The coverage of a scene's claims, and their width.
+fn judge_scene(name: &str, runs: &[Claim], true_errors: &[f64]) -> [f64; 2] {
     let (whole, half, width) = (coverage(runs, true_errors, 1.0), coverage(runs, true_errors, 0.5), width(runs, true_errors));
     println!("{name}: coverage {whole}, of half the claim {half}; the claim is {width:.2} times the error");
     assert_holds(name, scene_check(name, runs, true_errors, 1.0));
     assert_complains("half the claim", scene_check(name, runs, true_errors, 0.5));
-    coverages.push(whole);
-    widths.push(width);
+    [whole, width]
 }
 
-fn judge_scenes(coverages: &[f64], widths: &[f64]) {
-    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-    println!("all scenes: coverage {:.3}, the claim is {:.2} times the error", mean(coverages), mean(widths));
-    assert_holds("all scenes", coverage_check("all scenes", mean(coverages)));
-    assert!(mean(widths) <= MOST_WIDTH && widths.iter().all(|width| *width < 2.0), "{widths:?}");
+fn judge_scenes(judged: &[[f64; 2]]) {
+    let [coverage, width] = [0, 1].map(|of: usize| judged.iter().map(|scene| scene[of]).sum::<f64>() / judged.len() as f64);
+    println!("all scenes: coverage {coverage:.3}, the claim is {width:.2} times the error");
+    assert_holds("all scenes", coverage_check("all scenes", coverage));
+    assert!(width <= MOST_WIDTH && judged.iter().all(|[_, width]| *width < 2.0), "{judged:?}");
 }
 
 /// What a scene's pixels are without the bias of the radius, and the relative error that this has: of a radius a quarter as large.
@@ -184,7 +189,7 @@ fn without_bias(gpu: &Gpu, scene: &Scene, like: &scene::RunResult, rounds: u32) 
 }
 
 /// Judges the claims of noise and bias together of runs of a scene, against one without bias.
-fn judge_all(name: &str, runs: &[scene::RunResult], truth: &scene::RunResult, coverages: &mut Vec<f64>, widths: &mut Vec<f64>) {
+fn judge_all(name: &str, runs: &[scene::RunResult], truth: &scene::RunResult) -> [f64; 2] {
     let unit = truth.film.measure().relative_to_mean(1.0);
     let own_error = truth.film.relative_error();
     let off = |lit: &scene::RunResult| {
@@ -202,26 +207,31 @@ fn judge_all(name: &str, runs: &[scene::RunResult], truth: &scene::RunResult, co
         mean(&|lit| lit.error().bias.unwrap().upper),
         true_errors.iter().sum::<f64>() / true_errors.len() as f64
     );
-    judge_scene(name, &claims, &true_errors, coverages, widths);
+    judge_scene(name, &claims, &true_errors)
 }
 
-/// The claims of noise and bias together of so many runs a scene, which shrink their radii as runs do by default.
+/// The claims of noise and bias together of a hundred runs a scene, with the settings of each, beside a long run without bias.
+fn claims_of_all(gpu: &Gpu, scenes: &[&str], size: u32, rounds: u32, settings: impl Fn(&Scene) -> SceneSettings) -> Vec<[f64; 2]> {
+    let judge = |name: &&str| {
+        let scene = scene(name);
+        let settings = settings(&scene);
+        let run = |seed| seen(gpu, &scene, &SceneSettings { seed, ..settings.clone() }, &scene.first_camera(), [size; 2]);
+        let runs: Vec<scene::RunResult> = (1..=100).map(run).collect();
+        let end = if settings.stop.error.is_some() { End::Error } else { End::Rounds };
+        assert!(runs.iter().all(|lit| lit.end == end), "{name}: runs end by {end:?}");
+        judge_all(name, &runs, &without_bias(gpu, &scene, &runs[0], rounds))
+    };
+    scenes.iter().map(judge).collect()
+}
+
+/// Of runs that shrink their radii as runs do by default.
 #[test]
 #[ignore = "a thousand runs and long references: for a real GPU"]
 fn noise_and_bias_of_a_hundred_runs_lie_within_the_claim_as_often_as_claimed() {
     let Some(gpu) = device() else { return };
-    let (mut coverages, mut widths) = (Vec::new(), Vec::new());
-    for name in SCENES {
-        let scene = scene(name);
-        let run = |seed| {
-            let stop = Stop { confidence: CONFIDENCE, ..Stop::default() };
-            let settings = SceneSettings { rounds: 64, seed, stop, ..SceneSettings::default() };
-            seen(&gpu, &scene, &settings, &scene.first_camera(), [48; 2])
-        };
-        let runs: Vec<scene::RunResult> = (1..=100).map(run).collect();
-        judge_all(name, &runs, &without_bias(&gpu, &scene, &runs[0], 2000), &mut coverages, &mut widths);
-    }
-    judge_scenes(&coverages, &widths);
+    let stop = Stop { confidence: CONFIDENCE, ..Stop::default() };
+    let settings = |_: &Scene| SceneSettings { rounds: 64, stop, ..SceneSettings::default() };
+    judge_scenes(&claims_of_all(&gpu, &SCENES, 48, 2000, settings));
 }
 
 /// The same of runs that end at an error, with what a pilot chooses for it, tiles included.
@@ -230,28 +240,21 @@ fn noise_and_bias_of_a_hundred_runs_lie_within_the_claim_as_often_as_claimed() {
 fn errors_of_what_a_pilot_chooses_lie_within_the_claim_as_often_as_claimed() {
     let Some(gpu) = device() else { return };
     let (size, error) = if gpu.facts().kind == "cpu" { (16, 0.15) } else { (48, 0.04) };
-    let (mut coverages, mut widths) = (Vec::new(), Vec::new());
-    for name in ["open-box", "cornell", "cornell-spheres", "caustic-sphere"] {
-        let scene = scene(name);
-        let geometry = Geometry::new(&scene).unwrap();
-        let camera = scene.first_camera();
+    let stop = Stop { error: Some(error), confidence: CONFIDENCE, ..Stop::default() };
+    let usual = SceneSettings { rounds: 20_000, stop, ..SceneSettings::default() };
+    let chosen = |scene: &Scene| {
+        let (geometry, camera) = (Geometry::new(scene).unwrap(), scene.first_camera());
         let view = View { geometry: &geometry, camera: Some(&camera), phases: &[] };
-        let stop = Stop { error: Some(error), confidence: CONFIDENCE, ..Stop::default() };
-        let usual = SceneSettings { rounds: 20_000, stop, ..SceneSettings::default() };
-        let plan = trial::plan(&gpu, &scene, &view, &usual, square_picture(size)).unwrap();
-        let chosen = pilot::choose(&gpu, &scene, &view, &plan, Free::ALL, &AtomicBool::new(false)).unwrap().unwrap().set(&usual);
-        let run = |seed| seen(&gpu, &scene, &SceneSettings { seed, ..chosen.clone() }, &camera, [size; 2]);
-        let runs: Vec<scene::RunResult> = (1..=100).map(run).collect();
-        assert!(runs.iter().all(|lit| lit.end == End::Error), "{name}: runs end at their error");
-        judge_all(name, &runs, &without_bias(&gpu, &scene, &runs[0], 500), &mut coverages, &mut widths);
-    }
-    println!("coverage of all scenes: {:.3}", coverages.iter().sum::<f64>() / coverages.len() as f64);
+        let pilot = pilot::choose_for(&gpu, scene, &view, &usual, square_picture(size), Free::ALL, &AtomicBool::new(false));
+        pilot.unwrap().unwrap().set(&usual)
+    };
+    let scenes = ["open-box", "cornell", "cornell-spheres", "caustic-sphere"];
+    println!("coverage and width: {:.3?}", claims_of_all(&gpu, &scenes, size, 500, chosen));
 }
 
 #[test]
 fn errors_lie_within_the_claim_as_often_as_claimed() {
-    // Of lamps in mirrors and glass thousands of rounds are needed.
-    claims_hold(&SCENES[1..], 8);
+    claims_hold(&FEW, 8);
 }
 
 #[test]
@@ -266,15 +269,9 @@ fn errors_of_a_hundred_runs_lie_within_the_claim_as_often_as_claimed() {
 fn errors_of_large_pictures_lie_within_the_claim_as_often_as_claimed() {
     let Some(gpu) = device() else { return };
     for name in ["cornell-spheres", "caustic-sphere"] {
-        let (scene, geometry) = (scene(name), Geometry::new(&scene(name)).unwrap());
-        let view = View { geometry: &geometry, camera: Some(&scene.first_camera()), phases: &[] };
-        let run = |seed| {
-            let stop = Stop { confidence: CONFIDENCE, ..Stop::default() };
-            let settings = SceneSettings { samples: 16, rounds: 64, alpha: 1.0, seed, stop, ..SceneSettings::default() };
-            let plan = without_differences(trial::plan(&gpu, &scene, &view, &settings, square_picture(256)).unwrap());
-            let lit = scene::light(&gpu, &view, plan, &mut Control::default()).unwrap();
-            (lit.film.surface_means().collect(), lit.film.error(CONFIDENCE).bound(CONFIDENCE), lit.film.measure().relative_to_mean(1.0))
-        };
+        let stop = Stop { confidence: CONFIDENCE, ..Stop::default() };
+        let settings = |seed| SceneSettings { samples: 16, rounds: 64, alpha: 1.0, seed, stop, ..SceneSettings::default() };
+        let run = |seed| claim_of_noise(&of_noise(&gpu, &scene(name), &settings(seed), 256, false).film);
         let runs: Vec<Claim> = (1..=40).map(run).collect();
         let true_errors = true_errors(&runs);
         println!("{name}: coverage {}, {:.2} times the error", coverage(&runs, &true_errors, 1.0), width(&runs, &true_errors));
@@ -291,51 +288,43 @@ fn mirror_ball() -> Scene {
     room
 }
 
-/// Whether the tail of a run's noise is known, and whether its error is within its claim.
-fn judged(film: &SceneFilm, truth: &[DVec3]) -> (bool, bool) {
-    let (error, found): (_, Vec<DVec3>) = (film.error(CONFIDENCE), film.surface_means().collect());
-    let off = root_mean_square(pairs(&found, truth).map(|(mean, truth)| *mean - *truth));
-    let is_within = film.measure().relative_to_mean(off) <= error.bound(CONFIDENCE);
-    (error.tail_is_known(CONFIDENCE), is_within)
+/// A picture of the mirror ball.
+fn of_mirror_ball(gpu: &Gpu, size: u32, settings: &SceneSettings) -> scene::RunResult {
+    let scene = mirror_ball();
+    scene::render(gpu, &scene, settings, Target::Picture(&scene.first_camera(), [size; 2])).unwrap()
 }
 
-/// Of runs that know the tail of their noise as many are within their claim as it says; others say that they do not know it.
-fn claims_of_known_tails_hold(most_rounds: u32, least_known: usize) {
+/// Of runs that know the tail of their noise, of which there are so many at least, as many are within their claim as it says; where most
+/// do not know it, fewer of all runs are.
+fn claims_of_known_tails_hold(rounds: u32, seeds: u64, least_known: usize) {
     let Some(gpu) = device() else { return };
-    let lit = |rounds, seed| {
-        let settings = SceneSettings { rounds, stop: Stop { confidence: CONFIDENCE, ..Stop::default() }, ..settings(1.0, seed) };
-        scene::render(&gpu, &mirror_ball(), &settings, Target::Picture(&mirror_ball().first_camera(), [2 * SIZE; 2])).unwrap()
+    let stop = Stop { confidence: CONFIDENCE, ..Stop::default() };
+    let one = |seed| {
+        let film = of_mirror_ball(&gpu, 2 * SIZE, &SceneSettings { rounds, stop, ..settings(1.0, seed) }).film;
+        (film.error(CONFIDENCE).tail_is_known(CONFIDENCE), claim_of_noise(&film))
     };
-    let truth: Vec<DVec3> = lit(800, 1000).film.surface_means().collect();
-    for (rounds, least_known) in [(16, 1), (most_rounds, least_known)] {
-        let runs: Vec<scene::RunResult> = (1..=20).map(|seed| lit(rounds, seed)).collect();
-        let check = |runs: &mut dyn Iterator<Item = (bool, bool)>| {
-            let known: Vec<bool> = runs.filter(|(is_known, _)| *is_known).map(|(_, is_within)| is_within).collect();
-            let within = known.iter().filter(|is_within| **is_within).count();
-            println!("{rounds} rounds: the tail of {} runs is known, and {within} of these are within their claim", known.len());
-            assert!(known.len() >= least_known, "{rounds} rounds: {}", known.len());
-            coverage_check(&format!("{rounds} rounds"), within as f64 / known.len() as f64)
-        };
-        assert_holds("the mirror ball", check(&mut runs.iter().map(|lit| judged(&lit.film, &truth))));
-        if rounds == 16 {
-            let careless = |lit: &scene::RunResult| {
-                let plan = FilmPlan { rare_radiance: 0.0, ..lit.film.plan.clone() };
-                judged(&SceneFilm { plan, ..lit.film.clone() }, &truth)
-            };
-            assert_complains("runs that trust what they have seen", check(&mut runs.iter().map(careless)));
-        }
+    let (is_known, runs): (Vec<bool>, Vec<Claim>) = (1..=seeds).map(one).unzip();
+    let within: Vec<bool> = pairs(true_errors(&runs), &runs).map(|(off, (_, bound, _))| off <= *bound).collect();
+    let check = |within: &[bool]| coverage_check("runs", within.iter().filter(|is| **is).count() as f64 / within.len() as f64);
+    let known: Vec<bool> = pairs(is_known, &within).filter(|(is_known, _)| *is_known).map(|(_, within)| *within).collect();
+    println!("{rounds} rounds: {known:?} of those whose tail is known, {within:?} of all are within their claim");
+    assert!(known.len() >= least_known, "{rounds} rounds: {}", known.len());
+    assert_holds(format!("{rounds} rounds"), check(&known));
+    if 2 * known.len() < within.len() {
+        assert_complains("runs that trust what they have seen", check(&within));
     }
 }
 
 #[test]
 fn claims_hold_once_the_tail_is_known() {
-    claims_of_known_tails_hold(128, 5);
+    claims_of_known_tails_hold(32, 16, 1);
 }
 
 #[test]
 #[ignore = "two minutes on a software device"]
 fn claims_hold_once_most_tails_are_known() {
-    claims_of_known_tails_hold(256, 15);
+    claims_of_known_tails_hold(16, 20, 1);
+    claims_of_known_tails_hold(256, 20, 15);
 }
 
 /// Paths that meet the lamp may be missing from every one of the first 30 rounds, whose noise is then small.
@@ -343,13 +332,11 @@ fn claims_hold_once_most_tails_are_known() {
 fn a_run_goes_on_while_what_is_unseen_may_be_more_than_is_wanted() {
     let Some(gpu) = device() else { return };
     let wanted = 1.0;
-    for seed in 1..=4 {
-        let lit = seen(&gpu, &mirror_ball(), &settings(wanted, seed), &mirror_ball().first_camera(), [SIZE; 2]);
-        let error = lit.film.error(CONFIDENCE);
-        println!("{} rounds: at most {:.3}, unseen {:.3}", lit.film.rounds, error.bound(CONFIDENCE), error.unseen);
-        assert_eq!(lit.end, End::Error);
-        assert!(lit.film.blocks > 16 && error.unseen > 0.0 && watched_error(&lit) <= wanted);
-    }
+    let lit = of_mirror_ball(&gpu, 2 * SIZE, &SceneSettings { samples: 4, ..settings(wanted, 1) });
+    let error = lit.film.error(CONFIDENCE);
+    println!("{} rounds: at most {:.3}, unseen {:.3}", lit.film.rounds, error.bound(CONFIDENCE), error.unseen);
+    assert_eq!(lit.end, End::Error);
+    assert!(lit.film.blocks > 16 && error.unseen > 0.0 && watched_error(&lit) <= wanted);
 }
 
 /// The paper's box by a builder, with an error that is wanted.
@@ -360,8 +347,16 @@ fn in_box(gpu: Option<&Gpu>, error: Option<f64>, rounds: u32, seed: u64) -> (Run
 }
 
 fn run_box(gpu: Option<&Gpu>, settings: &RoomSettings) -> (RunResult, Vec<Progress>) {
+    run_box_slowly(gpu, settings, Duration::ZERO)
+}
+
+/// With a pause whenever progress is told.
+fn run_box_slowly(gpu: Option<&Gpu>, settings: &RoomSettings, pause: Duration) -> (RunResult, Vec<Progress>) {
     let (never, mut told) = (AtomicBool::new(false), Vec::new());
-    let mut tell = |progress: &Progress| told.push(progress.clone());
+    let mut tell = |progress: &Progress| {
+        told.push(progress.clone());
+        std::thread::sleep(pause);
+    };
     let mut control = Control { cancelled: &never, progress: &mut tell, ..Control::default() };
     let outcome = match gpu {
         Some(gpu) => room::on_gpu(gpu, &open_box(settings), settings, &mut control).unwrap(),
@@ -432,7 +427,8 @@ fn a_run_of_the_box_ends_at_what_is_reached_first() {
         let emitted = outcome.film.emitted;
         assert!((1..1_000_000).contains(&emitted) && outcome.fates[0].emitted == emitted, "{emitted}");
         assert!(outcome.film.sums.iter().sum::<u64>() > 0 && outcome.film.flux_error(0).is_infinite());
-        let (outcome, _) = run_box(gpu, &settings(Stop { seconds: Some(0.3), ..Stop::default() }));
+        let timed = RoomSettings { chunk: None, ..settings(Stop { seconds: Some(0.5), ..Stop::default() }) };
+        let (outcome, _) = run_box_slowly(gpu, &timed, Duration::from_millis(50));
         let rounds = outcome.film.rounds;
         assert_eq!((outcome.end, outcome.film.emitted), (End::Time, u64::from(rounds) * 1001));
         let whole = run_box(gpu, &RoomSettings { rounds, ..settings(Stop::default()) }).0;
@@ -490,25 +486,25 @@ fn a_run_ends_at_its_time_or_its_error_whichever_comes_first() {
         stop: Stop { error, confidence: 0.95, seconds, ..Stop::default() },
         ..settings(1.0, 1)
     };
-    let began = Instant::now();
     let (lit, told) = watched(&gpu, "cornell", &stop(Some(1e-6), Some(0.5)));
     assert_eq!(lit.end, End::Time);
-    // Not before its time, and no round is begun after it, however busy the machine is.
-    assert!(began.elapsed().as_secs_f64() >= 0.5, "{:?}", began.elapsed());
-    let (_, before) = told.split_last().unwrap();
-    assert!(before.iter().all(|progress| progress.seconds < 0.5), "{told:?}");
-    assert_eq!(u64::from(lit.film.rounds), told.last().unwrap().done);
+    // Not before its time, and no round is begun after it, however busy the machine is: behind it there is the end of the round
+    // that it meets, and the run's.
+    let last = told.last().unwrap();
+    let behind = told.iter().filter(|progress| progress.seconds >= 0.5).count();
+    assert!(last.seconds >= 0.5 && behind <= 2, "{told:?}");
+    assert_eq!(u64::from(lit.film.rounds), last.done);
     let (lit, _) = watched(&gpu, "cornell", &stop(Some(0.9), Some(1000.0)));
     assert_eq!((lit.end, lit.film.rounds), (End::Error, 16));
     let (lit, _) = watched(&gpu, "cornell", &SceneSettings { rounds: 7, ..stop(Some(1e-6), Some(1000.0)) });
     assert_eq!((lit.end, lit.film.rounds), (End::Rounds, 7));
 }
 
-/// Of the ten scenes, how far the number of rounds predicted at a tenth of the run is off at its end: rounds and not seconds, which
+/// Of some scenes, how far the number of rounds predicted at a tenth of the run is off at its end: rounds and not seconds, which
 /// on a busy machine are anybody's guess. Runs of 60 rounds, by which wanted errors are chosen, have `times` that error.
-fn predictions(gpu: &Gpu, photons: u32, alpha: f64, times: f64) -> Vec<f64> {
+fn predictions(gpu: &Gpu, scenes: &[&str], photons: u32, alpha: f64, times: f64) -> Vec<f64> {
     let mut off = Vec::new();
-    for name in SCENES {
+    for name in scenes {
         let settings = |error, seed| SceneSettings { photons, caustic_photons: photons, alpha, ..settings(error, seed) };
         let first = watched(gpu, name, &SceneSettings { rounds: 60, stop: Stop::default(), ..settings(1.0, 3) }).0;
         let wanted = (watched_error(&first) / times).min(1.0);
@@ -525,17 +521,17 @@ fn predictions(gpu: &Gpu, photons: u32, alpha: f64, times: f64) -> Vec<f64> {
         off.push((predicted / end - 1.0).abs());
     }
     off.sort_by(f64::total_cmp);
-    assert!(off.len() >= 8, "{off:?}");
+    assert!(off.len() + 1 >= scenes.len(), "{off:?}");
     off
 }
 
-/// Within a fifth, in 9 of 10 scenes.
+/// Within a fifth.
 #[test]
 fn the_end_is_predicted_at_a_tenth_of_the_run() {
     let Some(gpu) = device() else { return };
-    // About 350 rounds, or 150 where most of it is unseen.
-    let off = predictions(&gpu, 300, 1.0, 2.4);
-    assert!(off[off.len() * 9 / 10 - 1] <= 0.2, "{off:?}");
+    // About 170 rounds.
+    let off = predictions(&gpu, &FEW, 300, 1.0, 1.7);
+    assert!(off.iter().all(|off| *off <= 0.2), "{off:?}");
     // The paper's line, of which progress is told in photons.
     let wanted = bound_in_box(&in_box(Some(&gpu), None, 60, 1000).0) / 3.4;
     let (outcome, told) = in_box(Some(&gpu), Some(wanted), 20_000, 5);
@@ -547,11 +543,13 @@ fn the_end_is_predicted_at_a_tenth_of_the_run() {
     assert!((predicted / end - 1.0).abs() <= 0.2, "the box: {predicted} of {end}");
 }
 
-/// With bias, which falls with a radius that shrinks: within a factor of 1.5 in 9 of 10 scenes.
+/// In 9 of 10 scenes within a fifth; with bias, which falls with a radius that shrinks, within a factor of 1.5.
 #[test]
-#[ignore = "half a thousand rounds of ten scenes: a minute on a software device"]
-fn the_end_of_noise_and_bias_is_predicted_at_a_tenth_of_the_run() {
+#[ignore = "half a thousand rounds of ten scenes, twice: two minutes on a software device"]
+fn the_end_of_every_scene_is_predicted_at_a_tenth_of_the_run() {
     let Some(gpu) = device() else { return };
-    let off = predictions(&gpu, 5000, SceneSettings::default().alpha, 2.0);
-    assert!(off[off.len() * 9 / 10 - 1] <= 0.5, "{off:?}");
+    for (photons, alpha, times, most) in [(300, 1.0, 2.4, 0.2), (5000, SceneSettings::default().alpha, 2.0, 0.5)] {
+        let off = predictions(&gpu, &SCENES, photons, alpha, times);
+        assert!(off[off.len() * 9 / 10 - 1] <= most, "{off:?}");
+    }
 }

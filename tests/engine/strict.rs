@@ -186,11 +186,11 @@ fn spoiled_guesses(quotient: i32, root: i32) -> Vec<(String, Vec<u32>)> {
 /// it is cut to an integer, and a root those of 1 / inversesqrt, 6.5 units of the root.
 #[test]
 fn guesses_as_far_off_as_vulkan_allows_change_no_bit() {
-    let Some(healthy) = device() else { return };
+    let Some(mut gpu) = device() else { return };
     let operands = operands();
-    let expected = check::math(&healthy, &operands).unwrap();
-    let results_of = |quotient, root| {
-        let gpu = open(Options { replaced: spoiled_guesses(quotient, root), ..Options::default() }).unwrap();
+    let expected = check::math(&gpu, &operands).unwrap();
+    let mut results_of = |quotient, root| {
+        gpu.replace(spoiled_guesses(quotient, root));
         check::math(&gpu, &operands).unwrap()
     };
     let same = |found: &[MathResults]| {
@@ -199,7 +199,7 @@ fn guesses_as_far_off_as_vulkan_allows_change_no_bit() {
         });
         differing.map_or(Ok(()), |(operand, (a, b))| Err(format!("of {operand:?}: {a:?} instead of {b:?}")))
     };
-    for (quotient, root) in [(-3, -7), (-2, -3), (-1, -1), (0, 7), (1, 1), (2, -7), (3, 3), (3, 7), (-3, 7)] {
+    for (quotient, root) in [(-3, -7), (-1, 0), (1, 1), (3, 7)] {
         let found = results_of(quotient, root);
         assert_holds(format!("guesses {quotient} and {root} off"), same(&found));
         for (operand, found) in pairs(&operands, &found) {
@@ -264,12 +264,22 @@ fn the_cpu_builder_agrees_to_the_bit() {
     }
 }
 
+fn found_again(names: &[&str]) {
+    let Some(gpu) = device() else { return };
+    let differing: Vec<String> = names.iter().filter_map(|name| bits::check(&gpu, name).err()).map(|complaint| complaint.text).collect();
+    assert!(differing.is_empty(), "{} of {} differ:\n{}", differing.len(), names.len(), differing.join("\n"));
+}
+
+/// Mirrors, glass and caustics; a sky; textures, lights of all kinds and glTF's materials; the paper's box.
 #[test]
 fn every_device_finds_these_bits() {
-    let Some(gpu) = device() else { return };
-    let differing: Vec<String> =
-        BITS.iter().filter_map(|(name, _)| bits::check(&gpu, name).err()).map(|complaint| complaint.text).collect();
-    assert!(differing.is_empty(), "{} of {} differ:\n{}", differing.len(), BITS.len(), differing.join("\n"));
+    found_again(&["cornell", "cornell-spheres", "sky-over-plane", "blender.glb", "the paper's box"]);
+}
+
+#[test]
+#[ignore = "long: minutes of compiling"]
+fn every_device_finds_all_bits() {
+    found_again(&BITS.map(|(name, _)| name));
 }
 
 /// Rounding changes which way single paths go, and nothing on the whole.

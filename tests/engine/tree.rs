@@ -66,7 +66,7 @@ fn two_channels() -> RoomSettings {
 #[test]
 fn the_tree_gives_the_films_of_brute_force_for_every_number_of_photons() {
     let gpu = device();
-    for count in [0, 1, 2, 7, 8, 9, 40, 41, 640, 1000, 20_000] {
+    for count in [0, 1, 2, 7, 8, 9, 40, 41, 640, 5000] {
         let map = scattered(count);
         for radius in [0.5 / 65_536.0, 0.003, 0.05, 0.5] {
             let settings = room_for(&map, &RoomSettings { radius, ..two_channels() });
@@ -91,24 +91,24 @@ fn builders_and_splits_give_the_bits_of_the_grid() {
     let lesser = device_with(Options { without_int64_atomics: true, ..Options::default() }).unwrap();
     let paper = RoomSettings { mesh: 19, ..RoomSettings::default() };
     let glossy = [Some(2.0), None, Some(0.5), Some(0.01), Some(5.0)];
-    for (what, settings) in [
+    for (half, (what, settings)) in [
         ("Lambertian walls", paper.clone()),
         (
             "two channels, rounds",
             RoomSettings { photons: 1201, rounds: 3, shininess: glossy, light_power: [3.0, 0.2], radius: 0.025, ..paper },
         ),
-    ] {
+    ]
+    .into_iter()
+    .enumerate()
+    {
         let expected = film(&gpu, &settings);
         assert!(expected.sums.iter().filter(|sum| **sum > 0).count() > expected.sums.len() / 2);
-        for (place, group_size) in [32, 128, 1024].into_iter().enumerate() {
-            for builder in Builder::ON_GPU {
-                let chunk = [None, Some(301), Some(1024)][place];
-                let group_size = group_size.min(gpu.facts().work_group_size);
-                let other = RoomSettings { builder, group_size, counters: [None, Some(4), Some(16)][place], chunk, ..by_tree(&settings) };
-                let found = film(&gpu, &other);
-                assert_eq!((found.channel_count, found.scale), (expected.channel_count, expected.scale));
-                assert_holds(format!("{what}, {builder:?}, groups of {group_size}"), equal_sums("film", &found.sums, &expected.sums));
-            }
+        for (place, builder) in Builder::ON_GPU.into_iter().enumerate().skip(half).step_by(2) {
+            let (group_size, chunk, counters) = [(32, None, None), (128, Some(301), Some(4)), (1024, Some(1024), Some(16))][place % 3];
+            let group_size = group_size.min(gpu.facts().work_group_size);
+            let found = film(&gpu, &RoomSettings { builder, group_size, counters, chunk, ..by_tree(&settings) });
+            assert_eq!((found.channel_count, found.scale), (expected.channel_count, expected.scale));
+            assert_holds(format!("{what}, {builder:?}, groups of {group_size}"), equal_sums("film", &found.sums, &expected.sums));
         }
         assert_holds(format!("{what}, 32 bits"), equal_sums("film", &film(&lesser, &by_tree(&settings)).sums, &expected.sums));
         let settings = RoomSettings { threads: 2, ..settings };
@@ -116,7 +116,7 @@ fn builders_and_splits_give_the_bits_of_the_grid() {
         assert_holds(format!("{what}, CPU"), equal_sums("film", &tree.sums, &grid.sums));
     }
     // Nothing is stored in a black box, and the whole line still runs.
-    for builder in Builder::ON_GPU {
+    for builder in [Builder::Naive, Builder::Persistent] {
         let black = by_tree(&RoomSettings { reflectance: 0.0, builder, mesh: 8, ..RoomSettings::default() });
         assert!(film(&gpu, &black).sums.iter().all(|sum| *sum == 0));
         assert!(film(&gpu, &RoomSettings { nearest: Some(5), ..black }).sums.iter().all(|sum| *sum == 0));
@@ -258,11 +258,11 @@ fn builders_and_the_cpu_take_the_same_nearest_photons() {
     let Some(gpu) = device() else { return };
     let lesser = device_with(Options { without_int64_atomics: true, ..Options::default() }).unwrap();
     let glossy = [Some(2.0), None, Some(0.5), Some(0.01), Some(5.0)];
-    for (nearest, rounds) in [(40, 1), (6, 3)] {
+    for (nearest, rounds) in [(40, 1), (6, 2)] {
         let uneven = RoomSettings { mesh: 33, shininess: glossy, light_power: [3.0, 0.2], ..RoomSettings::default() };
         let settings = RoomSettings { nearest: Some(nearest), rounds, math: Math::Strict, threads: 2, ..by_tree(&uneven) };
         let expected = run_on_cpu(&settings).film;
-        for (place, builder) in Builder::ON_GPU.into_iter().enumerate() {
+        for (place, builder) in Builder::ON_GPU.into_iter().enumerate().skip(rounds as usize % 2).step_by(2) {
             let other = RoomSettings { builder, group_size: [128, 32, 64][place % 3], ..settings.clone() };
             let found = film(&gpu, &other);
             assert_eq!((found.channel_count, found.scale), (expected.channel_count, expected.scale));
@@ -321,13 +321,4 @@ fn plans_keep_a_round_together() {
     let small = Limits { memory_bytes: 1 << 20, ..limits };
     let error = RoomPlan::new(&open_box(&settings), &settings, &small).unwrap_err().to_string();
     assert!(error.starts_with("--nearest 10: searches the 300000 photons of a round at once"), "{error}");
-}
-
-/// The photons of real rounds, against brute force over the host's list.
-#[test]
-fn traced_photons_are_found() {
-    let Some(gpu) = device() else { return };
-    let settings = RoomSettings { nearest: Some(25), mesh: 9, shininess: [Some(2.0); 5], ..by_tree(&RoomSettings::default()) };
-    let map = photons(&gpu, &settings);
-    assert_holds("25 nearest", nearest_check(&plan_for_host(&settings), &map, 25, &film(&gpu, &settings).sums));
 }

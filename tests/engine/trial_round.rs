@@ -3,7 +3,6 @@
 
 use std::sync::atomic::AtomicBool;
 
-use crate::common::known;
 use crate::common::lit::light;
 use crate::common::prelude::*;
 use crate::engine::unseen_light::room_without_floor;
@@ -36,10 +35,6 @@ fn receivers(geometry: &Geometry, points: &[(DVec3, DVec3)]) -> Vec<Receiver> {
     points.iter().map(receiver).collect()
 }
 
-fn light_check(found: f64, expected: f64) -> Check {
-    if (found / expected - 1.0).abs() < 0.04 { Ok(()) } else { Err(format!("{found:.4} where {expected:.4} is right")) }
-}
-
 #[test]
 fn a_room_on_a_plain_is_lit_as_it_is_without_the_plain() {
     let Some(gpu) = device() else { return };
@@ -60,22 +55,23 @@ fn a_room_on_a_plain_is_lit_as_it_is_without_the_plain() {
     let radius = plan.global.as_ref().unwrap().radius * geometry.unit;
     let found = mean(plan);
     println!("radius {radius:.3} m, {found:.4} where {expected:.4} is right");
-    assert_holds("the room", light_check(found, expected));
+    let check = |found: f64| relative_check("light", found, expected, 0.04);
+    assert_holds("the room", check(found));
     assert!((0.05..0.6).contains(&radius), "{radius}");
     let by_area = ScenePlan::new(&scene, &geometry, &settings, sensor, &engine::limits(gpu.facts())).unwrap();
     println!("by area: {} m", by_area.global.as_ref().unwrap().radius * geometry.unit);
     // As wide as that, a disc is that of the room alone.
-    assert_holds("a radius by the area, up to the walls", light_check(mean(by_area), expected));
+    assert_holds("a radius by the area, up to the walls", check(mean(by_area)));
     let beyond = SceneSettings { edge_correction: false, ..settings };
     let by_area = ScenePlan::new(&scene, &geometry, &beyond, sensor, &engine::limits(gpu.facts())).unwrap();
-    assert_complains("a radius by the area, past the walls", light_check(mean(by_area), expected));
+    assert_complains("a radius by the area, past the walls", check(mean(by_area)));
 }
 
 /// The plan of a picture, by a trial round.
 fn tried(gpu: &Gpu, scene: &Scene, geometry: &Geometry, settings: &SceneSettings) -> ScenePlan {
     let camera = scene.first_camera();
     let view = View { geometry, camera: Some(&camera), phases: &[] };
-    trial::plan(gpu, scene, &view, settings, Sensor::Picture { width: 64, height: 48 }).unwrap()
+    trial::plan(gpu, scene, &view, settings, Sensor::Picture { width: 32, height: 24 }).unwrap()
 }
 
 /// Where photons lie everywhere alike, so that the area tells the same.
@@ -84,7 +80,7 @@ fn built_in_scenes_keep_about_the_radius_of_their_area() {
     let Some(gpu) = device() else { return };
     let settings = by_rounds();
     let mut off = Vec::new();
-    for name in ["open-box", "cornell", "cornell-spheres", "caustic-sphere", "furnace"] {
+    for name in ["cornell-spheres", "caustic-sphere", "furnace"] {
         let scene = scene(name);
         let geometry = Geometry::new(&scene).unwrap();
         let plan = tried(&gpu, &scene, &geometry, &settings);
@@ -177,16 +173,9 @@ fn a_room_too_small_for_its_scene_has_an_unknown_bias() {
     }
 }
 
+/// Radii by density know no builder or chunk: films are the same to the bit.
 #[test]
-fn a_room_has_radii_of_its_own_beside_a_hall() {
-    let Some(gpu) = device() else { return };
-    assert_holds("radii by the density", known::room_beside_a_hall(&gpu, true));
-    assert_complains("the median's radius everywhere", known::room_beside_a_hall(&gpu, false));
-}
-
-/// Radii by density know no builder, chunk or part: films are the same to the bit, and parts add up to the whole.
-#[test]
-fn radii_by_density_change_no_bit_by_builder_chunk_or_part() {
+fn radii_by_density_change_no_bit_by_builder_or_chunk() {
     let Some(gpu) = device() else { return };
     let scene = scene("cornell-spheres");
     let camera = scene.first_camera();
@@ -194,16 +183,10 @@ fn radii_by_density_change_no_bit_by_builder_chunk_or_part() {
     let lit = |settings: SceneSettings| scene::render(&gpu, &scene, &settings, Target::Picture(&camera, [24, 18])).unwrap();
     let whole = lit(settings.clone());
     assert!(whole.plan.has_classes() && whole.plan.maps().any(|map| whole.film.classes(map).is_some_and(|(first, last)| first < last)));
-    for (builder, chunk) in [(Builder::Atomic, None), (Builder::Naive, Some(700)), (Builder::Persistent, Some(1300))] {
+    for (builder, chunk) in [(Builder::Naive, Some(700)), (Builder::Persistent, Some(1300))] {
         let other = lit(SceneSettings { builder: Some(builder), chunk, ..settings.clone() });
         assert!(other.film == whole.film && other.film.class_counts == whole.film.class_counts, "{builder:?}, {chunk:?}");
     }
-    let mut sums = vec![0; whole.film.sums.len()];
-    for part in [Part::Direct, Part::Specular, Part::Caustic, Part::Indirect] {
-        let of_part = lit(SceneSettings { part, ..settings.clone() });
-        sums.iter_mut().zip(&of_part.film.sums).for_each(|(sum, of_part)| *sum += of_part);
-    }
-    assert!(sums == whole.film.sums);
 }
 
 /// A radius that is given for one map leaves the other's to the trial, and neither loses its light.
@@ -212,9 +195,9 @@ fn one_radius_may_be_given() {
     let Some(gpu) = device() else { return };
     let scene = scene("cornell-spheres");
     let camera = scene.first_camera();
-    let settings = SceneSettings { photons: 20_000, caustic_photons: 20_000, rounds: 4, ..by_rounds() };
+    let settings = SceneSettings { photons: 10_000, caustic_photons: 10_000, rounds: 4, ..by_rounds() };
     let part_totals = |settings: SceneSettings| {
-        let lit = scene::render(&gpu, &scene, &settings, Target::Picture(&camera, [32, 24])).unwrap();
+        let lit = scene::render(&gpu, &scene, &settings, Target::Picture(&camera, [16, 12])).unwrap();
         lit.film.part_totals.iter().map(|total| *total as f64).collect::<Vec<_>>()
     };
     let expected = part_totals(settings.clone());

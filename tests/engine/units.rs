@@ -79,8 +79,7 @@ const LIGHTS: [usize; 2] = [2, 0];
 
 /// Flux that reaches the part of a disc that lies on its wall, from each light of 1 W, and the area of
 /// that part.
-fn direct_on_disc(emission: EmissionLaw, wall: usize, centre: [f64; 2], radius: f64) -> ([f64; 2], f64) {
-    let (rings, spokes) = (6, 16);
+fn direct_on_disc(emission: EmissionLaw, wall: usize, centre: [f64; 2], radius: f64, [rings, spokes]: [u32; 2]) -> ([f64; 2], f64) {
     let cell = PI * radius * radius / f64::from(rings * spokes);
     let (mut flux, mut area) = ([0.0; 2], 0.0);
     for ring in 0..rings {
@@ -108,7 +107,7 @@ fn expected_direct(settings: &RoomSettings) -> Vec<(f64, f64)> {
     let texel = |i: usize| (i as f64 + 0.5) / mesh as f64 * 2.0 * HALF_EDGE - HALF_EDGE;
     let mut expected = Vec::new();
     for (wall, place) in (0..5).flat_map(|wall| (0..mesh * mesh).map(move |place| (wall, place))) {
-        let (flux, area) = direct_on_disc(settings.emission, wall, [texel(place % mesh), texel(place / mesh)], settings.radius);
+        let (flux, area) = direct_on_disc(settings.emission, wall, [texel(place % mesh), texel(place / mesh)], settings.radius, [6, 16]);
         let of_light = f64::from(settings.photons) / 2.0;
         // Each photon of a light is stored in the disc with the probability albedo * flux.
         let variance: f64 = flux.iter().map(|flux| of_light * albedo * flux * (1.0 - albedo * flux)).sum();
@@ -128,9 +127,9 @@ fn direct_check(irradiance: &[f64], expected: &[(f64, f64)]) -> Check {
     Ok(())
 }
 
-/// Direct light alone, in discs that do not overlap and lie on their walls.
+/// Direct light alone, in discs that do not overlap and lie on their walls: so many photons find a gain of 1 % with 6 standard errors.
 fn direct_settings(emission: EmissionLaw) -> RoomSettings {
-    RoomSettings { emission, bounces: 1, photons: 2_000_000, rng: Rng::Philox, mesh: 16, radius: 0.015, ..RoomSettings::default() }
+    RoomSettings { emission, bounces: 1, photons: 1_000_000, rng: Rng::Philox, mesh: 16, radius: 0.015, ..RoomSettings::default() }
 }
 
 #[test]
@@ -276,37 +275,29 @@ fn stored_photons_over_albedo_are_the_arriving_ones() {
     assert_complains("a gain of 3 %", check(1.03));
 }
 
-#[test]
-fn radiosity_is_albedo_times_irradiance() {
-    for reflectance in [0.25, 0.75, 1.0] {
-        let settings = RoomSettings { reflectance, ..RoomSettings::default() };
-        for wall in walls(&run_on_cpu(&settings)) {
-            assert!(wall.radiosity.iter().any(|value| *value > 0.0));
-            for (radiosity, irradiance) in pairs(&wall.radiosity, &wall.irradiance) {
-                let expected = f64::from(reflectance) * irradiance;
-                assert!((radiosity - expected).abs() <= 1e-12 * expected, "{}: {radiosity} and {irradiance}", wall.name);
-            }
-        }
-    }
-}
-
 /// Watts that all walls reflect: the radiosity over the walls' area is the flux of the stored photons.
 /// What a texel sees is a mean over its disc, so edges shift a little of it: bounded by half a percent
 /// at this radius.
 #[test]
 fn reflected_flux_is_that_of_the_stored_photons() {
-    let settings = RoomSettings { photons: 200_001, rounds: 1, rng: Rng::Philox, radius: 0.015, threads: 2, ..RoomSettings::default() };
+    let settings = RoomSettings { photons: 50_001, rng: Rng::Philox, radius: 0.015, threads: 2, ..RoomSettings::default() };
     let reflected = |settings: &RoomSettings| {
         let outcome = run_on_cpu(settings);
         let texel_area = (2.0 * HALF_EDGE / f64::from(settings.mesh)).powi(2);
-        let watts = walls(&outcome).iter().flat_map(|wall| &wall.radiosity).sum::<f64>() * texel_area;
+        let walls = walls(&outcome);
+        for (radiosity, irradiance) in walls.iter().flat_map(|wall| pairs(&wall.radiosity, &wall.irradiance)) {
+            let expected = f64::from(settings.reflectance) * irradiance;
+            assert!((radiosity - expected).abs() <= 1e-12 * expected, "{radiosity} and {irradiance}");
+        }
+        let watts = walls.iter().flat_map(|wall| &wall.radiosity).sum::<f64>() * texel_area;
         let stored = outcome.ledger().stored as f64;
         (watts, stored * settings.light_power.iter().sum::<f64>() / settings.total_photons() as f64)
     };
     for settings in [
         settings.clone(),
         RoomSettings { light_power: [7.0, 7.0], ..settings.clone() },
-        RoomSettings { photons: 50_001, rounds: 4, ..settings.clone() },
+        RoomSettings { photons: 12_501, rounds: 4, ..settings.clone() },
+        RoomSettings { reflectance: 0.25, ..settings.clone() },
         RoomSettings { shininess: [Some(5.0); 5], ..settings },
     ] {
         let (film, photons) = reflected(&settings);
@@ -319,7 +310,7 @@ fn reflected_flux_is_that_of_the_stored_photons() {
 #[test]
 fn edge_correction_divides_by_what_lies_on_the_wall() {
     let Some(gpu) = device() else { return };
-    let corrected = RoomSettings { bounces: 1, photons: 1_000_000, rng: Rng::Philox, ..RoomSettings::default() };
+    let corrected = RoomSettings { bounces: 1, photons: 200_000, rng: Rng::Philox, ..RoomSettings::default() };
     let uncorrected = RoomSettings { edge_correction: false, ..corrected.clone() };
     let (with, without) = (walls(&run(&gpu, &corrected)), walls(&run(&gpu, &uncorrected)));
     let radius = corrected.radius;
@@ -329,7 +320,8 @@ fn edge_correction_divides_by_what_lies_on_the_wall() {
         for wall in [1, 3, 4] {
             let texel = row * 64 + column;
             let centre = [column, row].map(|i| (i as f64 + 0.5) / 64.0 * 2.0 * HALF_EDGE - HALF_EDGE);
-            let flux = direct_on_disc_fine(wall, centre, radius);
+            // Fine enough for discs that an edge cuts.
+            let (flux, _) = direct_on_disc(EmissionLaw::Uniform, wall, centre, radius, [40, 160]);
             let t = half_texel / radius;
             let edge_share = 1.0 - (t.acos() - t * (1.0 - t * t).sqrt()) / PI;
             // In a corner the parts beyond both edges overlap: shares F + F - 1 plus what was cut twice.
@@ -339,17 +331,17 @@ fn edge_correction_divides_by_what_lies_on_the_wall() {
                 _ => 1.0,
             };
             let area = share * PI * radius * radius;
-            let per_light = 500_000.0;
+            let per_light = 0.5 * f64::from(corrected.photons);
             let variance: f64 = flux.iter().map(|flux| per_light * 0.75 * flux * (1.0 - 0.75 * flux)).sum();
             let (mean, error) = (flux.iter().sum::<f64>() / area, variance.sqrt() / per_light / 0.75 / area);
             let what = format!("{place} of wall {wall}");
-            // The raster of the flux is good to a part in 500.
-            assert_holds(&what, z_check(&what, with[wall].irradiance[texel], mean, error + 0.002 * mean));
+            // The raster of the flux is good to a part in 250.
+            assert_holds(&what, z_check(&what, with[wall].irradiance[texel], mean, error + 0.004 * mean));
             let ratio = without[wall].irradiance[texel] / with[wall].irradiance[texel];
             assert!((ratio - share).abs() < 1e-9, "{what}: {ratio} where {share} of the disc is on the wall");
             if place == "edge" {
                 assert!((0.5..0.6).contains(&ratio), "{ratio}");
-                assert_complains("an edge without correction", z_check(&what, without[wall].irradiance[texel], mean, error + 0.002 * mean));
+                assert_complains("an edge without correction", z_check(&what, without[wall].irradiance[texel], mean, error + 0.004 * mean));
             }
         }
     }
@@ -360,25 +352,4 @@ fn edge_correction_divides_by_what_lies_on_the_wall() {
 fn corner_share(t: f64) -> f64 {
     let strip = t * (1.0 - t * t).sqrt() + t.asin();
     0.25 + strip / PI + t * t / PI
-}
-
-/// Direct flux of uniform emission on the part of a disc that lies on its wall, from each light of 1 W,
-/// on a raster fine enough for discs that an edge cuts.
-fn direct_on_disc_fine(wall: usize, centre: [f64; 2], radius: f64) -> [f64; 2] {
-    let cells = 200;
-    let pitch = 2.0 * radius / f64::from(cells);
-    let mut flux = [0.0; 2];
-    for i in 0..cells {
-        for j in 0..cells {
-            let offset = [i, j].map(|k| (f64::from(k) + 0.5) * pitch - radius);
-            let [s, t] = [centre[0] + offset[0], centre[1] + offset[1]];
-            if offset[0] * offset[0] + offset[1] * offset[1] > radius * radius || s.abs() > HALF_EDGE || t.abs() > HALF_EDGE {
-                continue;
-            }
-            for (light, flux) in LIGHTS.into_iter().zip(&mut flux) {
-                *flux += pitch * pitch * direct_from(light, EmissionLaw::Uniform, wall, on_wall(wall, s, t), 4, 12);
-            }
-        }
-    }
-    flux
 }

@@ -86,7 +86,7 @@ fn probes_in_a_house_on_a_sunlit_plain_have_a_bound_and_no_error() {
     let geometry = Geometry::new(&scene).unwrap();
     let expected = 20f64.ln() * 1000.0 * (geometry.radius * geometry.unit).powi(2) / (3000.0 * 16.0);
     assert!((unknown.upper_bound / expected - 1.0).abs() < 1e-3, "{unknown:?}: {expected}");
-    for truth in Judge::new(&scene, 8).irradiance_at(&inside, 4000, 1) {
+    for truth in Judge::new(&scene, 8).irradiance_at(&inside, 1000, 1) {
         let truth = truth.mean.total().x;
         assert!(truth > 0.05 && truth < unknown.upper_bound, "{truth}, {unknown:?}");
     }
@@ -216,12 +216,6 @@ pub fn hidden_lamp(gpu: &Gpu) -> Check<Complaint> {
     }
 }
 
-#[test]
-fn lamps_that_no_ray_has_met_are_said_to_be_hidden() {
-    let Some(gpu) = device() else { return };
-    assert_holds("a lamp behind a hole", hidden_lamp(&gpu));
-}
-
 /// A box that stands in the middle of the floor of a furnace of 2 m, points of its sides, and what they receive.
 fn box_in_a_furnace(gpu: &Gpu, width: f64) -> Result<RunResult, Error> {
     let cube = |corner: DVec3, size: f64, faces_in: bool| {
@@ -270,12 +264,6 @@ pub fn dim_photons(gpu: &Gpu) -> Check<Complaint> {
     }
 }
 
-#[test]
-fn points_that_only_dim_photons_have_met_are_said_to_be_so() {
-    let Some(gpu) = device() else { return };
-    assert_holds("a tiny box in a furnace", dim_photons(&gpu));
-}
-
 /// Photons that are aimed at a window are dim; those that the ground scatters into it are bright and rare. Without them a room is too dark
 /// for its error, and the report says so.
 #[test]
@@ -292,7 +280,7 @@ fn light_that_the_ground_scatters_into_a_room_is_said_to_be_missing() {
     let both = |(x, z): (f64, f64)| [(dvec3(x, 3.0, z), DVec3::NEG_Y), (dvec3(x, 0.0, z), DVec3::Y)];
     let points: Vec<_> = (0..9).flat_map(|k| both((f64::from(k / 3) - 1.5, f64::from(k % 3) - 1.0))).collect();
     let lit = render(&gpu, &scene, &SceneSettings { part: Part::Indirect, ..by_rounds() }, Target::Points(&points)).unwrap();
-    let truth = Judge::new(&scene, 16).irradiance_at(&points, 40_000, 1);
+    let truth = Judge::new(&scene, 16).irradiance_at(&points, 6000, 1);
     let found: f64 = (0..points.len()).map(|point| red(&lit, point).0).sum();
     let missing = truth.iter().map(|point| point.mean.indirect.x).sum::<f64>() - found;
     let errors: f64 = (0..points.len()).map(|point| lit.film.stated_error(point).x + truth[point].standard_error.indirect.x).sum();

@@ -1,5 +1,5 @@
-//! Scenes from glTF: what a file says is what the scene holds, what it cannot be used for is refused
-//! in one line, and no mutated file makes the loader panic.
+//! Scenes from glTF: what a file says is what the scene holds, and what it cannot be used for is refused in one line. What mutations
+//! of files come to is in tests/fuzz.rs.
 
 use crate::common::gltf_file::{data_uri, encoded, floats, set_buffer, square, square_buffer};
 use crate::common::prelude::*;
@@ -42,7 +42,9 @@ fn glb(mut value: Value) -> Vec<u8> {
 
 #[test]
 fn a_file_says_what_the_scene_holds() {
-    for scene in [load(&square()).unwrap(), open("scene.glb", &glb(square())).unwrap()] {
+    // A mark of the byte order is passed over.
+    let marked = [b"\xef\xbb\xbf".as_slice(), square().to_string().as_bytes()].concat();
+    for scene in [load(&square()), open("scene.glb", &glb(square())), open("scene.gltf", &marked)].map(Result::unwrap) {
         let [mesh] = scene.meshes.as_slice() else { panic!("{:?}", scene.meshes) };
         assert_eq!(mesh.name, "wall");
         assert_eq!(mesh.positions[2], DVec3::new(3.0, 4.0, 3.0));
@@ -328,6 +330,13 @@ fn what_cannot_be_used_is_refused_with_file_and_object() {
         (|v| v["buffers"][0]["byteLength"] = json!(10_000), &["buffer 0", "140 bytes", "10000"]),
         (|v| v["buffers"][0]["uri"] = json!("absent.bin"), &["buffer 0", "absent.bin", "cannot be read"]),
         (|v| with_image(v, "absent.png"), &["scene.gltf", "texture image 0", "absent.png", "no such file"]),
+        (
+            |v| {
+                with_image(v, "a.avif");
+                v["textures"] = json!([{"extensions": {"EXT_texture_avif": {"source": 0}}}]);
+            },
+            &["material 'glow'", "texture 0", "but by EXT_texture_avif", "PNG, JPEG, WebP or KTX 2"],
+        ),
         (|v| v["buffers"][0]["uri"] = json!("%zz"), &["buffer 0", "%zz"]),
         (|v| v["buffers"][0]["uri"] = json!("https://example.com/a.bin"), &["buffer 0", "only files beside this one"]),
         (|v| v["buffers"][0]["uri"] = json!("data:x;base64,@@@"), &["buffer 0", "not base64"]),
@@ -344,7 +353,6 @@ fn what_cannot_be_used_is_refused_with_file_and_object() {
             |v| drop(v["meshes"][0]["primitives"][0]["attributes"].as_object_mut().unwrap().remove("POSITION")),
             &["no triangle; ignored: primitives without positions: mesh 'wall'"],
         ),
-        (|v| v["meshes"][0]["primitives"][0]["material"] = json!(7), &["scene.gltf", "the file is not valid glTF: ", "material"]),
         (|v| v["extensionsRequired"] = json!(["EXT_materials_fur"]), &["scene.gltf", "EXT_materials_fur", "export its materials"]),
         (|v| v["asset"]["version"] = json!("9.9"), &["scene.gltf", "9.9"]),
     ];
@@ -591,14 +599,6 @@ fn sparse_accessors_without_a_view_may_be_as_long_as_their_buffers() {
     Scene::open(path.to_str().unwrap(), false).unwrap();
 }
 
-#[test]
-fn textures_without_a_picture_that_is_read_name_what_has_it() {
-    let mut value = square();
-    with_image(&mut value, "a.avif");
-    value["textures"] = json!([{"extensions": {"EXT_texture_avif": {"source": 0}}}]);
-    assert_refused(&value, &["material 'glow'", "texture 0", "but by EXT_texture_avif", "PNG, JPEG, WebP or KTX 2"]);
-}
-
 /// Integers stand for themselves, or for parts of their range.
 #[test]
 fn quantized_meshes_are_read() {
@@ -706,13 +706,6 @@ fn shared_vertices_are_read_once_for_each_use() {
     assert_eq!((scene.meshes[1].uvs[0].len(), scene.meshes[1].normals.len()), (3, 3));
 }
 
-#[test]
-fn a_mark_of_the_byte_order_is_passed_over() {
-    let text = square().to_string();
-    let scene = open("scene.gltf", &[b"\xef\xbb\xbf".as_slice(), text.as_bytes()].concat()).unwrap();
-    assert_eq!(scene.triangle_count(), 2);
-}
-
 /// What the extension would say is missing without it: the complaint is about the extension, with what to do.
 #[test]
 fn extensions_that_are_needed_and_not_read_are_one_line() {
@@ -782,47 +775,6 @@ fn loading_reports_its_stages() {
     let wanted = "reading the file, decoding textures, reading meshes, preparing triangles, looking for overlaps, \
         building the hierarchy, preparing triangles, packing textures, collecting lights";
     assert_eq!(stages.join(", "), wanted);
-}
-
-/// Nodes within themselves, and deeper than any hierarchy.
-#[test]
-fn endless_hierarchies_end() {
-    let mut value = square();
-    value["nodes"][0]["children"] = json!([0]);
-    assert_refused(&value, &["'wall'"]);
-}
-
-/// Bytes changed, cut and repeated at random, JSON values replaced: the loader answers, and quickly.
-#[test]
-fn no_mutated_file_makes_the_loader_panic() {
-    let whole = glb(square());
-    let text = square().to_string().into_bytes();
-    let mut state = 1u64;
-    let mut random = |below: usize| {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((state >> 33) as usize) % below.max(1)
-    };
-    let mut refused = 0;
-    for case in 0..4000 {
-        let (name, seed) = if case % 2 == 0 { ("a.glb", &whole) } else { ("a.gltf", &text) };
-        let mut bytes = seed.clone();
-        for _ in 0..=random(6) {
-            let place = random(bytes.len());
-            match random(5) {
-                0 => bytes[place] ^= 1 << random(8),
-                1 => bytes[place] = random(256) as u8,
-                2 => bytes.truncate(place.max(1)),
-                3 => bytes[place] = b"0123456789-eE.[]{},:"[random(20)],
-                _ => {
-                    let end = (place + random(16)).min(bytes.len());
-                    let part = bytes[place..end].to_vec();
-                    bytes.splice(place..place, part);
-                }
-            }
-        }
-        refused += usize::from(open(name, &bytes).is_err());
-    }
-    assert!(refused > 1000, "the mutations must matter: {refused} of 4000 were refused");
 }
 
 /// What Blender's own exporter writes (tools/make_blender_scene.py).
@@ -1033,19 +985,8 @@ fn everything_of_a_material_is_read() {
 fn materials_that_say_nothing_have_the_defaults() {
     let scene = load(&with_material(json!({"name": "plain"}))).unwrap();
     assert_eq!(scene.materials[0], Material::layered("plain", Vec3::ONE, Layers::default()));
-    let empty = [
-        "volume",
-        "specular",
-        "clearcoat",
-        "sheen",
-        "ior",
-        "transmission",
-        "dispersion",
-        "diffuse_transmission",
-        "iridescence",
-        "anisotropy",
-    ];
-    let empty: serde_json::Map<String, Value> = empty.iter().map(|name| (format!("KHR_materials_{name}"), json!({}))).collect();
+    let empty = "volume specular clearcoat sheen ior transmission dispersion diffuse_transmission iridescence anisotropy".split(' ');
+    let empty: serde_json::Map<String, Value> = empty.map(|name| (format!("KHR_materials_{name}"), json!({}))).collect();
     let scene = load(&with_material(json!({"name": "empty", "extensions": empty}))).unwrap();
     assert_eq!(scene.materials[0], Material::layered("empty", Vec3::ONE, Layers::default()));
     assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
@@ -1161,9 +1102,7 @@ fn specular_and_glossiness_stand_alone() {
 
 /// The fraction of the ior 0 is 1 whatever stands beside it: a specular factor s reflects s of the light along the normal, and the
 /// rest goes on.
-#[test]
-fn surfaces_of_ior_zero_reflect_their_specular_factor() {
-    let Some(gpu) = device() else { return };
+fn check_ior_zero(mean: impl Fn(&Scene, &Camera, u32) -> f64) {
     for specular in [1.0f32, 0.25] {
         let mut scene = load(&with_material(json!({"name": "old", "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0},
             "extensions": {"KHR_materials_ior": {"ior": 0}, "KHR_materials_transmission": {"transmissionFactor": 1},
@@ -1178,13 +1117,28 @@ fn surfaces_of_ior_zero_reflect_their_specular_factor() {
         let wall = scene.materials.len() - 1;
         scene.meshes.push(Mesh::parallelogram("wall", DVec3::new(-8.0, -8.0, 2.0), 20.0 * DVec3::X, 20.0 * DVec3::Y, wall));
         let camera = Camera::looking_at("ray", DVec3::new(2.1, 3.2, 8.0), DVec3::new(2.1, 3.2, 3.0), DVec3::Y, 0.003);
-        let settings = SceneSettings { photons: 1000, rounds: 4, ..by_rounds() };
-        let found = mean_red(&seen(&gpu, &scene, &settings, &camera, [32, 32]));
+        let found = mean(&scene, &camera, 32);
         let expected = f64::from(specular + 2.0 * (1.0 - specular));
         // Deltas are chosen by chance where there are two.
         let error = 0.5 * f64::from(specular * (1.0 - specular)).sqrt() / 32.0 + 1e-5;
         assert_holds(specular, z_check("radiance", found, expected, error));
     }
+}
+
+#[test]
+fn surfaces_of_ior_zero_reflect_their_specular_factor() {
+    check_ior_zero(|scene, camera, side| {
+        let image = Judge::new(scene, u32::MAX).image(camera, side, side, 4, 1);
+        image.pixels.iter().map(|pixel| pixel.mean.total().x).sum::<f64>() / image.pixels.len() as f64
+    });
+}
+
+#[test]
+#[ignore = "long: makes kernels of its own"]
+fn surfaces_of_ior_zero_reflect_their_specular_factor_on_a_device() {
+    let Some(gpu) = device() else { return };
+    let settings = SceneSettings { photons: 1000, rounds: 4, ..by_rounds() };
+    check_ior_zero(|scene, camera, side| mean_red(&seen(&gpu, scene, &settings, camera, [side, side])));
 }
 
 #[test]

@@ -13,7 +13,7 @@ use photonmill::scene::material::Coverage;
 use photonmill::scene::texture::Filter;
 use photonmill::verify::judge::{FirstSurface, first_surfaces};
 
-const SMALL: &str = "--size 24x24 --photons 500 -q";
+const SMALL: &str = "--size 8x8 --photons 500 -q";
 
 impl Place {
     fn content(&self, name: &str) -> Vec<u8> {
@@ -43,8 +43,8 @@ fn layers_are_the_parts_the_error_and_what_is_seen() {
     let mut expected: BTreeSet<String> = rgb.iter().flat_map(|layer| ["R", "G", "B"].map(|channel| format!("{layer}.{channel}"))).collect();
     expected.extend(["R", "G", "B", "normal.X", "normal.Y", "normal.Z", "depth.Z"].map(str::to_owned));
     assert_eq!(all.keys().cloned().collect::<BTreeSet<_>>(), expected);
-    // As if each part were asked for alone; and their sum but for the rounding of floats.
-    for part in ["direct", "specular", "caustic", "indirect"] {
+    // As if a part were asked for alone, as the next test has it of indirect light; and the sum of all but for the rounding of floats.
+    for part in ["specular", "caustic"] {
         place.succeed(&format!("render cornell-spheres --rounds 8 --part {part} --layers none -o {part}.exr {SMALL}"));
         let alone = place.channels(&format!("{part}.exr"));
         assert_eq!(alone.len(), 3);
@@ -60,8 +60,8 @@ fn layers_are_the_parts_the_error_and_what_is_seen() {
             assert!((sum - f64::from(*whole)).abs() <= 3e-7 * f64::from(*whole), "{channel} of pixel {pixel}: {sum}, {whole}");
         }
     }
-    // Neither layers nor their lack change the light.
-    place.succeed(&format!("render cornell-spheres --rounds 8 -o b.exr --layers albedo,depth {SMALL}"));
+    // Neither layers nor their lack change the light, which is what `--part all` asks for.
+    place.succeed(&format!("render cornell-spheres --rounds 8 --part all -o b.exr --layers albedo,depth {SMALL}"));
     assert!(place.light("a.exr") == place.light("b.exr"));
     let some: Vec<String> = place.channels("b.exr").into_keys().collect();
     assert_eq!(some, ["B", "G", "R", "albedo.B", "albedo.G", "albedo.R", "depth.Z"]);
@@ -76,7 +76,7 @@ fn layers_are_the_parts_the_error_and_what_is_seen() {
 fn parts_of_runs_add_up_in_layers() {
     let Some(_) = device() else { return };
     let place = Place::new();
-    let run = |more: &str| place.succeed(&format!("render cornell-spheres {more} {SMALL}"));
+    let run = |more: &str| place.succeed(&format!("render cornell {more} {SMALL}"));
     run("--rounds 16 -o whole.exr");
     run("--rounds 8 -o half.exr --checkpoint half.pms");
     run("--rounds 16 -o resumed.exr --resume half.pms");
@@ -87,6 +87,10 @@ fn parts_of_runs_add_up_in_layers() {
     place.succeed("merge 1.pms 2.pms -o merged.exr");
     let (merged, whole) = (place.channels("merged.exr"), place.channels("whole.exr"));
     assert!(merged.len() == whole.len() - 7 && merged.iter().all(|(name, values)| *values == whole[name]));
+    place.assert_refused([
+        ("repeat 1.exr", ["1.exr: holds a shard", "without --shard"]),
+        ("repeat merged.exr", ["merged.exr: was put together by merge", ""]),
+    ]);
     // Of two shards one has no parts.
     run("--rounds 16 --shard 1/2 --checkpoint 1.pms");
     place.succeed("merge 1.pms 2.pms -o merged.exr");
@@ -189,7 +193,7 @@ fn files_say_how_they_were_made() {
         assert_eq!(made.settings["samples"], 2);
     }
     // The command makes the same picture.
-    assert_eq!(exr.command, "photonmill render cornell --size 24x24 --seed 7 --photons 500 --samples 2 --rounds 8 -o picture.exr");
+    assert_eq!(exr.command, "photonmill render cornell --size 8x8 --seed 7 --photons 500 --samples 2 --rounds 8 -o picture.exr");
     let line = exr.command.strip_prefix("photonmill ").unwrap();
     place.succeed(&format!("{line} -q"));
     assert!(place.content("picture.exr") == place.content("a.exr"), "equal results are equal files");
@@ -215,6 +219,11 @@ fn files_say_how_they_were_made() {
     assert!(!texts.values().any(|text| text.contains(&folder)) && !format!("{:?}", exr.settings).contains(&folder));
 }
 
+/// The square by hand.
+fn square_file() -> String {
+    crate::common::gltf_file::square().to_string()
+}
+
 /// With what a pilot chose, tiles among it, and a scene of a file.
 #[test]
 fn pictures_are_made_again_to_the_bit() {
@@ -224,29 +233,30 @@ fn pictures_are_made_again_to_the_bit() {
     place.succeed(&format!("render cornell-spheres --size 24x24 --error {error} -o piloted.exr -q"));
     let Repeat::With { tiles, .. } = Metadata::read(&place.content("piloted.exr")).unwrap().repeat else { panic!("cannot be repeated") };
     assert!(tiles.is_some());
-    std::fs::copy(format!("{}/tests/scenes/blender.glb", env!("CARGO_MANIFEST_DIR")), place.at("a scene.glb")).unwrap();
-    place.succeed(&format!("render 'a scene.glb' -o file.png --rounds 8 --environment 0.5 --tone linear --exposure 1 {SMALL}"));
-    place.succeed(&format!("render cornell -o timed.png --time 0.2s {SMALL}"));
-    place.succeed(&format!("render cornell -o few.exr --rounds 3 --filter tent --final-gather {SMALL}"));
-    place.succeed(&format!("render cornell -o half.png --rounds 8 --checkpoint half.pms {SMALL}"));
-    place.succeed(&format!("render cornell -o resumed.exr --rounds 16 --resume half.pms {SMALL}"));
+    place.write("a scene.gltf", square_file());
+    // As many rounds as there is time for.
+    let of_file = format!("render 'a scene.gltf' -o file.png --time 0.2s --environment 0.5 --tone linear --exposure 1 {SMALL}");
+    place.succeed(&of_file);
+    place.succeed(&format!("render cornell -o half.exr --rounds 8 --filter tent --checkpoint half.pms {SMALL}"));
+    // The last three are less than a block.
+    place.succeed(&format!("render cornell -o resumed.exr --rounds 11 --filter tent --resume half.pms {SMALL}"));
     place.succeed("map cornell -o map.pm --photons 500 --rounds 8 -q");
-    place.succeed("render cornell --map map.pm --rounds 4 -o mapped.png --size 24x24 -q");
-    for name in ["piloted.exr", "file.png", "timed.png", "few.exr", "resumed.exr", "mapped.png"] {
-        let (stdout, stderr) = place.succeed(&format!("repeat {name} -q"));
-        assert!(stdout.starts_with(&format!("{name}: repeated, all ")) && stdout.contains("are identical"), "{name}: {stdout}");
-        assert!(!stderr.contains("warning"), "{name}: {stderr}");
+    place.succeed("render cornell --map map.pm --rounds 4 -o mapped.png --size 8x8 -q");
+    for line in ["piloted.exr", "resumed.exr -o again.exr", "mapped.png"] {
+        let (stdout, stderr) = place.succeed(&format!("repeat {line} -q"));
+        assert!(stdout.contains(": repeated, all ") && stdout.contains("are identical"), "{line}: {stdout}");
+        assert!(!stderr.contains("warning"), "{line}: {stderr}");
     }
-    // To a file, which says the same.
-    place.succeed("repeat piloted.exr -o again.exr -q");
-    let bytes = |name: &str| place.channels(name);
-    assert!(bytes("again.exr") == bytes("piloted.exr"));
-    place.succeed("repeat again.exr -q");
+    // A file that repeats says how, too.
+    assert!(place.channels("again.exr") == place.channels("resumed.exr"));
+    let [again, resumed] = ["again.exr", "resumed.exr"].map(|name| Metadata::read(&place.content(name)).unwrap());
+    assert_eq!((&again.command, &again.repeat), (&resumed.command, &resumed.repeat));
     // The scene has moved.
     std::fs::create_dir(place.at("moved")).unwrap();
-    std::fs::rename(place.at("a scene.glb"), place.at("moved/scene.glb")).unwrap();
-    place.assert_refused([(on_device("repeat file.png -q"), ["file.png: is of the scene a scene.glb, which is not there", "--scene"])]);
-    place.succeed("repeat file.png --scene moved/scene.glb -o again.png -q");
+    std::fs::rename(place.at("a scene.gltf"), place.at("moved/scene.gltf")).unwrap();
+    place.assert_refused([(on_device("repeat file.png -q"), ["file.png: is of the scene a scene.gltf, which is not there", "--scene"])]);
+    let (stdout, _) = place.succeed("repeat file.png --scene moved/scene.gltf -o again.png -q");
+    assert!(stdout.starts_with("file.png: repeated, all ") && stdout.contains("are identical"), "{stdout}");
     assert_eq!(png_codes(&place.content("again.png")), png_codes(&place.content("file.png")));
 }
 
@@ -254,43 +264,31 @@ fn pictures_are_made_again_to_the_bit() {
 fn what_cannot_be_made_again_is_refused() {
     let Some(_) = device() else { return };
     let place = Place::new();
-    let blender = std::fs::read(format!("{}/tests/scenes/blender.glb", env!("CARGO_MANIFEST_DIR"))).unwrap();
-    place.write("scene.glb", &blender);
-    place.succeed(&format!("render scene.glb -o a.png --rounds 4 {SMALL}"));
+    place.write("scene.gltf", square_file());
+    place.succeed(&format!("render scene.gltf -o a.png --rounds 4 {SMALL}"));
     // Another scene of that name.
-    let name = b"\"baseColorFactor\":[0.";
-    let place_of_number = blender.windows(name.len()).position(|bytes| bytes == name).unwrap() + name.len();
-    let digit = (place_of_number..).find(|place| blender[*place].is_ascii_digit()).unwrap();
-    let mut other = blender;
-    other[digit] = if other[digit] == b'9' { b'8' } else { other[digit] + 1 };
-    place.write("scene.glb", &other);
+    place.write("scene.gltf", square_file().replace("[0.5,0.25,0.125,1]", "[0.5,0.25,0.25,1]"));
     // Without what it says, and without it as another version does.
     let codes = png_codes(&place.content("a.png")).unwrap();
-    image::save_buffer(place.at("bare.png"), &codes, 24, 24, image::ColorType::Rgb8).unwrap();
-    for shard in [1, 2] {
-        place.succeed(&format!("render cornell --rounds 8 --shard {shard}/2 --checkpoint {shard}.pms -o shard.png {SMALL}"));
-    }
-    place.succeed("merge 1.pms 2.pms -o merged.exr");
+    image::save_buffer(place.at("bare.png"), &codes, 8, 8, image::ColorType::Rgb8).unwrap();
     let own = format!("\"photonmill\":\"{}\"", env!("CARGO_PKG_VERSION"));
+    place.succeed(&format!("render cornell --rounds 4 -o b.exr --layers none {SMALL}"));
+    let content = place.content("b.exr");
     let exr = |from: &str, to: &str| {
-        place.succeed(&format!("render cornell --rounds 4 -o b.exr --layers none {SMALL}"));
-        let content = place.content("b.exr");
         let at = content.windows(from.len()).position(|bytes| bytes == from.as_bytes()).unwrap();
         assert_eq!(from.len(), to.len());
         [&content[..at], to.as_bytes(), &content[at + from.len()..]].concat()
     };
     place.write("old.exr", exr(&own, &own.replace("\"0.", "\"9.")));
-    place.write("sly.exr", exr("\"--size=24x24\"", "\"--json=b.jsn\""));
-    place.write("wrong.exr", exr("\"--size=24x24\"", "\"--size=24y24\""));
+    place.write("sly.exr", exr("\"--size=8x8\"", "\"--json=b.j\""));
+    place.write("wrong.exr", exr("\"--size=8x8\"", "\"--size=8y8\""));
     place.write("text.png", "no picture");
     place.assert_refused([
-        (on_device("repeat a.png -q"), ["a.png: is of another scene than scene.glb is now", "SHA-256", "--scene"].as_slice()),
+        (on_device("repeat a.png -q"), ["a.png: is of another scene than scene.gltf is now", "SHA-256", "--scene"].as_slice()),
         ("repeat bare.png".into(), &["bare.png: holds nothing of how it was made", "another program has saved it"]),
-        ("repeat shard.png".into(), &["shard.png: holds a shard", "without --shard"]),
-        ("repeat merged.exr".into(), &["merged.exr: was put together by merge"]),
         ("repeat old.exr".into(), &["old.exr: was made by photonmill 9.", "only the same version"]),
         ("repeat sly.exr".into(), &["sly.exr: says otherwise", "decide no pixel"]),
-        ("repeat wrong.exr".into(), &["wrong.exr: says otherwise", "24y24"]),
+        ("repeat wrong.exr".into(), &["wrong.exr: says otherwise", "8y8"]),
         ("repeat text.png".into(), &["text.png", "OpenEXR"]),
         ("repeat absent.png".into(), &["absent.png", "cannot be read"]),
         ("repeat a.jpg".into(), &["FILE a.jpg", "ends in .png or .exr"]),
@@ -298,13 +296,13 @@ fn what_cannot_be_made_again_is_refused() {
         ("repeat a.png -o a.png".into(), &["-o a.png", "it is also read"]),
     ]);
     // A pixel was changed since: the values differ, and the exit code says so.
-    let (size, mut channels) = exr_file::decode(&place.content("b.exr")).unwrap();
-    let made = Metadata::read(&place.content("b.exr")).unwrap();
+    let (size, mut channels) = exr_file::decode(&content).unwrap();
+    let made = Metadata::read(&content).unwrap();
     channels[0].values[5] += 1.0;
     place.write("touched.exr", exr_file::encode(size, channels, Some(&made)));
     let output = place.run(&on_device("repeat touched.exr -q"));
     let stderr = text(&output.stderr);
-    assert!(output.status.code() == Some(1) && stderr.contains("touched.exr: 1 of 1728 values differ"), "{stderr}");
+    assert!(output.status.code() == Some(1) && stderr.contains("touched.exr: 1 of 192 values differ"), "{stderr}");
 }
 
 /// Blender's Python module and Mitsuba, which the tool installs.

@@ -86,7 +86,7 @@ fn both_see_what_the_path_tracer_sees() {
     let parallel = Camera { projection: Projection::Orthographic { half_height: 0.7 }, ..camera };
     for camera in [lens, parallel] {
         let judged = Judge::new(&scene, 32).image(&camera, 8, 8, 600, 1);
-        let settings = SceneSettings { photons: 5_000, rounds: 32, samples: 4, ..by_rounds() };
+        let settings = SceneSettings { photons: 5_000, caustic_photons: 5_000, rounds: 32, samples: 4, ..by_rounds() };
         let lit = seen(&gpu, &scene, &settings, &camera, [8, 8]);
         let (mut found, mut expected, mut squares) = (0.0, 0.0, 0.0);
         for (pixel, judged) in judged.pixels.iter().enumerate() {

@@ -5,11 +5,9 @@
 use std::sync::atomic::AtomicBool;
 
 use crate::common::family::{FALSE_ALARM, normal_p_value};
-use crate::common::known;
+use crate::common::known::kept;
 use crate::common::prelude::*;
 use photonmill::scene::closed_forms::NAMES;
-use photonmill::verify::judge::radiosity::{cells_of, form_factor_from, on_wall};
-use photonmill::verify::selfcheck::measure::{irradiance, radiance};
 use photonmill::verify::selfcheck::{self, Estimate, Finding};
 
 /// Right within the error.
@@ -26,10 +24,14 @@ fn right(finding: &Finding) -> Check<Complaint> {
     Err(Complaint::new(kind, format!("{finding:?}")))
 }
 
-/// One closed form by its name.
-pub fn closed_form_check(gpu: &Gpu, name: &str) -> Check<Complaint> {
+/// What is found of one closed form, by its name.
+fn finding(gpu: &Gpu, name: &str) -> Result<Finding, Error> {
     let case = selfcheck::cases().into_iter().find(|case| case.name == name).unwrap_or_else(|| panic!("there is no case {name}"));
-    right(&Finding::new(name, case.expected, (case.measure)(Some(gpu))?))
+    Ok(Finding::new(name, case.expected, (case.measure)(Some(gpu))?))
+}
+
+pub fn closed_form_check(gpu: &Gpu, name: &str) -> Check<Complaint> {
+    right(&finding(gpu, name)?)
 }
 
 /// Right within the error, and the error small enough for 1 % to be seen.
@@ -42,7 +44,17 @@ fn check(finding: &Finding) {
     }
 }
 
+/// Of what neither `tests/engine/planted_faults.rs` nor other closed forms of the tests ask for.
 #[test]
+fn closed_forms_that_nothing_else_asks_for_hold() {
+    let Some(gpu) = device() else { return };
+    for name in ["open box, persistent builder, cosine lights: hits stored per photon", "mirror corridor, 6 mirrors: radiance"] {
+        check(&finding(&gpu, name).unwrap());
+    }
+}
+
+#[test]
+#[ignore = "long: a minute and a half on a software device"]
 fn every_closed_form_holds() {
     let Some(gpu) = device() else { return };
     let never = AtomicBool::new(false);
@@ -84,7 +96,7 @@ fn families_tell_chance_from_error() {
 }
 
 fn settings() -> SceneSettings {
-    SceneSettings { photons: 1000, rounds: 2, shadow_rays: 32, ..by_rounds() }
+    kept(SceneSettings { photons: 1000, rounds: 2, shadow_rays: 32, ..by_rounds() })
 }
 
 #[test]
@@ -93,10 +105,11 @@ fn two_skies_shine_as_one_of_both_radiances() {
     let mut both = scene("sky-over-plane");
     both.lights.push(both.lights[0].clone());
     assert!(matches!(both.lights[0].kind, LightKind::Environment { .. }));
-    let plane = irradiance(&gpu, &both, &settings(), &[(DVec3::ZERO, DVec3::Y)]).unwrap();
-    check(&Finding::new("the plane under two skies", 2.0 * PI, plane));
-    let up = radiance(&gpu, &both, &settings(), DVec3::Y, DVec3::Y * 2.0).unwrap();
-    check(&Finding::new("two skies seen", 2.0, up));
+    // Nothing is random: a sky is sampled by the cosine.
+    let (plane, _) = red(&received(&gpu, &both, &settings(), &[(DVec3::ZERO, DVec3::Y)]), 0);
+    assert_holds("the plane under two skies", relative_check("irradiance", plane, 2.0 * PI, 1e-4));
+    let up = radiances(&gpu, &both, &settings(), DVec3::Y, DVec3::Y * 2.0, 4);
+    up.iter().for_each(|seen| assert_holds("two skies seen", relative_check("radiance", *seen, 2.0, 1e-4)));
 }
 
 /// One lamp of the paper's box alone, in the middle of the floor, and walls that scatter nothing.
@@ -146,72 +159,23 @@ fn a_disc_lights_points_and_a_wall_by_either_law() {
     family.assert_tells_one_per_cent();
 }
 
-/// A square plate of 1 W/m2/sr gives a parallel one, as far off as it is wide, pi F = pi 0.1998248957 on average, and one
-/// that stands on its edge pi 0.2000437761; at each point it is Lambert's sum over the plate's edges.
-#[test]
-fn a_plate_lights_a_parallel_and_a_perpendicular_one() {
-    let Some(gpu) = device() else { return };
-    // Left, right and floor of a cube of 0.5 m.
-    let plate = cells_of(0, 1).next().unwrap();
-    let corner = DVec3::splat(-0.25);
-    let (x, y, z) = (DVec3::X * 0.5, DVec3::Y * 0.5, DVec3::Z * 0.5);
-    let scene = scene_of(
-        vec![
-            Mesh::parallelogram("plate", corner, y, z, 0),
-            Mesh::parallelogram("parallel", corner + x, z, y, 1),
-            Mesh::parallelogram("perpendicular", corner, z, x, 1),
-        ],
-        vec![shining(0.0), matt(0.0)],
-        vec![],
-    );
-    let n = 16;
-    let place = |i: usize| ((i as f64 + 0.5) / n as f64 - 0.5) * 0.5;
-    let mut family = Family::default();
-    for (what, wall, normal, mean) in [("parallel", 1, DVec3::NEG_X, 0.199_824_895_7), ("perpendicular", 2, DVec3::Y, 0.200_043_776_1)] {
-        let points: Vec<_> = (0..n * n).map(|k| (on_wall(wall, place(k % n), place(k / n)), normal)).collect();
-        let exact: Vec<f64> = points.iter().map(|(point, _)| PI * form_factor_from(*point, normal, &plate)).collect();
-        let of_points = exact.iter().sum::<f64>() / exact.len() as f64;
-        assert!((of_points / (PI * mean) - 1.0).abs() < 2e-3, "{what}: {of_points}");
-        let times = 24;
-        let found = irradiances(&gpu, &scene, &settings(), &repeated(&points, times), 1..2).remove(0);
-        let of_time = |time: usize| found.iter().skip(time).step_by(times).map(|light| light.x).sum::<f64>() / exact.len() as f64;
-        family.expect_mean(format!("{what} plate"), &(0..times).map(of_time).collect::<Vec<_>>(), of_points);
-        for (k, exact) in exact.iter().enumerate().step_by(37) {
-            let found: Vec<f64> = found[k * times..(k + 1) * times].iter().map(|light| light.x).collect();
-            family.expect_mean(format!("{what}, point {k}"), &found, *exact);
-        }
-    }
-    // Next to the plate its light comes from everywhere on it, and one point has 1536 rays.
-    family.assert_tells(0.01, |what| what.ends_with("plate"));
-}
-
 /// I cos / d^2 by shadow rays, where nothing is random; by photons the mean over a disc of radius h at distance d,
 /// 2 I / h^2 (1 - d / sqrt(d^2 + h^2)), the solid angle of a cap.
 #[test]
 fn a_point_light_falls_off_with_distance_and_cosine() {
     let Some(gpu) = device() else { return };
     let scene_at = |d: f64| scene_of(vec![level(-d, [4.0; 2], true, 0)], vec![matt(0.0)], vec![point(DVec3::ZERO)]);
+    let angles = [0.0, 20.0, 40.0].map(f64::to_radians);
     let mut family = Family::default();
     for d in [0.5, 1.0, 2.0] {
-        for degrees in [0.0, 20.0, 40.0] {
-            let cosine = f64::to_radians(degrees).cos();
-            let point = DVec3::new(d * f64::to_radians(degrees).tan(), -d, 0.0);
-            let found = received(&gpu, &scene_at(d), &settings(), &[(point, DVec3::Y)]);
-            let exact = cosine.powi(3) / (d * d);
-            family.expect(format!("{d} m, {degrees} degrees"), red(&found, 0).0, exact, 0.0);
+        let points = angles.map(|angle| (DVec3::new(d * angle.tan(), -d, 0.0), DVec3::Y));
+        let found = means(&received(&gpu, &scene_at(d), &settings(), &points));
+        for (angle, found) in pairs(angles, found) {
+            family.expect(format!("{d} m, {angle:.2} radians"), found.x, angle.cos().powi(3) / (d * d), 0.0);
         }
-        let h: f64 = 1.9;
-        let photons = mapped(50_000, 32, 1, h);
-        let points = [(DVec3::NEG_Y * d, DVec3::Y)];
-        assert_builders_agree(&gpu, &scene_at(d), &photons, &points);
-        let (mean, error) = red(&received(&gpu, &scene_at(d), &photons, &points), 0);
-        family.expect_estimate(format!("{d} m, photons"), mean, error, 32, 2.0 / (h * h) * (1.0 - d / d.hypot(h)));
+        let (h, rounds): (f64, u32) = (1.9, 24);
+        let (mean, error) = red(&received(&gpu, &scene_at(d), &kept(mapped(20_000, rounds, 1, h)), &points[..1]), 0);
+        family.expect_estimate(format!("{d} m, photons"), mean, error, rounds, 2.0 / (h * h) * (1.0 - d / d.hypot(h)));
     }
-    family.assert_tells_one_per_cent();
-}
-
-#[test]
-fn a_spot_falls_off_between_its_cones() {
-    let Some(gpu) = device() else { return };
-    assert_holds("the spot", known::spot(&gpu));
+    family.assert_tells(0.03, |_| true);
 }

@@ -1,6 +1,7 @@
 //! Light that is scattered to and fro and cannot leave, against closed forms: an integrating sphere, a furnace, parallel
 //! plates, the geometric series of bounces. `photonmill::verify::selfcheck` has the furnace that is a box.
 
+use crate::common::known::kept;
 use crate::common::prelude::*;
 use photonmill::ledger::Fates;
 
@@ -60,58 +61,41 @@ fn kept_by_horizon(mesh: &Mesh, points: &[(DVec3, DVec3)], radius: f64) -> f64 {
     kept / all
 }
 
-const SEGMENTS: u32 = 96;
-const RADIUS: f64 = 0.12;
-
-/// A point light of 1 W in a closed hollow of area A: after b bounces (1 - rho^b) / (1 - rho) / A on average over the
-/// wall, whatever its shape, as no light is lost; of a sphere the same everywhere. Albedos of 0.5, 0.9
-/// and 0.99 as colours beside a channel that reflects all: so no photon ends, and all that is random is where
-/// photons land.
+/// Of a sphere of 1 m of flat triangles, in which light that cannot leave is the same everywhere.
+///
+/// A point light of 1 W in its middle: after b bounces (1 - rho^b) / (1 - rho) / A on average over the wall of area A. Albedos of 0.5,
+/// 0.9 and 0.99 as colours beside a channel that reflects all: so no photon ends, and all that is random is where photons land.
+///
+/// Walls that shine with 1 W/m2/sr and scatter half of what arrives: pi of direct and pi of scattered light, and so in any polyhedron.
 #[test]
 fn an_integrating_sphere_multiplies_light() {
     let Some(gpu) = device() else { return };
-    let intensity = Vec3::splat((0.25 / PI) as f32);
-    let sphere = hollow_sphere(SEGMENTS);
-    let (points, area) = (evenly_over(&sphere, 1500), area_of(&sphere));
-    let kept = kept_by_horizon(&sphere, &points, RADIUS);
-    assert!((kept - (1.0 - RADIUS * RADIUS / 8.0)).abs() < 0.002, "{kept}");
+    let radius = 0.12;
+    let sphere = hollow_sphere(96);
+    let (points, area) = (evenly_over(&sphere, 400), area_of(&sphere));
+    let kept_light = kept_by_horizon(&sphere, &points, radius);
+    assert!((kept_light - (1.0 - radius * radius / 8.0)).abs() < 0.002, "{kept_light}");
+    let lamp = LightKind::Point { position: DVec3::ZERO, intensity: Vec3::splat((0.25 / PI) as f32) };
+    let walls = |colour| Material::lambert("wall", colour);
     let mut family = Family::default();
-    for (albedo, bounces, photons) in [(Vec3::new(1.0, 0.99, 0.9), 60, 800), (Vec3::new(0.9, 0.5, 1.0), 16, 3000)] {
-        let material = Material::lambert("wall", albedo);
-        let scene = scene_of(vec![sphere.clone()], vec![material], vec![LightKind::Point { position: DVec3::ZERO, intensity }]);
-        let settings = mapped(photons, 1, bounces, RADIUS);
-        assert_builders_agree(&gpu, &scene, &settings, &points);
-        let runs = irradiances(&gpu, &scene, &settings, &points, 1..17);
-        for channel in 0..3 {
-            let rho = f64::from(albedo[channel]);
+    for (material, lights, bounces, photons) in [
+        (walls(Vec3::new(1.0, 0.99, 0.9)), vec![lamp.clone()], 60, 800),
+        (walls(Vec3::new(0.9, 0.5, 1.0)), vec![lamp], 16, 2000),
+        (shining(0.5), vec![], 16, 10_000),
+    ] {
+        let is_furnace = lights.is_empty();
+        let scene = scene_of(vec![sphere.clone()], vec![material.clone()], lights);
+        let runs = irradiances(&gpu, &scene, &kept(mapped(photons, 1, bounces, radius)), &points, 1..17);
+        for channel in 0..if is_furnace { 1 } else { 3 } {
+            let rho = f64::from(material.base_colour[channel]);
             let series: f64 = (1..bounces).map(|bounce| rho.powi(bounce as i32)).sum();
             // What comes straight from the middle comes from above every horizon near.
-            let expected = (1.0 + kept * series) / area;
-            family.expect_mean(format!("sphere, albedo {rho:.2}, {bounces} bounces"), &over_points(&runs, channel), expected);
+            let expected = if is_furnace { TAU * kept_light } else { (1.0 + kept_light * series) / area };
+            let what = format!("sphere, {}albedo {rho:.2}, {bounces} bounces", if is_furnace { "shining, " } else { "" });
+            family.expect_mean(what, &over_points(&runs, channel), expected);
         }
     }
-    family.assert_tells_one_per_cent();
-}
-
-/// A closed sphere that shines with 1 W/m2/sr and scatters half of what arrives: pi of direct and pi of scattered light at
-/// every point of it, and so in any polyhedron.
-#[test]
-fn a_furnace_sphere_is_evenly_lit() {
-    let Some(gpu) = device() else { return };
-    let sphere = hollow_sphere(SEGMENTS);
-    let points = evenly_over(&sphere, 1500);
-    let scene = scene_of(vec![sphere], vec![shining(0.5)], vec![]);
-    let mut family = Family::default();
-    let settings = mapped(20_000, 1, 16, RADIUS);
-    assert_builders_agree(&gpu, &scene, &settings, &points);
-    let runs = irradiances(&gpu, &scene, &settings, &points, 1..17);
-    let expected = 2.0 * PI * kept_by_horizon(&scene.meshes[0], &points, RADIUS);
-    family.expect_mean("furnace sphere", &over_points(&runs, 0), expected);
-    for point in (0..points.len()).step_by(150) {
-        let of_point: Vec<f64> = runs.iter().map(|run| run[point].x).collect();
-        family.expect_mean(format!("furnace sphere, point {point}"), &of_point, expected);
-    }
-    family.assert_tells(0.01, |what| !what.contains("point"));
+    family.assert_tells(0.015, |_| true);
 }
 
 /// Two infinite plates that face each other, the lower one shining with M = pi W/m2: M / (1 - rho rho') arrives above,
@@ -126,16 +110,15 @@ fn parallel_plates_send_light_to_and_fro() {
     let mut family = Family::default();
     for illumination in BOTH {
         let shadow_rays = by_rounds().shadow_rays;
-        let settings = SceneSettings { caustic_photons: 20_000, shadow_rays, ..fixed_radius(illumination, 30_000, 1, 48, 0.15) };
+        let settings = kept(SceneSettings { shadow_rays, ..fixed_radius(illumination, 6000, 1, 48, 0.15) });
         let points = [grid(0.2, DVec3::NEG_Y, 6), grid(-0.2, DVec3::Y, 6)].concat();
-        assert_builders_agree(&gpu, &scene, &settings, &points);
-        let runs = irradiances(&gpu, &scene, &settings, &points, 1..25);
+        let runs = irradiances(&gpu, &scene, &settings, &points, 1..17);
         let (upper, lower): (Vec<_>, Vec<_>) = runs.iter().map(|run| (run[..36].to_vec(), run[36..].to_vec())).unzip();
         let exact = PI / (1.0 - below * above);
         family.expect_mean(format!("plates, {illumination:?}: above"), &over_points(&upper, 0), exact);
         family.expect_mean(format!("plates, {illumination:?}: below"), &over_points(&lower, 0), above * exact);
     }
-    family.assert_tells_one_per_cent();
+    family.assert_tells(0.04, |_| true);
 }
 
 /// Photons that survive bounce k of a closed room: rho^k of all, and none escapes.
@@ -144,42 +127,14 @@ fn expect_geometric(family: &mut Family, what: &str, fates: &Fates, rho: f64) {
         assert_eq!(counts.escaped, 0, "{what}");
         let chance = rho.powi(bounce as i32 + 1);
         let error = (chance * (1.0 - chance) / fates.emitted as f64).sqrt();
-        // Where few survive, few tell: 1 % must be seven errors for a test to notice it beside its own.
-        let bright = if 0.01 * chance > 7.0 * error { "bright: " } else { "" };
+        // Where few survive, few tell: 2 % must be seven errors for a test to notice it beside its own.
+        let bright = if 0.02 * chance > 7.0 * error { "bright: " } else { "" };
         family.expect_count(format!("{bright}{what}, albedo {rho:.2}, bounce {}", bounce + 1), counts.stored, fates.emitted, chance);
     }
 }
 
-/// With a sixth wall the paper's box is closed: albedo^k of the photons are stored at bounce k, by every builder. Where fewer
-/// than half of the 524 288 photons are left, more than 1 % goes unnoticed.
-#[test]
-fn bounces_in_a_closed_room_are_a_geometric_series() {
-    let gpu = device();
-    let mut family = Family::default();
-    for rho in [0.5f32, 0.9, 0.99] {
-        let fates = |builder, photons| {
-            // So few points need no index of so many photons.
-            let usual = RoomSettings { rng: Rng::Philox, mesh: 1, gather: Gather::Brute, threads: 2, ..RoomSettings::default() };
-            let settings = RoomSettings { builder, reflectance: rho, photons, ..usual };
-            let room = closed_box(&settings, rho);
-            match gpu.as_ref().filter(|_| builder != Builder::Cpu) {
-                Some(gpu) => run_scene(gpu, &room, &settings),
-                None => run_scene_on_cpu(&room, &settings),
-            }
-            .fates
-        };
-        for builder in JUDGED {
-            expect_geometric(&mut family, &format!("room, {}", builder.name()), &fates(builder, 1 << 19)[0], f64::from(rho));
-        }
-        let few = fates(Builder::Atomic, 3001);
-        for builder in Builder::ON_GPU.into_iter().filter(|_| gpu.is_some()) {
-            assert_eq!(fates(builder, 3001), few, "{}", builder.name());
-        }
-    }
-    family.assert_tells(0.01, |what| what.starts_with("bright"));
-}
-
-/// The same in a sphere of triangles.
+/// In a closed sphere albedo^k of the photons are stored at bounce k. Where fewer than half of the 131 072 photons are left, more than
+/// 2 % goes unnoticed. `tests/light/extremes.rs` has the paper's box with a sixth wall.
 #[test]
 fn bounces_in_a_sphere_are_a_geometric_series() {
     let Some(gpu) = device() else { return };
@@ -187,11 +142,8 @@ fn bounces_in_a_sphere_are_a_geometric_series() {
     let mut family = Family::default();
     for rho in [0.5f32, 0.9, 0.99] {
         let scene = scene_of(vec![hollow_sphere(12)], vec![matt(rho)], vec![lamp.clone()]);
-        let settings = SceneSettings { photons: 1 << 17, bounces: 15, rounds: 1, radius: Some(0.05), ..by_rounds() };
-        let floor = [(DVec3::NEG_Y * 0.95, DVec3::Y)];
-        assert_builders_agree(&gpu, &scene, &SceneSettings { radius: Some(0.5), ..settings.clone() }, &floor);
-        let lit = received(&gpu, &scene, &settings, &[(DVec3::ZERO, DVec3::Y)]);
+        let lit = received(&gpu, &scene, &kept(flights(1 << 17, 15)), &[(DVec3::ZERO, DVec3::Y)]);
         expect_geometric(&mut family, "sphere", &lit.fates[0], f64::from(rho));
     }
-    family.assert_tells(0.01, |what| what.starts_with("bright"));
+    family.assert_tells(0.02, |what| what.starts_with("bright"));
 }

@@ -1,6 +1,7 @@
 //! Sums, estimates and sizes at their ends: more photons than f32 or 32 bits count, light over many decades, the
 //! least and the largest radius, one photon and none, and plans around every limit.
 
+use crate::common::known::kept;
 use crate::common::lit::received_within;
 use crate::common::prelude::*;
 use glam::EulerRot;
@@ -15,7 +16,6 @@ use photonmill::scene::rectangle::disc_rectangle_area;
 use photonmill::settings::MAX_EVENTS;
 use photonmill::settings::scene::Kernel;
 use photonmill::settings::stop::Stop;
-use photonmill::verify::selfcheck::measure::irradiance;
 
 /// Half of an f32's spacing below 1.
 const U: f64 = 1.0 / 16_777_216.0;
@@ -134,7 +134,7 @@ fn mixed_weights_are_summed_to_half_a_unit_each() {
 #[test]
 fn faint_light_is_right_to_half_a_film_unit() {
     let Some(gpu) = device() else { return };
-    let settings = SceneSettings { photons: 1, rounds: 2, shadow_rays: 1, ..by_rounds() };
+    let settings = kept(SceneSettings { photons: 1, rounds: 2, shadow_rays: 1, ..by_rounds() });
     for exponent in [0, -3, -6, -9, -12] {
         let mut plane = scene("sky-over-plane");
         let albedo = 10f32.powi(exponent);
@@ -345,7 +345,7 @@ fn a_map_of_one_photon_is_one_disc() {
     let close = disc(DVec3::Y * 1e-3, DVec3::NEG_Y, 1e-3, EmissionLaw::Cosine);
     for radius in [0.05, 0.2, 1.0] {
         let points = [(DVec3::ZERO, DVec3::Y), (DVec3::X * 1.9, DVec3::Y), (DVec3::ZERO, DVec3::NEG_Y)];
-        let lit = received(&gpu, &over_plane(close.clone()), &mapped(1, 1, 1, radius), &points);
+        let lit = received(&gpu, &over_plane(close.clone()), &kept(mapped(1, 1, 1, radius)), &points);
         let expected = 1.0 / (PI * radius * radius);
         // The area is known to 2^-24 of the squared radius, and some roundings of f32 follow.
         let check = |expected: f64| relative_check("one photon", red(&lit, 0).0, expected, 16.0 * U);
@@ -356,25 +356,42 @@ fn a_map_of_one_photon_is_one_disc() {
 }
 
 fn furnace_settings(radius: f64) -> SceneSettings {
-    mapped(10_000, 2, 60, radius)
+    kept(mapped(10_000, 2, 60, radius))
 }
 
-/// From all of the scene, twice over, down to a two-hundredth of the distance between photons: the estimate stays
-/// right on average, at edges and in corners too; outside of what positions allow a radius is refused.
+/// All weight functions integrate to 1, and none looks beyond its radius: a furnace is as bright by each, from all of the scene, twice
+/// over, down to a two-hundredth of the distance between photons, at edges and in corners too. Notices 6 % where the radius is large.
 #[test]
-fn radii_from_the_whole_scene_to_below_the_photons_spacing_are_right() {
+fn every_kernel_of_every_radius_integrates_to_one() {
     let Some(gpu) = device() else { return };
-    let exact = PI / 0.5;
     let middle = |k: usize| (DVec3::new((k % 8) as f64 / 8.0 + 0.06, 0.0, (k / 8) as f64 / 8.0 + 0.06), DVec3::Y);
     let edges = |k: usize| (DVec3::new(if k.is_multiple_of(2) { 1e-4 } else { 1.0 - 1e-4 }, 0.0, k as f64 / 64.0 + 1e-3), DVec3::Y);
-    for (radius, most) in [(2.0, 0.02), (1.0, 0.02), (0.3, 0.02), (0.01, 0.1), (0.002, 0.3)] {
-        for (what, points) in [("middle", (0..64).map(middle).collect::<Vec<_>>()), ("edges", (0..64).map(edges).collect())] {
-            let found = irradiance(&gpu, &scene("furnace"), &furnace_settings(radius), &points).unwrap();
-            println!("radius {radius}, {what}: {:.4} +- {:.4}, expected {exact:.4}", found.mean, found.standard_error);
-            assert!(found.standard_error < most * exact, "radius {radius}, {what}: {found:?}");
-            assert_holds(format!("radius {radius}, {what}"), z_check("irradiance", found.mean, exact, found.standard_error));
+    let points: Vec<_> = (0..64).map(middle).chain((0..64).map(edges)).collect();
+    let mut family = Family::default();
+    let rows = [(Kernel::Box, &[2.0, 1.0, 0.3, 0.01, 0.002][..]), (Kernel::Cone, &[2.0, 0.1][..]), (Kernel::Epanechnikov, &[2.0, 0.1][..])];
+    for (kernel, radius) in rows.into_iter().flat_map(|(kernel, radii)| radii.iter().map(move |radius| (kernel, *radius))) {
+        // Points see other photons by small radii, and the same by large ones.
+        let is_small = radius < 0.05;
+        let photons = if is_small { 15_000 } else { 6000 };
+        let settings = SceneSettings { kernel, photons, rounds: 16, ..furnace_settings(radius) };
+        let lit = received(&gpu, &scene("furnace"), &settings, &points);
+        for (what, of) in [("middle", 0..64), ("edges", 64..128)] {
+            let found: Vec<(f64, f64)> = of.map(|point| red(&lit, point)).collect();
+            let mean = found.iter().map(|(mean, _)| mean).sum::<f64>() / 64.0;
+            let error =
+                if is_small { found.iter().map(|(_, error)| error * error).sum::<f64>().sqrt() } else { found.iter().map(|of| of.1).sum() };
+            let size = if radius < 1.0 { "" } else { "wide " };
+            family.expect_estimate(format!("{kernel:?}, {size}radius {radius}, {what}"), mean, error / 64.0, 16, TAU);
         }
     }
+    family.assert_tells(0.06, |what| what.contains("wide"));
+    family.assert_tells(0.5, |what| !what.contains("0.002"));
+}
+
+/// Outside of what positions allow a radius is refused.
+#[test]
+fn radii_beyond_what_positions_allow_are_refused() {
+    let Some(gpu) = device() else { return };
     let furnace = scene("furnace");
     let plan = |radius: f64| scene_plan(&gpu, &furnace, &furnace_settings(radius), Sensor::Receivers { count: 1 });
     let least = 1.0 / 32_768.0;
@@ -419,21 +436,6 @@ fn edges_and_corners_are_dark_by_what_lies_beyond_them() {
     for (place, expected) in [(0, 0.5), (1, 0.6575), (2, 0.8045), (3, 0.9279), (4, 1.0), (6, 0.25), (7, 0.63408), (8, 0.89591)] {
         let share = red(&without, place).0 / red(&with, place).0;
         assert!((share - expected).abs() < 3e-4, "place {place}: {share} where {expected} is right");
-    }
-}
-
-/// All weight functions integrate to 1: a furnace is as bright by each, and none looks beyond its radius.
-#[test]
-fn every_kernel_of_every_radius_integrates_to_one() {
-    let Some(gpu) = device() else { return };
-    let points = [(DVec3::new(0.5, 0.0, 0.5), DVec3::Y), (DVec3::new(0.0, 0.0, 0.5), DVec3::Y), (DVec3::new(1e-3, 0.0, 1e-3), DVec3::Y)];
-    for kernel in [Kernel::Box, Kernel::Cone, Kernel::Epanechnikov] {
-        for radius in [2.0, 0.1] {
-            let settings = SceneSettings { kernel, photons: 20_000, ..furnace_settings(radius) };
-            let found = irradiance(&gpu, &scene("furnace"), &settings, &points).unwrap();
-            assert!(found.standard_error < 0.03 * 2.0 * PI, "{kernel:?}, {radius}: {found:?}");
-            assert_holds(format!("{kernel:?}, radius {radius}"), z_check("irradiance", found.mean, 2.0 * PI, found.standard_error));
-        }
     }
 }
 
@@ -560,7 +562,7 @@ fn maps_of_a_chunk_are_numbered_in_32_bits() {
 fn photons_of_a_second_row_of_groups_reach_the_map() {
     let Some(gpu) = device() else { return };
     let photons = 65_535 * 32 + 33;
-    let settings = SceneSettings { group_size: 32, ..mapped(photons, 1, 1, 0.01) };
+    let settings = SceneSettings { group_size: 32, ..kept(mapped(photons, 1, 1, 0.01)) };
     let points = [(DVec3::new(0.5, 0.0, 0.5), DVec3::Y), (DVec3::new(0.5, 0.5, 0.0), DVec3::Z)];
     // A software device counts less memory than it has.
     let limits = Limits { memory_bytes: 1 << 33, ..engine::limits(gpu.facts()) };
@@ -569,12 +571,11 @@ fn photons_of_a_second_row_of_groups_reach_the_map() {
     assert_eq!(whole.plan.global.as_ref().unwrap().chunk_photons, photons, "the photons do not fit one dispatch here");
     let split = lit(&SceneSettings { chunk: Some(1_000_003), ..settings.clone() });
     assert_eq!((&whole.film, &whole.fates), (&split.film, &split.fates));
-    let traced = |lit: &RunResult| lit.fates[0].bounces[0].stored + lit.fates[0].bounces[0].absorbed + lit.fates[0].bounces[0].escaped;
-    assert_eq!(traced(&whole), u64::from(photons));
-    assert_eq!(traced(&lit(&SceneSettings { photons: photons - 33, ..settings })), u64::from(photons) - 33);
+    let first = &whole.fates[0].bounces[0];
+    assert_eq!(first.stored + first.absorbed + first.escaped, u64::from(photons));
 }
 
-/// Pictures of one pixel, of odd sides and of one long row, by small and large work groups.
+/// Pictures of one pixel, of odd sides and of one long row, by usual and large work groups.
 #[test]
 fn pictures_of_any_shape_are_whole() {
     let Some(gpu) = device() else { return };
@@ -582,7 +583,7 @@ fn pictures_of_any_shape_are_whole() {
     let camera = cornell.cameras[0].clone();
     for size in [[1, 1], [63, 65], [4097, 1], [1, 129]] {
         let of = |group_size| {
-            let settings = SceneSettings { group_size, photons: 2000, rounds: 1, shadow_rays: 1, ..by_rounds() };
+            let settings = SceneSettings { group_size, photons: 2000, rounds: 1, shadow_rays: 1, ..kept(by_rounds()) };
             seen(&gpu, &cornell, &settings, &camera, size).film
         };
         let expected = of(128);
@@ -590,9 +591,7 @@ fn pictures_of_any_shape_are_whole() {
         let lit = expected.sums.chunks(3).filter(|pixel| pixel.iter().any(|sum| *sum > 0)).count();
         // The camera sees past the room on a wide picture, and nothing but the room on a square one.
         assert!(lit > 0 && (size[0] > 1000 || lit > expected.pixels() / 2), "{size:?}: {lit} pixels are lit");
-        for group_size in [32, 1024] {
-            assert!(of(group_size) == expected, "{size:?}, work groups of {group_size}");
-        }
+        assert!(of(1024) == expected, "{size:?}, work groups of 1024");
     }
 }
 
@@ -635,27 +634,16 @@ fn the_ends_of_every_setting_give_numbers() {
     }
 }
 
-/// What the checks of this file say of values that are off.
-#[test]
-fn the_checks_of_numbers_complain() {
-    let complains = |found: f64| -> Check { relative_check("value", found, 2.0, 1e-6) };
-    assert_holds("itself", complains(2.0));
-    for (what, found) in
-        [("a little more", 2.0 + 4e-6), ("a little less", 2.0 - 4e-6), ("no number", f64::NAN), ("infinity", f64::INFINITY)]
-    {
-        assert_complains(what, complains(found));
-    }
-}
-
 /// A spot's light falls off by one law down to half angles of a thousandth of a degree: on its axis and between its cones,
 /// from shadow rays against the closed form, and as a power that photons bring.
 #[test]
 fn narrow_spots_shine_as_wide_ones() {
     let Some(gpu) = device() else { return };
     let position = DVec3::new(0.25, 1.0, -0.5);
-    for (what, direction) in [("straight down", DVec3::NEG_Y), ("aslant", DVec3::new(0.3, -1.0, 0.2).normalize())] {
-        for degrees in [10.0f64, 1.0, 0.1, 0.05, 0.01, 0.001] {
-            let outer_angle = degrees.to_radians() as f32;
+    let (down, aslant) = (("straight down", DVec3::NEG_Y), ("aslant", DVec3::new(0.3, -1.0, 0.2).normalize()));
+    for (what, direction, angles) in [(down.0, down.1, &[10.0, 0.1, 0.001][..]), (aslant.0, aslant.1, &[1.0, 0.05, 0.01, 0.001][..])] {
+        for &degrees in angles {
+            let outer_angle = f64::to_radians(degrees) as f32;
             let (inner, outer) = (0.5 * f64::from(outer_angle), f64::from(outer_angle));
             let inner_angle = inner as f32;
             let spot = over_plane(LightKind::Spot { position, direction, intensity: Vec3::ONE, inner_angle, outer_angle });
@@ -670,7 +658,7 @@ fn narrow_spots_shine_as_wide_ones() {
             };
             let shares = [0.0, 0.25, 0.45, 0.6, 0.75, 0.9, 1.1];
             let places = shares.map(|share| place(share * outer));
-            let settings = SceneSettings { rounds: 2, part: Part::Direct, ..by_rounds() };
+            let settings = kept(SceneSettings { rounds: 2, part: Part::Direct, ..by_rounds() });
             let lit = received(&gpu, &spot, &settings, &places.map(|(point, _)| (point, DVec3::Y)));
             // Single precision knows a direction to 1e-7 radians.
             let tolerance = 2e-5 + 1e-7 * 8.0 / outer;
@@ -682,7 +670,7 @@ fn narrow_spots_shine_as_wide_ones() {
 
             // Within its whole disc, a photon map holds the spot's power.
             let radius = 1.2 * place(outer).0.distance(place(0.0).0).max(2e-4);
-            let lit = received(&gpu, &spot, &mapped(1000, 2, 1, radius), &[(place(0.0).0, DVec3::Y)]);
+            let lit = received(&gpu, &spot, &kept(mapped(1000, 2, 1, radius)), &[(place(0.0).0, DVec3::Y)]);
             let exact = 2.0 * PI * (versine(inner) + (versine(outer) - versine(inner)) / 3.0) / (PI * radius * radius);
             assert_holds(format!("{what}, {degrees} degrees"), relative_check("power", red(&lit, 0).0, exact, 1e-5));
         }
@@ -696,7 +684,7 @@ fn walls_light_the_points_that_touch_them() {
     let distances = [0.0, 1e-8, 1e-7, 1e-6, 3e-6, 1e-5, 1e-4];
     let mut family = Family::default();
     let mut check = |what: &str, scene: &Scene, points: &[(DVec3, DVec3)], expected: &dyn Fn(DVec3) -> f64| {
-        let settings = SceneSettings { rounds: 16, shadow_rays: 64, part: Part::Direct, ..by_rounds() };
+        let settings = kept(SceneSettings { rounds: 16, shadow_rays: 64, part: Part::Direct, ..by_rounds() });
         let lit = received(&gpu, scene, &settings, points);
         for (k, (point, _)) in points.iter().enumerate() {
             let ((found, error), exact) = (red(&lit, k), expected(*point));
@@ -711,31 +699,22 @@ fn walls_light_the_points_that_touch_them() {
     check("in a corner", &furnace, &on(|d| DVec3::new(d, 0.0, d), DVec3::Y), &|_| PI);
     check("in an edge", &furnace, &on(|d| DVec3::new(1.0 - d, 0.6, 1.0), DVec3::NEG_Z), &|_| PI);
 
-    // One wall, of plain or textured light, aslant to all axes.
+    // One wall, of textured light, aslant to all axes.
     let turn = DQuat::from_euler(EulerRot::XYZ, 0.3, 0.7, -0.4);
-    for textured in [false, true] {
-        let emission_texture = textured.then_some(TextureUse::of(0, 0));
-        let lamp = Material { emission: Vec3::ONE, emission_texture, ..matt(0.0) };
-        let wall = Mesh::parallelogram("wall", DVec3::ZERO, turn * DVec3::Y, turn * DVec3::Z, 1);
-        let floor = Mesh::parallelogram("floor", turn * DVec3::NEG_X, turn * DVec3::Z, turn * (DVec3::X * 2.0), 0);
-        let texture = Texture {
-            name: "white".into(),
-            width: 1,
-            height: 1,
-            texels: vec![Vec3::ONE].into(),
-            wrap: [Wrap::Clamp; 2],
-            filter: Default::default(),
-        };
-        let room = Scene { textures: vec![texture], ..scene_of(vec![wall, floor], vec![matt(0.0), lamp], vec![]) };
-        let points = distances.map(|distance| (turn * DVec3::new(distance, 0.0, 0.4), turn * DVec3::Y));
-        let exact = |point: DVec3| {
-            let distance = (turn.inverse() * point).x.abs();
-            // From a foot of the wall, one of its sides on either hand (Howell, configuration B-3).
-            let half = |width: f64| width.atan2(distance) - distance / distance.hypot(1.0) * width.atan2(distance.hypot(1.0));
-            0.5 * (half(0.4) + half(0.6))
-        };
-        check(if textured { "a textured wall" } else { "a wall" }, &room, &points, &exact);
-    }
+    let lamp = Material { emission: Vec3::ONE, emission_texture: Some(TextureUse::of(0, 0)), ..matt(0.0) };
+    let wall = Mesh::parallelogram("wall", DVec3::ZERO, turn * DVec3::Y, turn * DVec3::Z, 1);
+    let floor = Mesh::parallelogram("floor", turn * DVec3::NEG_X, turn * DVec3::Z, turn * (DVec3::X * 2.0), 0);
+    let texels = vec![Vec3::ONE].into();
+    let texture = Texture { name: "white".into(), width: 1, height: 1, texels, wrap: [Wrap::Clamp; 2], filter: Default::default() };
+    let room = Scene { textures: vec![texture], ..scene_of(vec![wall, floor], vec![matt(0.0), lamp], vec![]) };
+    let points = distances.map(|distance| (turn * DVec3::new(distance, 0.0, 0.4), turn * DVec3::Y));
+    let exact = |point: DVec3| {
+        let distance = (turn.inverse() * point).x.abs();
+        // From a foot of the wall, one of its sides on either hand (Howell, configuration B-3).
+        let half = |width: f64| width.atan2(distance) - distance / distance.hypot(1.0) * width.atan2(distance.hypot(1.0));
+        0.5 * (half(0.4) + half(0.6))
+    };
+    check("a textured wall", &room, &points, &exact);
     family.assert_tells(0.2, |_| true);
 }
 
@@ -751,14 +730,14 @@ fn channels_a_millionth_as_bright_are_right() {
     let down =
         LightKind::Spot { position: DVec3::Y * 0.5, direction: DVec3::NEG_Y, intensity: Vec3::ONE, inner_angle: 0.5, outer_angle: 1.0 };
     let wall = scene_of(vec![level(0.0, [1.0; 2], true, 0), level(1.0, [1.0; 2], false, 1)], vec![floor, matt(0.0)], vec![down]);
-    let photons = SceneSettings { photons: 20_000, bounces: 4, rounds: 16, radius: Some(0.4), ..by_rounds() };
+    let photons = kept(SceneSettings { photons: 20_000, bounces: 4, rounds: 8, radius: Some(0.4), ..by_rounds() });
     let settings = |illumination, part| SceneSettings { illumination, part, ..photons.clone() };
     let of_lamp = (lamp, settings(Illumination::Photons, Part::All), DVec3::splat(0.5));
     let of_wall = (wall, settings(Illumination::Split, Part::Indirect), DVec3::Y * 0.5);
     for (what, (scene, settings, middle)) in [("a lamp", of_lamp), ("a wall", of_wall)] {
         let points: Vec<_> =
             grid(0.5, DVec3::NEG_Y, 3).into_iter().map(|(point, normal)| (middle + 0.8 * point + DVec3::Y * 0.1, normal)).collect();
-        let runs: Vec<_> = (1..9).map(|seed| received(&gpu, &scene, &SceneSettings { seed, ..settings.clone() }, &points)).collect();
+        let runs: Vec<_> = (1..7).map(|seed| received(&gpu, &scene, &SceneSettings { seed, ..settings.clone() }, &points)).collect();
         // Of a point too few photons may be seen for a channel to be right, but not without its error saying so.
         let off = |lit: &RunResult, point: usize, channel: usize| {
             let (mean, error) = (lit.film.mean(point), lit.film.stated_error(point));
@@ -794,7 +773,7 @@ fn a_channel_below_the_films_unit_is_right(gpu: &Gpu, rounds: u32, done: u32) {
     plane.materials[0].base_colour = tint.as_vec3();
     let camera = Camera::looking_at("above", DVec3::Y * 1.5, DVec3::ZERO, DVec3::Z, 0.1);
     let stop = Stop { photons: Some(u64::from(done)), ..Stop::default() };
-    let settings = SceneSettings { photons: 1, rounds, shadow_rays: 1, samples: 1, stop, ..by_rounds() };
+    let settings = SceneSettings { photons: 1, rounds, shadow_rays: 1, samples: 1, stop, ..kept(by_rounds()) };
     let lit = seen(gpu, &plane, &settings, &camera, [16, 16]);
     assert_eq!(lit.film.rounds, done);
     let pixels = lit.film.pixels();

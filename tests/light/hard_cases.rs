@@ -2,18 +2,17 @@
 //! or leaks. `tests/materials/hard_materials.rs`, `tests/engine/random_numbers.rs` and `tests/light/extremes.rs` do the same for materials,
 //! random numbers, and for sums, estimates and sizes.
 //!
-//! The tests at the end hold the table of all hard cases (`tests/common/cases.rs`) against the sources, README and the guide.
+//! The tests at the end check the guide's table of all hard cases (`tests/common/cases.rs` reads it) against the sources and README.
 
-use crate::common::cases::{self, CASES, COUNTS, Case, Shown};
-use crate::common::known::{self, none_returns};
+use crate::common::cases::{ABSENT, COUNTS, Case, cases};
+use crate::common::known::{self, kept, mean_irradiance, none_returns};
 use crate::common::prelude::*;
 use crate::common::sources::{read, texts};
 use photonmill::engine::scene::RunResult;
-use photonmill::verify::selfcheck::measure::{irradiance, radiance};
 
 /// Short runs of the Cornell box.
 pub fn settings() -> SceneSettings {
-    SceneSettings { photons: 4000, caustic_photons: 4000, rounds: 2, shadow_rays: 8, ..by_rounds() }
+    kept(SceneSettings { photons: 4000, caustic_photons: 4000, rounds: 2, shadow_rays: 8, ..by_rounds() })
 }
 
 fn cornell() -> Scene {
@@ -29,44 +28,23 @@ fn cornell_at(way: impl Fn(DVec3) -> DVec3) -> (Scene, Vec<(DVec3, DVec3)>) {
     (moved(cornell(), &way), POINTS.iter().map(|(position, normal)| (way(*position), *normal)).collect())
 }
 
-/// Radiance does not depend on size or place; the file's own coordinates may be far from the origin.
-#[test]
-fn size_and_place_do_not_change_the_light() {
-    let Some(gpu) = device() else { return };
-    let expected = irradiance(&gpu, &cornell(), &settings(), &POINTS).unwrap();
-    assert!(expected.mean > 0.5 && expected.standard_error < 0.03 * expected.mean, "{expected:?}");
-    let far = DVec3::new(1e4, -2e4, 5e3);
-    for (what, scale, way) in [("a thousandth", 1e-3, DVec3::ZERO), ("ten thousand times", 1e4, DVec3::ZERO), ("far away", 1.0, far)] {
-        let (scene, points) = cornell_at(|at| at * scale + way);
-        let found = irradiance(&gpu, &scene, &settings(), &points).unwrap();
-        assert_holds(what, same_light(what, found, expected));
-    }
-    let mut brighter = cornell();
-    brighter.materials[3].emission *= 1.3;
-    let found = irradiance(&gpu, &brighter, &settings(), &POINTS).unwrap();
-    assert_complains("a lamp a third brighter", same_light("brighter", found, expected));
-}
-
 /// A parallelogram of `n` x `n` x 2 triangles in place of one of two.
 fn cut(mesh: &Mesh, n: u32) -> Mesh {
     let [o, a, _, b] = mesh.positions[..] else { panic!("{} is no parallelogram", mesh.name) };
     Mesh { material: mesh.material, ..tessellated(&mesh.name, o, a - o, b - o, n) }
 }
 
-/// Edges, corners and slivers inside a wall are no edges of its light; neither are triangles that lie on it. Runs have the
-/// same seeds, so that all but a few photons take the same paths; indirect light by itself shows best what walls absorb.
+/// Edges, corners and slivers inside a wall are no edges of its light. Runs have the same seeds, so that all but a few photons take the
+/// same paths.
 #[test]
 fn how_a_wall_is_cut_does_not_change_its_light() {
     let Some(gpu) = device() else { return };
-    let of = |scene: &Scene| {
-        [(Part::All, 4000), (Part::Indirect, 20_000)]
-            .map(|(part, photons)| irradiance(&gpu, scene, &SceneSettings { part, photons, ..settings() }, &POINTS).unwrap())
-    };
+    let of = |scene: &Scene| mean_irradiance(&gpu, scene, &SceneSettings { photons: 20_000, rounds: 8, ..settings() }, &POINTS).mean;
     let expected = of(&cornell());
     let check = |what: &str, other: fn(&Mesh) -> Mesh| -> Check {
         let mut scene = cornell();
         scene.meshes.iter_mut().take(5).for_each(|mesh| *mesh = other(mesh));
-        pairs(of(&scene), expected).try_for_each(|(found, expected)| relative_check(what, found.mean, expected.mean, 1e-2))
+        relative_check(what, of(&scene), expected, 1e-2)
     };
     let sliver = |mesh: &Mesh| {
         let mut mesh = mesh.clone();
@@ -85,7 +63,6 @@ fn how_a_wall_is_cut_does_not_change_its_light() {
     assert_holds("fine", check("3200 triangles a wall", |mesh| cut(mesh, 40)));
     assert_holds("finest", check("100 352 triangles a wall", on_the_floor));
     assert_holds("slivers", check("slivers", sliver));
-    assert_holds("doubled", check("every triangle twice", |mesh| Mesh { triangles: mesh.triangles.repeat(2), ..mesh.clone() }));
     assert_complains("half of the triangles turned", check("half turned", half_turned));
 }
 
@@ -95,6 +72,7 @@ fn how_a_wall_is_cut_does_not_change_its_light() {
 fn flat_lamps_light_nothing_of_their_own_plane() {
     let Some(gpu) = device() else { return };
     let direct = SceneSettings { photons: 1, rounds: 40, bounces: 1, shadow_rays: 32, ..settings() };
+    let photons = SceneSettings { illumination: Illumination::Photons, bounces: 1, ..settings() };
     let grid = |middle: DVec3, normal: DVec3, width: f64| {
         let (u, v) = normal.any_orthonormal_pair();
         let place = move |k: i32| width * (f64::from(k) / 15.0 - 0.5);
@@ -103,8 +81,10 @@ fn flat_lamps_light_nothing_of_their_own_plane() {
     for law in [EmissionLaw::Uniform, EmissionLaw::Cosine] {
         let mut room = closed_room(0.0);
         room.lights = vec![lamp(disc(DVec3::new(0.5, 0.0, 0.5), DVec3::Y, 0.1, law))];
-        let own = received(&gpu, &room, &direct, &grid(DVec3::new(0.5, 0.0, 0.5), DVec3::Y, 0.4));
-        assert_eq!(mean_red(&own), 0.0, "{law:?}");
+        for settings in [&direct, &photons] {
+            let own = received(&gpu, &room, settings, &grid(DVec3::new(0.5, 0.0, 0.5), DVec3::Y, 0.4));
+            assert_eq!(mean_red(&own), 0.0, "{law:?}, {:?}", settings.illumination);
+        }
         let opposite = received(&gpu, &room, &direct, &grid(DVec3::new(0.5, 1.0, 0.5), DVec3::NEG_Y, 0.4));
         assert!(mean_red(&opposite) > 0.1, "{law:?}");
     }
@@ -118,23 +98,6 @@ fn flat_lamps_light_nothing_of_their_own_plane() {
     assert_eq!(mean_red(&received(&gpu, &room, &direct, &own)), 0.0);
     let opposite = grid(turn * DVec3::new(0.5, 0.0, 0.5), turn * DVec3::Y, 0.4);
     assert!(mean_red(&received(&gpu, &room, &direct, &opposite)) > 0.1);
-}
-
-/// A lamp flush with a wall lights what faces it, and neither its wall nor what lies behind.
-#[test]
-fn a_light_flush_with_a_wall_shines_into_the_room() {
-    let Some(gpu) = device() else { return };
-    let mut scene = scene("point-over-plane");
-    scene.lights = vec![lamp(disc(DVec3::ZERO, DVec3::Y, 0.1, EmissionLaw::Cosine))];
-    let above = [(DVec3::Y * 2.0, DVec3::NEG_Y)];
-    let found = irradiance(&gpu, &scene, &SceneSettings { shadow_rays: 32, ..settings() }, &above).unwrap();
-    let exact = 1.0 / (PI * (0.01 + 4.0));
-    assert_holds("above", z_check("above", found.mean, exact, found.standard_error.max(1e-4 * exact)));
-    for illumination in BOTH {
-        let settings = SceneSettings { illumination, bounces: 1, ..settings() };
-        let beside = irradiance(&gpu, &scene, &settings, &[(DVec3::X * 0.3, DVec3::Y)]).unwrap();
-        assert_eq!(beside.mean, 0.0, "{illumination:?}: the lamp's own wall");
-    }
 }
 
 /// A closed cube of 1 m, seen from inside, without light of its own.
@@ -265,90 +228,74 @@ fn rays_at_edges_and_corners_meet_a_wall() {
             })
         })
         .collect();
-    for cells in [1, 40] {
+    let places = [edges_and_corners(), inner].concat();
+    let meet = |cells: u32, way: fn(&mut DVec3)| {
         let mut room = closed_room(0.9);
         room.meshes.iter_mut().for_each(|mesh| *mesh = cut(mesh, cells));
-        for (what, places) in [("edges and corners of the room", edges_and_corners()), ("edges and corners of triangles", inner.clone())] {
-            room.lights = aimed_at(&places, from);
-            let lit = received(&gpu, &room, &flights(200_000, 1), &[(DVec3::new(0.5, 0.0, 0.5), DVec3::Y)]);
-            let what = format!("{what}, {cells} x {cells} cells");
-            assert_holds(&what, none_escapes(&what, &lit));
-        }
-    }
+        room.meshes[0].positions.iter_mut().for_each(way);
+        room.lights = aimed_at(&places, from);
+        none_escapes("edges and corners", &received(&gpu, &room, &kept(flights(200_000, 1)), &[(DVec3::new(0.5, 0.0, 0.5), DVec3::Y)]))
+    };
+    assert_holds("in one piece", meet(1, |_| {}));
+    assert_holds("40 x 40 cells", meet(40, |_| {}));
     // A wall that ends 2^-12 before its neighbour lets photons out.
-    let mut open = closed_room(0.9);
-    open.meshes[0].positions.iter_mut().for_each(|position| position.z = position.z.max(1.0 / 4096.0));
-    open.lights = aimed_at(&edges_and_corners(), from);
-    let lit = received(&gpu, &open, &flights(200_000, 1), &[(DVec3::new(0.5, 0.0, 0.5), DVec3::Y)]);
-    assert_complains("a gap of a 4096th", none_escapes("a gap", &lit));
+    assert_complains("a gap of a 4096th", meet(1, |position| position.z = position.z.max(1.0 / 4096.0)));
 }
 
 /// Photons that start on walls, some within a rounding of an edge, and photons that were sent into edges and
 /// corners: none finds a way out, however often it is scattered.
-#[test]
-fn photons_on_edges_and_in_corners_stay_in_the_room() {
+fn none_leaves_by_edges_and_corners(photons: u32) {
     let Some(gpu) = device() else { return };
     let point = [(DVec3::new(0.5, 0.0, 0.5), DVec3::Y)];
-    let furnace = received(&gpu, &scene("furnace"), &flights(1_000_000, 1), &point);
+    let furnace = received(&gpu, &scene("furnace"), &kept(flights(photons, 1)), &point);
     let mut room = closed_room(0.9);
     room.lights = aimed_at(&edges_and_corners(), DVec3::new(0.37, 0.52, 0.61));
-    let aimed = received(&gpu, &room, &flights(100_000, 8), &point);
+    let aimed = received(&gpu, &room, &kept(flights(photons / 4, 8)), &point);
     assert_holds("a furnace", none_escapes("from anywhere on the walls", &furnace));
     assert_holds("a closed room", none_escapes("from edges and corners", &aimed));
+}
+
+#[test]
+fn photons_on_edges_and_in_corners_stay_in_the_room() {
+    none_leaves_by_edges_and_corners(200_000);
+}
+
+#[test]
+#[ignore = "long: millions of photons"]
+fn millions_of_photons_on_edges_and_in_corners_stay_in_the_room() {
+    none_leaves_by_edges_and_corners(4_000_000);
 }
 
 #[test]
 fn photons_leave_a_surface_once_and_for_all() {
     let Some(gpu) = device() else { return };
     let tilts = [DQuat::IDENTITY, DQuat::from_axis_angle(DVec3::new(0.3, 0.5, -0.8).normalize(), 1.1), DQuat::from_rotation_z(1e-4)];
+    let places = [(1.0, DVec3::ZERO), (1e-3, DVec3::new(0.1, -0.2, 0.3)), (1e4, DVec3::ZERO), (1.0, DVec3::new(1e4, -2e4, 5e3))];
     for (number, tilt) in tilts.into_iter().enumerate() {
-        for cells in [1, 40] {
-            for (size, place) in
-                [(1.0, DVec3::ZERO), (1e-3, DVec3::new(0.1, -0.2, 0.3)), (1e4, DVec3::ZERO), (1.0, DVec3::new(1e4, -2e4, 5e3))]
-            {
-                let mut plane = scene("sun-over-plane");
-                plane.materials[0].base_colour = Vec3::ONE;
-                plane.meshes[0] = cut(&plane.meshes[0], cells);
-                plane.meshes[0].positions.iter_mut().for_each(|position| *position = tilt * *position * size + place);
-                plane.lights = vec![lamp(sun(tilt * DVec3::new(0.3, -1.0, 0.2)))];
-                let settings = SceneSettings { radius: None, ..flights(40_000, 2) };
-                let lit = received(&gpu, &plane, &settings, &[(place, tilt * DVec3::Y)]);
-                let what = format!("tilt {number}, {cells} x {cells} cells, size {size} at {place}");
-                assert_holds(&what, none_returns(&what, &lit));
-            }
+        for (k, (size, place)) in places.into_iter().enumerate() {
+            let cells = [1, 40][(number + k) % 2];
+            let mut plane = scene("sun-over-plane");
+            plane.materials[0].base_colour = Vec3::ONE;
+            plane.meshes[0] = cut(&plane.meshes[0], cells);
+            plane.meshes[0].positions.iter_mut().for_each(|position| *position = tilt * *position * size + place);
+            plane.lights = vec![lamp(sun(tilt * DVec3::new(0.3, -1.0, 0.2)))];
+            let settings = SceneSettings { radius: None, ..kept(flights(40_000, 2)) };
+            let lit = received(&gpu, &plane, &settings, &[(place, tilt * DVec3::Y)]);
+            let what = format!("tilt {number}, {cells} x {cells} cells, size {size} at {place}");
+            assert_holds(&what, none_returns(&what, &lit));
         }
     }
     for segments in [8, 64] {
         let mesh = Mesh { normals: Vec::new(), ..Mesh::sphere("ball", DVec3::new(0.2, 0.7, -0.4), 0.9, segments, 0) };
         let mut ball = scene_of(vec![mesh], vec![matt(1.0)], vec![sun(DVec3::new(0.3, -1.0, 0.2))]);
-        let lit = received(&gpu, &ball, &flights(100_000, 2), &[(DVec3::new(0.2, 1.6, -0.4), DVec3::Y)]);
+        let lit = received(&gpu, &ball, &kept(flights(40_000, 2)), &[(DVec3::new(0.2, 1.6, -0.4), DVec3::Y)]);
         assert_holds(segments, none_returns(&format!("ball of {segments} segments"), &lit));
         // A bowl sees itself.
         ball.meshes[0].triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
         ball.lights = vec![lamp(point(DVec3::new(0.2, 0.7, -0.4)))];
-        let lit = received(&gpu, &ball, &flights(100_000, 2), &[(DVec3::new(0.2, -0.2, -0.4), DVec3::Y)]);
+        let lit = received(&gpu, &ball, &kept(flights(40_000, 2)), &[(DVec3::new(0.2, -0.2, -0.4), DVec3::Y)]);
         assert_complains("the inside of a ball", none_returns("bowl", &lit));
     }
-}
-
-#[test]
-fn a_patch_in_a_plane_is_left_with_the_plane() {
-    let Some(gpu) = device() else { return };
-    assert_holds("the patch", known::patch_in_a_plane(&gpu));
-}
-
-#[test]
-fn a_lamp_in_a_flat_box_lights_nothing_outside() {
-    let Some(gpu) = device() else { return };
-    for illumination in BOTH {
-        assert_holds(format!("{illumination:?}"), known::lamp_in_a_box(&gpu, illumination));
-    }
-}
-
-#[test]
-fn each_half_of_a_roof_keeps_its_own_light() {
-    let Some(gpu) = device() else { return };
-    assert_holds("the roof", known::ridge(&gpu));
 }
 
 /// Two rooms side by side, the left one lit. `wall` is what stands between.
@@ -385,38 +332,14 @@ fn thin_walls_and_sheets_let_no_light_through() {
         }
     };
     for illumination in BOTH {
-        for radius in [0.3, 0.02] {
-            let settings = SceneSettings { illumination, photons: 20_000, rounds: 4, radius: Some(radius), alpha: 1.0, ..by_rounds() };
-            for (what, rooms) in [("a 4096th", &two_walls), ("a sheet", &sheet)] {
-                let what = format!("{what}, {illumination:?}, radius {radius}");
-                let points: Vec<_> = points
-                    .iter()
-                    .map(|(at, normal)| (if rooms.meshes.len() == 7 && at.x == thin.x { at.with_x(0.5) } else { *at }, *normal))
-                    .collect();
-                assert_holds(&what, check(&what, &received(&gpu, rooms, &settings, &points)));
-            }
-            assert_complains("no wall", check("no wall", &received(&gpu, &no_wall, &settings, &points)));
+        let settings = SceneSettings { illumination, photons: 20_000, rounds: 4, radius: Some(0.3), alpha: 1.0, ..kept(by_rounds()) };
+        for (what, rooms) in [("a 4096th", &two_walls), ("a sheet", &sheet)] {
+            let place = |at: DVec3| if rooms.meshes.len() == 7 && at.x == thin.x { at.with_x(0.5) } else { at };
+            let points = points.map(|(at, normal)| (place(at), normal));
+            let what = format!("{what}, {illumination:?}");
+            assert_holds(&what, check(&what, &received(&gpu, rooms, &settings, &points)));
         }
-    }
-}
-
-/// Walls that meet at an edge share no light: the floor is lit from straight above, the wall that rises from it is
-/// not.
-#[test]
-fn a_lit_floor_does_not_light_the_foot_of_the_wall() {
-    let Some(gpu) = device() else { return };
-    let mut corner = scene("sun-over-plane");
-    corner.materials[0].base_colour = Vec3::ZERO;
-    corner.lights = vec![lamp(sun(DVec3::NEG_Y))];
-    corner.meshes.push(Mesh::parallelogram("wall", DVec3::new(-2.0, 0.0, -2.0), DVec3::Y * 2.0, DVec3::Z * 4.0, 0));
-    for illumination in BOTH {
-        let settings = SceneSettings { illumination, photons: 100_000, radius: Some(0.3), alpha: 1.0, rounds: 2, ..by_rounds() };
-        let points =
-            [(DVec3::new(-1.99, 0.0, 0.0), DVec3::Y), (DVec3::new(-2.0, 0.01, 0.0), DVec3::X), (DVec3::new(-2.0, 0.0, 0.0), DVec3::X)];
-        let lit = received(&gpu, &corner, &settings, &points);
-        let [floor, wall, foot] = [0, 1, 2].map(|point| red(&lit, point).0);
-        assert!(floor > 0.8, "{illumination:?}: the floor has {floor}");
-        assert_eq!((wall, foot), (0.0, 0.0), "{illumination:?}");
+        assert_complains("no wall", check("no wall", &received(&gpu, &no_wall, &settings, &points)));
     }
 }
 
@@ -433,18 +356,17 @@ fn same_sums(what: &str, found: &RunResult, expected: &RunResult) -> Check {
 }
 
 /// From a millionth to a million times its size no decision and no bit of the light changes.
-#[test]
-fn every_power_of_two_is_the_same_light_to_the_bit() {
+fn powers_of_two_change_no_bit(step: usize) {
     let Some(gpu) = device() else { return };
     let of = |k: i32, settings: &SceneSettings| {
         let (scene, points) = scaled_cornell(k);
         let radius = settings.radius.map(|radius| radius * 2f64.powi(k));
         received(&gpu, &scene, &SceneSettings { radius, ..settings.clone() }, &points)
     };
-    let settings = SceneSettings { photons: 1500, caustic_photons: 1500, rounds: 2, shadow_rays: 4, radius: Some(0.1), ..by_rounds() };
+    let settings = SceneSettings { photons: 1500, caustic_photons: 1500, shadow_rays: 4, radius: Some(0.1), ..settings() };
     let expected = of(0, &settings);
     assert!(mean_red(&expected) > 0.5);
-    for k in -20..=20 {
+    for k in (-20..=20).step_by(step) {
         assert_holds(k, same_sums(&format!("scaled by 2^{k}"), &of(k, &settings), &expected));
     }
     let wider = of(0, &SceneSettings { radius: Some(0.1 * (1.0 + 1e-6)), ..settings });
@@ -452,8 +374,7 @@ fn every_power_of_two_is_the_same_light_to_the_bit() {
 }
 
 /// The paper's box at every such size: the photons of both builders go with it.
-#[test]
-fn the_open_box_of_any_power_of_two_stores_the_same_photons() {
+fn the_open_box_stores_the_same_photons(step: usize) {
     let gpu = device();
     for builder in [Builder::Cpu, Builder::Naive, Builder::Ballot] {
         let settings = RoomSettings { builder, photons: 1001, shininess: [Some(2.0); 5], ..RoomSettings::default() };
@@ -475,8 +396,25 @@ fn the_open_box_of_any_power_of_two_stores_the_same_photons() {
         };
         let expected = of(0);
         assert!(gpu.is_none() || expected.len() > 1001);
-        (-20..=20).for_each(|k| assert_eq!(of(k), expected, "{builder:?}, 2^{k}"));
+        (-20..=20).step_by(step).for_each(|k| assert_eq!(of(k), expected, "{builder:?}, 2^{k}"));
     }
+}
+
+#[test]
+fn every_power_of_two_is_the_same_light_to_the_bit() {
+    powers_of_two_change_no_bit(5);
+}
+
+#[test]
+fn the_open_box_of_any_power_of_two_stores_the_same_photons() {
+    the_open_box_stores_the_same_photons(5);
+}
+
+#[test]
+#[ignore = "long: each power by itself, where the short run has every fifth"]
+fn each_power_of_two_changes_no_bit() {
+    powers_of_two_change_no_bit(1);
+    the_open_box_stores_the_same_photons(1);
 }
 
 /// A scene whose coordinates are whole multiples of 2^-20 m, moved by ten thousand times its size: every number of
@@ -484,7 +422,7 @@ fn the_open_box_of_any_power_of_two_stores_the_same_photons() {
 #[test]
 fn ten_thousand_sizes_away_the_light_is_the_same_to_the_bit() {
     let Some(gpu) = device() else { return };
-    let settings = SceneSettings { photons: 1500, caustic_photons: 1500, rounds: 2, ..by_rounds() };
+    let settings = SceneSettings { photons: 1500, caustic_photons: 1500, ..settings() };
     let of = |way: DVec3| {
         let (scene, points) = cornell_at(|at| (at * 1_048_576.0).round() / 1_048_576.0 + way);
         received(&gpu, &scene, &settings, &points)
@@ -509,28 +447,25 @@ fn axis_parallel_rays_meet_the_same_by_tree_and_list() {
     room.lights = [DVec3::X, DVec3::Y, DVec3::Z].into_iter().flat_map(|axis| [axis, -axis]).map(|way| lamp(sun(way))).collect();
     let flush = [(DVec3::new(0.5, 0.0, 0.5), DVec3::Y), (DVec3::new(0.0, 0.5, 0.5), DVec3::X)];
     room.lights.extend(flush.map(|(centre, normal)| lamp(disc(centre, normal, 0.3, EmissionLaw::Uniform))));
-    let lit = |with: &[Effect], without: &[Effect], room: &Scene| {
-        let of_photons = SceneSettings { illumination: Illumination::Photons, photons: 60_000, ..by_rounds() };
-        let settings = SceneSettings { with: with.to_vec(), without: without.to_vec(), rounds: 2, bounces: 4, ..of_photons };
+    let lit = |by_tree: bool, room: &Scene| {
+        let mut settings = SceneSettings { illumination: Illumination::Photons, photons: 60_000, bounces: 4, ..settings() };
+        if !by_tree {
+            settings.with.retain(|effect| *effect != Effect::Bvh);
+            settings.without = vec![Effect::Bvh];
+        }
         received(&gpu, room, &settings, &POINTS)
     };
-    let (tree, list) = (lit(&[Effect::Bvh], &[], &room), lit(&[], &[Effect::Bvh], &room));
+    let (tree, list) = (lit(true, &room), lit(false, &room));
     assert!(tree.plan.keeps(Effect::Bvh) && !list.plan.keeps(Effect::Bvh) && mean_red(&list) > 0.0);
     assert_holds("tree", same_sums("tree", &tree, &list));
     room.meshes.remove(6);
-    assert_complains("a block less", same_sums("a block less", &lit(&[Effect::Bvh], &[], &room), &list));
+    assert_complains("a block less", same_sums("a block less", &lit(true, &room), &list));
 }
 
 #[test]
 fn sheets_in_one_plane_are_met_alike_by_tree_and_list() {
     let Some(gpu) = device() else { return };
     assert_holds("the sheets", known::sheets_in_one_plane(&gpu));
-}
-
-#[test]
-fn of_triangles_equally_near_the_lowest_number_is_met() {
-    let Some(gpu) = device() else { return };
-    assert_holds("the stack", known::stack_from_afar(&gpu));
 }
 
 /// Triangles without area, triangles given twice, and the order in which triangles are given change no bit.
@@ -541,11 +476,10 @@ fn flat_doubled_and_reordered_triangles_change_no_bit() {
     let mut plain = cornell();
     plain.materials.iter_mut().for_each(|material| material.emission = Vec3::ZERO);
     plain.lights = vec![lamp(point(DVec3::new(0.4, 0.8, 0.6)))];
-    let settings = SceneSettings { photons: 20_000, rounds: 2, ..by_rounds() };
     let of = |spoil: &dyn Fn(&mut Mesh)| {
         let mut scene = plain.clone();
         scene.meshes.iter_mut().for_each(spoil);
-        (Geometry::new(&scene).unwrap().left_out, received(&gpu, &scene, &settings, &POINTS))
+        (Geometry::new(&scene).unwrap().left_out, received(&gpu, &scene, &settings(), &POINTS))
     };
     let meshes = plain.meshes.len();
     let (none, expected) = of(&|_| {});
@@ -580,15 +514,15 @@ fn two_sheets_at_one_place_show_each_its_own_side() {
     let sheet = |name, a: DVec3, b: DVec3, material| Mesh::parallelogram(name, tilt * (-0.5 * (u + v)), tilt * a, tilt * b, material);
     let faces = [sheet("above", v, u, 0), sheet("below", u, v, 1)];
     sheets.lights = [DVec3::NEG_Y, DVec3::Y].map(|way| lamp(sun(tilt * way))).into();
-    let settings = SceneSettings { shadow_rays: 8, ..settings() };
+    let settings = SceneSettings { part: Part::Direct, ..settings() };
     for order in [[0, 1], [1, 0]] {
         sheets.meshes = order.map(|face| faces[face].clone()).into();
         for (side, albedo) in [(1.0, 0.8), (-1.0, 0.4)] {
-            let found =
-                radiance(&gpu, &sheets, &settings, tilt * DVec3::new(0.3, side * 1.5, 0.4), tilt * DVec3::new(0.1, 0.0, 0.2)).unwrap();
+            let (eye, target) = (tilt * DVec3::new(0.3, side * 1.5, 0.4), tilt * DVec3::new(0.1, 0.0, 0.2));
             // Each sun is chosen by half of the rays, stratified.
-            let what = format!("order {order:?}, side {side}");
-            assert_holds(&what, relative_check("radiance", found.mean, albedo / PI, 1e-4));
+            for seen in radiances(&gpu, &sheets, &settings, eye, target, 8) {
+                assert_holds(format!("order {order:?}, side {side}"), relative_check("radiance", seen, albedo / PI, 1e-4));
+            }
         }
     }
 }
@@ -613,12 +547,12 @@ fn small_lamps_shine_by_their_area() {
         let area = 0.5 * 4f64.powi(-k);
         // L A cos cos / d^2, and what the lamp's extent takes from it: 2 E[r^2] / d^2 of it, E[r^2] = edge^2 / 9.
         let (expected, extent) = (area / 0.25, 8.0 / 9.0 * 4f64.powi(-k));
-        let direct = SceneSettings { photons: 1, rounds: 1, bounces: 1, shadow_rays: 32, ..settings() };
-        let found = irradiance(&gpu, &room, &direct, &[below]).unwrap();
+        let direct = SceneSettings { photons: 1, rounds: 16, bounces: 1, shadow_rays: 32, ..settings() };
+        let found = mean_irradiance(&gpu, &room, &direct, &[below]);
         println!("lamp of 2^-{k} m: shadow rays see {:.4} of its light", found.mean / expected);
         let error = found.standard_error.max((extent + 1e-4) * expected);
         assert_holds(format!("2^-{k}"), z_check("shadow rays", found.mean, expected, error));
-        let mapped = irradiance(&gpu, &room, &mapped(10_000, 1, 1, 0.1), &[below]).unwrap();
+        let mapped = mean_irradiance(&gpu, &room, &kept(mapped(10_000, 16, 1, 0.1)), &[below]);
         // A disc of radius h below sees A / h^2 (1 - 1 / (1 + (h / d)^2)).
         let mean = area * (1.0 - 1.0 / (1.0 + 0.04)) / 0.01;
         assert_holds(format!("2^-{k}"), z_check("photons", mapped.mean, mean, mapped.standard_error.hypot(extent * mean)));
@@ -633,27 +567,8 @@ fn the_smallest_lamps_shine_into_the_room_or_are_left_out() {
     for k in [22, 26, 30, 31, 32, 33, 35, 37, 38, 40, 60, 74] {
         let (room, below) = room_with_lamp(k);
         assert_eq!(Geometry::new(&room).unwrap().left_out, usize::from(4 * k > 126), "a lamp of 2^-{k}");
-        let lit = received(&gpu, &room, &flights(5000, 1), &[below]);
+        let lit = received(&gpu, &room, &kept(flights(5000, 1)), &[below]);
         assert_holds(k, none_escapes(&format!("a lamp of 2^-{k}"), &lit));
-    }
-}
-
-/// A furnace turned so that its floor looks almost along -z, where frames of tangents break: as bright as ever.
-#[test]
-fn a_furnace_glows_alike_however_it_is_turned() {
-    let Some(gpu) = device() else { return };
-    let settings = mapped(6000, 2, 60, 0.3);
-    for e in [1e-2, 1e-4, 1e-6, 0.0] {
-        let turn = DQuat::from_rotation_arc(DVec3::Y, DVec3::new(e, 0.0, -1.0).normalize());
-        let furnace = moved(scene("furnace"), |at| turn * at);
-        // Away from the middle of the ceiling and on a wall: skewed directions would miss one and meet the other.
-        let points =
-            [(DVec3::new(0.2, 1.0, 0.3), DVec3::NEG_Y), (DVec3::new(0.0, 0.2, 0.5), DVec3::X), (DVec3::new(0.5, 0.0, 0.5), DVec3::Y)];
-        for (at, normal) in points {
-            let found = irradiance(&gpu, &furnace, &settings, &[(turn * at, turn * normal)]).unwrap();
-            assert!(found.standard_error < 0.1, "{found:?}");
-            assert_holds(format!("{e}, {normal}"), z_check("irradiance", found.mean, 2.0 * PI, found.standard_error));
-        }
     }
 }
 
@@ -662,7 +577,7 @@ fn a_furnace_glows_alike_however_it_is_turned() {
 fn an_eye_on_a_surface_sees_numbers() {
     let Some(gpu) = device() else { return };
     let cornell = cornell();
-    let settings = SceneSettings { photons: 500, rounds: 1, ..by_rounds() };
+    let settings = SceneSettings { photons: 500, rounds: 1, ..settings() };
     for (eye, target) in [
         (DVec3::new(0.5, 0.0, 0.9), DVec3::new(0.5, 0.5, 0.0)),
         (DVec3::ZERO, DVec3::ONE),
@@ -689,25 +604,22 @@ fn table_check(cases: &[Case], tests: &[String], program: &[String]) -> Check {
         return Err(format!("{case} does not stand in the table once"));
     }
     require(cases.len() == all.len(), || format!("{} cases instead of {}", cases.len(), all.len()))?;
-    let is_test = |name: &&str| {
+    let is_test = |name: &String| {
         let head = format!("fn {name}()");
         tests.iter().any(|source| {
             let mut places = source.match_indices(&head);
             places.any(|(at, _)| source[..at].trim_end().lines().rev().take(2).any(|line| line.trim() == "#[test]"))
         })
     };
-    for Case { number, shown, .. } in cases {
-        match shown {
-            Shown::Tests(names) => match names.iter().find(|name| !is_test(name)) {
-                Some(name) => return Err(format!("{number}: {name} is no test")),
-                None if names.is_empty() => return Err(format!("{number}: nothing shows it")),
-                None => {}
-            },
-            Shown::Absent { words, .. } => {
-                if let Some(word) = words.iter().find(|word| program.iter().any(|text| text.to_lowercase().contains(**word))) {
-                    return Err(format!("{number} is said not to occur here, and a source has {word:?}: it needs a test"));
-                }
-            }
+    for Case { number, tests } in cases {
+        let absent = ABSENT.iter().find(|(absent, _)| absent == number);
+        require(absent.is_some() == tests.is_empty(), || format!("{number}: nothing shows it, or it is said not to occur"))?;
+        if let Some(name) = tests.iter().find(|name| !is_test(name)) {
+            return Err(format!("{number}: {name} is no test"));
+        }
+        let mut words = absent.iter().flat_map(|(_, words)| *words);
+        if let Some(word) = words.find(|word| program.iter().any(|text| text.to_lowercase().contains(**word))) {
+            return Err(format!("{number} is said not to occur here, and a source has {word:?}: it needs a test"));
         }
     }
     Ok(())
@@ -717,80 +629,41 @@ fn table_check(cases: &[Case], tests: &[String], program: &[String]) -> Check {
 fn the_table_names_every_case_and_tests_that_exist() {
     let tests = [texts("src", &[".rs"]), texts("tests", &[".rs"])].concat();
     let program = [texts("src", &[".rs"]), texts("glsl", &[".glsl", ".comp"])].concat();
+    let cases = cases();
     let check = |cases: &[Case]| table_check(cases, &tests, &program);
-    assert_holds("the table", check(&CASES));
-    assert_complains("a case less", check(&CASES[1..]));
-    assert_complains("a case twice", check(&[&CASES[..], &CASES[..1]].concat()));
-    let shown = |shown| [&[Case { shown, ..CASES[0] }], &CASES[1..]].concat();
-    assert_complains("a test that is none", check(&shown(Shown::Tests(&["table_check"]))));
-    assert_complains("a test that was renamed", check(&shown(Shown::Tests(&["photons_leave_a_surface_for_good"]))));
-    assert_complains("no test", check(&shown(Shown::Tests(&[]))));
-    assert_complains("what has come to be there", check(&shown(Shown::Absent { why: "no quasi-Monte Carlo numbers", words: &["sobol"] })));
+    assert_holds("the table", check(&cases));
+    assert_complains("a case less", check(&cases[1..]));
+    assert_complains("a case twice", check(&[&cases[..], &cases[..1]].concat()));
+    let shown_by = |tests: &[&str]| {
+        let first = Case { tests: tests.iter().map(|name| String::from(*name)).collect(), ..cases[0].clone() };
+        [&[first], &cases[1..]].concat()
+    };
+    assert_complains("a test that is none", check(&shown_by(&["table_check"])));
+    assert_complains("a test that was renamed", check(&shown_by(&["photons_leave_a_surface_for_good"])));
+    assert_complains("no test", check(&shown_by(&[])));
+    assert_complains("what has come to be there", table_check(&cases, &tests, &["float discriminant = b * b - c;".into()]));
 }
 
-/// Every sentence of README and of the guide that counts the cases has the numbers of the table, and no others.
+/// Whoever says how many cases there are has the table's number, and the page with the table how many of them cannot occur.
 fn counts_check(texts: &[String], cases: &[Case]) -> Check {
-    let (shown, absent) = cases::counts(cases);
-    let mut counted = 0;
-    for paragraph in texts.iter().flat_map(|text| text.split("\n\n")) {
-        let paragraph = paragraph.split_whitespace().collect::<Vec<_>>().join(" ");
-        for sentence in paragraph.split(". ") {
-            // What stands in brackets counts something else.
-            let plain: String = sentence.split('(').map(|part| part.split_once(')').map_or(part, |(_, after)| after)).collect();
-            let words: Vec<&str> = plain.split(' ').collect();
-            let number = |word: &&str| word.trim_matches(|symbol: char| symbol.is_ascii_punctuation()).parse::<usize>().ok();
-            let counts_cases = words.windows(3).any(|three| {
-                number(&three[0]).is_some()
-                    && ["known failures", "hard cases", "known faults"].iter().any(|what| three[1..].join(" ").starts_with(what))
-            });
-            if !counts_cases {
-                continue;
-            }
-            counted += 1;
-            let wrong = words.iter().filter_map(number).find(|found| ![cases.len(), shown, absent].contains(found));
-            if let Some(wrong) = wrong {
-                let right = format!("{} cases, {shown} with tests, {absent} that cannot occur", cases.len());
-                return Err(format!("{wrong} in \"{sentence}\" is none of: {right}"));
-            }
-        }
-    }
-    if counted == 0 { Err("nothing says how many hard cases there are".into()) } else { Ok(()) }
+    let shown = cases.iter().filter(|case| !case.tests.is_empty()).count();
+    let says = format!("{} known failures of renderers: {shown} with the tests that show that they do not occur here, and ", cases.len())
+        + &format!("{} that cannot occur", cases.len() - shown);
+    let plain = texts.join(" ").split_whitespace().collect::<Vec<_>>().join(" ");
+    let words: Vec<&str> = plain.split(' ').collect();
+    // Whatever stands behind them.
+    let are_cases = |words: &[&str]| ["known failures", "hard cases"].iter().any(|what| words.join(" ").starts_with(what));
+    let counted = words.windows(3).filter(|three| are_cases(&three[1..]));
+    let wrong = counted.filter_map(|three| three[0].parse::<usize>().ok()).find(|count| *count != cases.len());
+    require(wrong.is_none() && plain.contains(&says), || format!("{wrong:?} cases, or no sentence with {says:?}"))
 }
 
 #[test]
 fn readme_and_guide_count_the_hard_cases() {
     let written = readme_and_guide();
-    assert_holds("README and the guide", counts_check(&written, &CASES));
-    assert_complains("a table of one case less", counts_check(&written, &CASES[1..]));
-    assert_complains("no sentence at all", counts_check(&["Hard cases are many.".to_owned()], &CASES));
-    assert_complains(
-        "a number of old",
-        counts_check(&["It lists 97 known failures: 88 with tests, and 9 that cannot apply.".to_owned()], &CASES),
-    );
-}
-
-/// The guide's page of hard cases has the rows of the table, in their order.
-fn page_check(page: &str) -> Check {
-    let is_row = |line: &&str| {
-        let number = line.strip_prefix("| ").and_then(|line| line.split(' ').next()).unwrap_or_default();
-        COUNTS.iter().any(|(group, _)| number.strip_prefix(*group).is_some_and(|rest| rest.parse::<usize>().is_ok()))
-    };
-    let (table, mut found) = (cases::table(), page.lines().filter(is_row));
-    for expected in table.lines().filter(is_row) {
-        match found.next() {
-            Some(row) if row == expected => {}
-            row => return Err(format!("{row:?} instead of {expected:?}; the table is:\n{table}")),
-        }
-    }
-    found.next().map_or(Ok(()), |row| Err(format!("{row:?} is no row of the table")))
-}
-
-#[test]
-fn the_guides_page_has_the_table() {
-    let table = cases::table();
-    assert_holds("the table itself", page_check(&table));
-    assert_complains("a row less", page_check(&table.replacen("| G1 |", "| G |", 1)));
-    assert_complains("a row more", page_check(&(table.clone() + "| M3 | twice | `page_check` |\n")));
-    assert_complains("another test", page_check(&table.replacen("`rays_at", "`rays_near", 1)));
-    assert_holds("src/guide/hard_cases.md", page_check(&read("src/guide/hard_cases.md")));
+    assert_holds("README and the guide", counts_check(&written, &cases()));
+    assert_complains("a table of one case less", counts_check(&written, &cases()[1..]));
+    assert_complains("no sentence at all", counts_check(&["Hard cases are many.".to_owned()], &cases()));
+    let of_old = "It lists 97 known failures: 88 with tests, and 9 that cannot apply.".to_owned();
+    assert_complains("a number of old", counts_check(&[&written[..], &[of_old]].concat(), &cases()));
 }

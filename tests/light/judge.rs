@@ -13,8 +13,8 @@ fn material(surface: Surface, base_colour: Vec3) -> Material {
     Material { surface, ..Material::lambert("material", base_colour) }
 }
 
-fn lamp(emission: Vec3) -> Material {
-    Material { emission, ..Material::lambert("lamp", Vec3::ZERO) }
+fn lamp_of(emission: Vec3) -> Material {
+    Material { emission, ..matt(0.0) }
 }
 
 fn environment() -> LightKind {
@@ -23,11 +23,20 @@ fn environment() -> LightKind {
 
 const SKY: DVec3 = DVec3::new(1.0, 2.0, 4.0);
 
+fn texture_of(width: u32, texels: Texels) -> Texture {
+    Texture { name: "texture".into(), width, height: 1, texels, wrap: [Wrap::Clamp; 2], filter: Default::default() }
+}
+
 /// A horizontal square of side 2 `half` around the axis z, at this height; its front looks up, or down.
 fn square(height: f64, half: f64, up: bool, material: usize) -> Mesh {
     let corner = DVec3::new(-half, -half, height);
     let (u, v) = (2.0 * half * DVec3::X, 2.0 * half * DVec3::Y);
     if up { Mesh::parallelogram("square", corner, u, v, material) } else { Mesh::parallelogram("square", corner, v, u, material) }
+}
+
+/// A square of 2 m under one light.
+fn plate_under(material: Material, light: LightKind) -> Scene {
+    scene_of(vec![square(0.0, 1.0, true, 0)], vec![material], vec![light])
 }
 
 /// The faces of a box from -half to half: bottom, top, then the sides; fronts look in or out.
@@ -94,7 +103,7 @@ fn a_disc_lights_the_point_on_its_axis() {
 }
 
 #[test]
-fn point_lights_fall_off_with_distance_and_cosine() {
+fn point_lights_fall_off_with_distance_and_cosine_and_add_up() {
     let bulb = LightKind::Point { position: DVec3::new(3.0, 0.0, 4.0), intensity: Vec3::new(50.0, 25.0, 0.0) };
     let lit = scene_of(vec![], vec![], vec![bulb.clone()]);
     let expected = DVec3::new(50.0, 25.0, 0.0) / 25.0 * 0.8;
@@ -104,14 +113,10 @@ fn point_lights_fall_off_with_distance_and_cosine() {
     let black = || vec![Material::lambert("black", Vec3::ZERO)];
     assert_total("lit", &irradiance(&scene_of(plates(5.0), black(), vec![bulb.clone()]), DVec3::ZERO, DVec3::Z, 2), expected);
     assert_total("shadow", &irradiance(&scene_of(plates(2.0), black(), vec![bulb]), DVec3::ZERO, DVec3::Z, 2), DVec3::ZERO);
-}
-
-#[test]
-fn two_lights_add_up_whatever_their_power() {
+    // Two, whatever their power.
     let bulb = |x: f64, intensity: f32| LightKind::Point { position: DVec3::new(x, 0.0, 1.0), intensity: Vec3::splat(intensity) };
-    let lit = scene_of(vec![], vec![], vec![bulb(0.0, 1.0), bulb(1.0, 30.0)]);
-    let expected = DVec3::splat(1.0 + 30.0 / 2f64.powf(1.5));
-    assert_total("both", &irradiance(&lit, DVec3::ZERO, DVec3::Z, 20_000), expected);
+    let both = irradiance(&scene_of(vec![], vec![], vec![bulb(0.0, 1.0), bulb(1.0, 30.0)]), DVec3::ZERO, DVec3::Z, 20_000);
+    assert_total("both", &both, DVec3::splat(1.0 + 30.0 / 2f64.powf(1.5)));
 }
 
 #[test]
@@ -130,7 +135,7 @@ fn spots_fall_off_between_their_cones() {
 #[test]
 fn the_sun_lights_by_its_cosine() {
     let sun = LightKind::Directional { direction: DVec3::new(0.6, 0.0, -0.8), irradiance: COLOUR };
-    let lit = scene_of(vec![square(0.0, 1.0, true, 0)], vec![material(Surface::Lambert, COLOUR)], vec![sun]);
+    let lit = plate_under(material(Surface::Lambert, COLOUR), sun);
     let expected = 0.8 * COLOUR.as_dvec3();
     assert_total("irradiance", &irradiance(&lit, DVec3::ZERO, DVec3::Z, 2), expected);
     let seen = expected * COLOUR.as_dvec3() / PI;
@@ -140,7 +145,7 @@ fn the_sun_lights_by_its_cosine() {
 
 #[test]
 fn the_sky_lights_an_open_plane() {
-    let mut lit = scene_of(vec![square(0.0, 1.0, true, 0)], vec![material(Surface::Lambert, COLOUR)], vec![environment()]);
+    let mut lit = plate_under(material(Surface::Lambert, COLOUR), environment());
     assert_total("irradiance", &irradiance(&lit, DVec3::new(0.3, 0.2, 0.0), DVec3::Z, 100), PI * SKY);
     let (above, below, spot) = (DVec3::new(0.0, 1.0, 2.0), DVec3::new(0.0, 1.0, -2.0), DVec3::new(0.3, 0.2, 0.0));
     let seen = radiance(&lit, above, spot, 100);
@@ -152,69 +157,111 @@ fn the_sky_lights_an_open_plane() {
     assert_total("both sides", &radiance(&lit, below, spot, 100), COLOUR.as_dvec3() * SKY);
 }
 
-/// All walls shine and scatter alike, whether as mirrors or not.
-fn furnace(surfaces: [Surface; 6]) -> Scene {
-    let shining = |surface| Material { emission: Vec3::new(1.0, 2.0, 3.0), ..material(surface, COLOUR) };
-    scene_of(faces(DVec3::new(1.0, 0.7, 0.5), true, [0, 1, 2, 3, 4, 5]), surfaces.map(shining).to_vec(), vec![])
+/// A box of these walls, all of which shine alike.
+fn furnace(walls: [Material; 6]) -> Scene {
+    let shining = |material: Material| Material { emission: Vec3::new(1.0, 2.0, 3.0), ..material };
+    scene_of(faces(DVec3::new(1.0, 0.7, 0.5), true, [0, 1, 2, 3, 4, 5]), walls.map(shining).to_vec(), vec![])
+}
+
+/// The same of equal walls but for some of them.
+fn furnace_of(wall: &Material, others: &[(usize, Material)]) -> Scene {
+    let mut walls = [(); 6].map(|()| wall.clone());
+    others.iter().for_each(|(number, material)| walls[*number] = material.clone());
+    furnace(walls)
 }
 
 const EMITTED: DVec3 = DVec3::new(1.0, 2.0, 3.0);
 
 #[test]
-fn a_furnace_glows_evenly() {
-    let expected = EMITTED / (1.0 - COLOUR.as_dvec3());
-    let mut surfaces = [Surface::Lambert; 6];
-    let eye = DVec3::new(0.2, 0.1, -0.1);
-    let rough = furnace(surfaces);
-    assert_total("all rough", &radiance(&rough, eye, DVec3::new(0.3, 0.5, -0.5), 20_000), expected);
-    let on_floor = irradiance(&rough, DVec3::new(0.3, 0.5, -0.5), DVec3::Z, 20_000);
-    assert_total("irradiance", &on_floor, PI * expected);
-    assert_meets("direct", on_floor.mean.direct, on_floor.standard_error.direct, PI * EMITTED);
+fn furnaces_glow_evenly_and_in_the_right_parts() {
+    let (eye, floor, ceiling) = (DVec3::new(0.2, 0.1, -0.1), DVec3::new(0.3, 0.5, -0.5), DVec3::new(0.3, 0.5, 0.5));
+    let colour = COLOUR.as_dvec3();
+    let expected = EMITTED / (1.0 - colour);
+    let rough = material(Surface::Lambert, COLOUR);
+    // To all but the eye the paper's Phong is Lambertian.
+    for wall in [rough.clone(), plain(COLOUR), material(Surface::PaperPhong { exponent: 20.0 }, COLOUR)] {
+        let lit = furnace_of(&wall, &[]);
+        let on_floor = irradiance(&lit, floor, DVec3::Z, 20_000);
+        assert_total("irradiance", &on_floor, PI * expected);
+        assert_meets("direct", on_floor.mean.direct, on_floor.standard_error.direct, PI * EMITTED);
+        if !matches!(wall.surface, Surface::PaperPhong { .. }) {
+            let seen = radiance(&lit, eye, floor, 20_000);
+            assert_total("rough", &seen, expected);
+            assert_meets("direct", seen.mean.direct, seen.standard_error.direct, EMITTED * (1.0 + colour));
+            assert_eq!((seen.mean.specular, seen.mean.caustic), (DVec3::ZERO, DVec3::ZERO));
+        }
+    }
 
     // With mirrors the same light comes in all parts, and none of it twice.
-    surfaces[1] = Surface::Mirror;
-    surfaces[2] = Surface::Mirror;
-    let shiny = furnace(surfaces);
-    let floor = radiance(&shiny, eye, DVec3::new(0.3, 0.5, -0.5), 40_000);
-    assert_total("floor", &floor, expected);
-    assert!(floor.mean.caustic.min_element() > 0.01 && floor.mean.indirect.min_element() > 0.01, "{floor:?}");
-    assert_eq!(floor.mean.specular, DVec3::ZERO);
-    let mirror = radiance(&shiny, eye, DVec3::new(0.3, 0.5, 0.5), 20_000);
-    assert_total("mirror", &mirror, expected);
-    assert_eq!(mirror.mean.direct, EMITTED);
-    assert_meets("specular", mirror.mean.specular, mirror.standard_error.specular, expected - EMITTED);
-    assert_total("irradiance", &irradiance(&shiny, DVec3::new(0.3, 0.5, -0.5), DVec3::Z, 40_000), PI * expected);
+    let mirror = material(Surface::Mirror, COLOUR);
+    let shiny = furnace_of(&rough, &[(1, mirror.clone()), (2, mirror)]);
+    let seen = radiance(&shiny, eye, floor, 40_000);
+    assert_total("floor", &seen, expected);
+    let above = radiance(&shiny, eye, ceiling, 20_000);
+    assert_total("mirror", &above, expected);
+    assert_meets("specular", above.mean.specular, above.standard_error.specular, expected - EMITTED);
+    assert_total("irradiance", &irradiance(&shiny, floor, DVec3::Z, 40_000), PI * expected);
+    // Metal reflects its base colour along the normal alone: a smooth wall of F0 = F90 comes from an ior of 0.
+    let layered_mirror = layered(Vec3::ZERO, &Layers { ior: 0.0, specular_colour: COLOUR, specular: 1.0, ..dielectric(0.0) });
+    let layered_shiny = furnace_of(&plain(COLOUR), &[(1, layered_mirror)]);
+    for (seen, above) in [(seen, above), (radiance(&layered_shiny, eye, floor, 10_000), radiance(&layered_shiny, eye, ceiling, 2000))] {
+        assert!(seen.mean.caustic.min_element() > 0.01 && seen.mean.indirect.min_element() > 0.01, "{seen:?}");
+        assert_eq!((seen.mean.specular, above.mean.direct), (DVec3::ZERO, EMITTED));
+        assert_eq!(above.mean.caustic + above.mean.indirect, DVec3::ZERO);
+    }
 
-    // To all but the eye the paper's Phong is Lambertian.
-    let phong = furnace([Surface::PaperPhong { exponent: 20.0 }; 6]);
-    assert_total("phong", &irradiance(&phong, DVec3::new(0.3, 0.5, -0.5), DVec3::Z, 20_000), PI * expected);
-}
-
-#[test]
-fn bounces_are_a_geometric_series() {
-    let lit = furnace([Surface::Lambert; 6]);
-    let camera = Camera::looking_at("ray", DVec3::ZERO, DVec3::new(0.3, 0.5, -0.5), DVec3::Z, 1.0);
-    let (mut expected, mut term) = (DVec3::ZERO, EMITTED);
-    for max_bounces in 0..8 {
-        expected += term;
-        term *= COLOUR.as_dvec3();
-        let judge = Judge::new(&lit, max_bounces);
-        assert_total("radiance", &judge.image(&camera, 1, 1, 10_000, 3).pixels[0], expected);
-        let at_wall = judge.irradiance_at(&[(DVec3::Z * -0.5, DVec3::Z)], 10_000, 4)[0];
-        assert_total("irradiance", &at_wall, PI * expected);
+    // Rough lobes of the same kinds: what is sharp and what is not.
+    for (roughness, is_sharp) in [(0.499f32, true), (0.5, false)] {
+        let lit = furnace_of(&plain(COLOUR), &[(0, layered(COLOUR, &metal(roughness)))]);
+        let seen = radiance(&lit, eye, floor, 2000).mean;
+        assert_eq!(seen.direct == EMITTED, is_sharp, "{seen:?}");
+        assert_eq!(seen.specular == DVec3::ZERO, !is_sharp, "{seen:?}");
+        assert_eq!(seen.indirect == DVec3::ZERO, is_sharp, "{seen:?}");
+        let from_wall = radiance(&lit, eye, DVec3::new(0.3, 0.7, 0.1), 5000).mean;
+        assert_eq!(from_wall.caustic == DVec3::ZERO, !is_sharp, "{from_wall:?}");
     }
 }
 
 #[test]
+fn bounces_are_a_geometric_series() {
+    let camera = Camera::looking_at("ray", DVec3::ZERO, DVec3::new(0.3, 0.5, -0.5), DVec3::Z, 1.0);
+    for wall in [material(Surface::Lambert, COLOUR), plain(COLOUR)] {
+        let lit = furnace_of(&wall, &[]);
+        let (mut expected, mut term) = (DVec3::ZERO, EMITTED);
+        for max_bounces in 0..6 {
+            expected += term;
+            term *= COLOUR.as_dvec3();
+            let judge = Judge::new(&lit, max_bounces);
+            assert_total("radiance", &judge.image(&camera, 1, 1, 10_000, 3).pixels[0], expected);
+            let at_wall = judge.irradiance_at(&[(DVec3::Z * -0.5, DVec3::Z)], 10_000, 4)[0];
+            assert_total("irradiance", &at_wall, PI * expected);
+        }
+    }
+    // A thin pane scatters nothing.
+    let meshes = vec![square(0.0, 1.0, true, 0), square(-1.0, 1.0, true, 1)];
+    let lit = scene_of(meshes, vec![layered(COLOUR, &clear(0.0, 1.5)), lamp_of(Vec3::ONE)], vec![]);
+    let camera = Camera::looking_at("down", DVec3::Z, DVec3::ZERO, DVec3::Y, 1e-9);
+    let seen = Judge::new(&lit, 0).image(&camera, 1, 1, 10_000, 3).pixels[0];
+    assert_total("pane", &seen, 0.96 * COLOUR.as_dvec3());
+    assert_eq!(seen.mean.direct, seen.mean.total());
+}
+
+#[test]
 fn a_lamp_is_seen_in_a_mirror_and_lights_through_it() {
-    let materials = || vec![material(Surface::Mirror, COLOUR), lamp(Vec3::new(1.0, 2.0, 3.0))];
+    let materials = || vec![material(Surface::Mirror, COLOUR), lamp_of(Vec3::new(1.0, 2.0, 3.0))];
     let lit = scene_of(vec![square(0.0, 5.0, true, 0), square(2.0, 1.0, false, 1)], materials(), vec![]);
     let seen = radiance(&lit, DVec3::new(3.0, 0.0, 2.0), DVec3::new(1.5, 0.1, 0.0), 2);
     assert_total("lamp", &seen, COLOUR.as_dvec3() * EMITTED);
     assert_eq!(seen.mean.specular, seen.mean.total());
 
     for law in [EmissionLaw::Cosine, EmissionLaw::Uniform] {
-        let lit = scene_of(vec![square(0.0, 5.0, true, 0)], materials(), vec![disc(1.0, -DVec3::Z, law)]);
+        // It lies in the very plane of a black ceiling.
+        let lit = scene_of(
+            vec![square(0.0, 5.0, true, 0), square(1.0, 5.0, false, 2)],
+            [materials(), vec![matt(0.0)]].concat(),
+            vec![disc(1.0, -DVec3::Z, law)],
+        );
+        assert_total("direct", &irradiance(&lit, DVec3::ZERO, DVec3::Z, 20_000), disc_irradiance(1.0, law));
         // From below its lamp a receiver sees the lamp's image only, as far below the mirror.
         let estimate = irradiance(&lit, DVec3::Z * 0.5, -DVec3::Z, 200_000);
         assert_total("image", &estimate, COLOUR.as_dvec3() * disc_irradiance(1.5, law));
@@ -223,20 +270,6 @@ fn a_lamp_is_seen_in_a_mirror_and_lights_through_it() {
         assert_total("disc", &radiance(&lit, DVec3::Z * 0.5, DVec3::Z, 2), DVec3::ZERO);
         assert_total("mirrored disc", &radiance(&lit, DVec3::Z * 0.5, DVec3::X * 0.01, 2), DVec3::ZERO);
     }
-}
-
-#[test]
-fn discs_in_walls_shine_into_the_room() {
-    // The mirror is the floor, the disc lies in the very plane of the ceiling.
-    let lit = scene_of(
-        vec![square(0.0, 5.0, true, 0), square(1.0, 5.0, false, 1)],
-        vec![material(Surface::Mirror, COLOUR), material(Surface::Lambert, Vec3::ZERO)],
-        vec![disc(1.0, -DVec3::Z, EmissionLaw::Cosine)],
-    );
-    let up = irradiance(&lit, DVec3::ZERO, DVec3::Z, 20_000);
-    assert_total("direct", &up, disc_irradiance(1.0, EmissionLaw::Cosine));
-    let down = irradiance(&lit, DVec3::Z * 0.5, -DVec3::Z, 200_000);
-    assert_total("mirrored", &down, COLOUR.as_dvec3() * disc_irradiance(1.5, EmissionLaw::Cosine));
 }
 
 #[test]
@@ -258,29 +291,10 @@ fn fresnel_meets_its_special_values() {
 }
 
 #[test]
-fn glass_transmits_what_it_does_not_reflect() {
-    let glass = material(Surface::Dielectric { ior: 1.5 }, Vec3::ONE);
-    let slab = || faces(DVec3::new(5.0, 5.0, 0.1), false, [0; 6]);
-    let mut meshes = slab();
-    meshes.push(square(-1.0, 5.0, true, 1));
-    let lit = scene_of(meshes, vec![glass.clone(), lamp(Vec3::ONE)], vec![]);
-    let (eye, target) = (DVec3::new(0.3, 0.2, 3.0), DVec3::new(0.3, 0.2, 0.0));
-    let transmitted = 0.96 * 0.96 / (1.0 - 0.04 * 0.04);
-    let seen = radiance(&lit, eye, target, 20_000);
-    assert_total("slab", &seen, DVec3::splat(transmitted));
-    assert_eq!(seen.mean.specular, seen.mean.total());
-
-    // Nothing is lost: under an even sky glass is invisible, and inside radiance is n^2 times as high.
-    let lit = scene_of(slab(), vec![glass], vec![environment()]);
-    assert_total("slant", &radiance(&lit, eye, DVec3::new(1.0, 0.5, 0.0), 20_000), SKY);
-    assert_total("inside", &radiance(&lit, DVec3::ZERO, DVec3::Z, 20_000), 2.25 * SKY);
-}
-
-#[test]
 fn refraction_obeys_snell() {
     // A lamp no wider than a pencil at the bottom of a pool, seen where Snell's law says.
     let water = material(Surface::Dielectric { ior: 1.25 }, Vec3::ONE);
-    let lit = scene_of(vec![square(0.0, 5.0, true, 0), square(-1.0, 0.01, true, 1)], vec![water, lamp(Vec3::ONE)], vec![]);
+    let lit = scene_of(vec![square(0.0, 5.0, true, 0), square(-1.0, 0.01, true, 1)], vec![water, lamp_of(Vec3::ONE)], vec![]);
     let eye_at = |sine: f64| {
         let surface = DVec3::X * (sine / 1.25 / (1.0 - (sine / 1.25).powi(2)).sqrt());
         (surface + DVec3::new(sine, 0.0, (1.0 - sine * sine).sqrt()), surface)
@@ -309,7 +323,7 @@ fn lobes_weigh_the_light_of_a_point() {
         (Surface::Glossy { exponent: 10.0 }, 12.0 / (2.0 * PI) * cosine.powi(10)),
         (Surface::Mirror, 0.0),
     ] {
-        let lit = scene_of(vec![square(0.0, 1.0, true, 0)], vec![material(surface, COLOUR)], vec![bulb.clone()]);
+        let lit = plate_under(material(surface, COLOUR), bulb.clone());
         let seen = radiance(&lit, 3.0 * eye, DVec3::ZERO, 2);
         // The picture is a little wider than a ray.
         assert_meets("lobe", seen.mean.total(), DVec3::splat(1e-8), expected * arriving);
@@ -319,32 +333,27 @@ fn lobes_weigh_the_light_of_a_point() {
 /// Behind a pane of index 1 the sky is seen as it is, but no light sampling reaches it.
 #[test]
 fn sampling_lobes_and_sampling_lights_agree() {
-    let pane = || material(Surface::Dielectric { ior: 1.0 }, Vec3::ONE);
+    let open_and_closed = |surface, eye, samples| {
+        let open = plate_under(material(surface, COLOUR), environment());
+        let mut closed = open.clone();
+        closed.meshes.extend(faces(DVec3::splat(2.0), false, [1; 6]));
+        closed.materials.push(material(Surface::Dielectric { ior: 1.0 }, Vec3::ONE));
+        [open, closed].map(|scene| radiance(&scene, eye, DVec3::ZERO, samples))
+    };
     for (surface, weight) in [
         (Surface::Lambert, 1.0),
         (Surface::PaperPhong { exponent: 3.0 }, 2.0 / 5.0),
         (Surface::Glossy { exponent: 0.0 }, 1.0),
         (Surface::Glossy { exponent: 30.0 }, 1.0),
     ] {
-        let mut meshes = vec![square(0.0, 1.0, true, 0)];
         let expected = weight * COLOUR.as_dvec3() * SKY;
-        let open = scene_of(meshes.clone(), vec![material(surface, COLOUR)], vec![environment()]);
-        let sampled_light = radiance(&open, DVec3::Z * 0.5, DVec3::ZERO, 40_000);
-        assert_meets("light", sampled_light.mean.direct, sampled_light.standard_error.direct, expected);
-        assert_eq!(sampled_light.mean.direct, sampled_light.mean.total());
-        meshes.extend(faces(DVec3::splat(2.0), false, [1; 6]));
-        let closed = scene_of(meshes, vec![material(surface, COLOUR), pane()], vec![environment()]);
-        let sampled_lobe = radiance(&closed, DVec3::Z * 0.5, DVec3::ZERO, 40_000);
-        assert_meets("lobe", sampled_lobe.mean.caustic, sampled_lobe.standard_error.caustic, expected);
-        assert_eq!(sampled_lobe.mean.caustic, sampled_lobe.mean.total());
+        let [of_lights, of_lobes] = open_and_closed(surface, DVec3::Z * 0.5, 40_000);
+        assert_total("light", &of_lights, expected);
+        assert_total("lobe", &of_lobes, expected);
+        assert_eq!((of_lights.mean.direct, of_lobes.mean.caustic), (of_lights.mean.total(), of_lobes.mean.total()));
     }
     // At a slant part of a lobe lies below the surface.
-    let glossy = material(Surface::Glossy { exponent: 5.0 }, COLOUR);
-    let mut meshes = vec![square(0.0, 1.0, true, 0)];
-    let eye = DVec3::new(0.9, 0.0, 0.2);
-    let open = radiance(&scene_of(meshes.clone(), vec![glossy.clone()], vec![environment()]), eye, DVec3::ZERO, 100_000);
-    meshes.extend(faces(DVec3::splat(2.0), false, [1; 6]));
-    let closed = radiance(&scene_of(meshes, vec![glossy, pane()], vec![environment()]), eye, DVec3::ZERO, 100_000);
+    let [open, closed] = open_and_closed(Surface::Glossy { exponent: 5.0 }, DVec3::new(0.9, 0.0, 0.2), 100_000);
     let noise = (open.total_standard_error.powf(2.0) + closed.total_standard_error.powf(2.0)).map(f64::sqrt);
     assert_meets("slant", open.mean.total(), noise, closed.mean.total());
     assert!(open.mean.total().cmplt(0.9 * COLOUR.as_dvec3() * SKY).all());
@@ -352,45 +361,32 @@ fn sampling_lobes_and_sampling_lights_agree() {
 
 #[test]
 fn textures_shade_lamps_and_walls() {
-    let texture = Texture {
-        name: "ramp".into(),
-        width: 2,
-        height: 1,
-        texels: vec![Vec3::ZERO, Vec3::ONE].into(),
-        wrap: [Wrap::Clamp; 2],
-        filter: Default::default(),
-    };
+    let ramp = || texture_of(2, vec![Vec3::ZERO, Vec3::ONE].into());
     let textured = Some(TextureUse::of(0, 0));
     let plain = |material| scene_of(vec![square(0.0, 1.0, true, 0)], vec![material], vec![]);
-    let mut lit = plain(Material { emission_texture: textured, ..lamp(Vec3::new(1.0, 2.0, 3.0)) });
-    lit.textures.push(texture.clone());
+    let mut lit = plain(Material { emission_texture: textured, ..lamp_of(Vec3::new(1.0, 2.0, 3.0)) });
+    lit.textures.push(ramp());
     for (x, share) in [(-0.75, 0.0), (0.0, 0.5), (0.75, 1.0)] {
         let seen = radiance(&lit, DVec3::new(x, 0.3, 1.0), DVec3::new(x, 0.3, 0.0), 2);
         assert_meets("lamp", seen.mean.total(), DVec3::splat(1e-8), share * EMITTED);
     }
     // A ramp and its mirror image make a plain lamp, so that on the axis each gives half.
-    let whole = irradiance(&plain(lamp(Vec3::new(1.0, 2.0, 3.0))), DVec3::Z, -DVec3::Z, 100_000);
+    let whole = irradiance(&plain(lamp_of(Vec3::new(1.0, 2.0, 3.0))), DVec3::Z, -DVec3::Z, 100_000);
     let form_factor = 4.0 / (2f64.sqrt() * PI) * (1.0 / 2f64.sqrt()).atan();
     assert_total("plain lamp", &whole, PI * form_factor * EMITTED);
     assert_total("ramp", &irradiance(&lit, DVec3::Z, -DVec3::Z, 100_000), 0.5 * PI * form_factor * EMITTED);
 
+    // A wall with the same ramp, and one whose vertices are dark at one side.
     let wall = Material { base_colour_texture: textured, ..material(Surface::Lambert, COLOUR) };
-    let mut wall = scene_of(vec![square(0.0, 1.0, true, 0)], vec![wall], vec![environment()]);
-    wall.textures.push(texture);
-    for (x, share) in [(-0.75, 0.0), (0.0, 0.5), (0.75, 1.0)] {
-        let seen = radiance(&wall, DVec3::new(x, 0.3, 1.0), DVec3::new(x, 0.3, 0.0), 20);
-        assert_meets("wall", seen.mean.total(), DVec3::splat(1e-8), share * COLOUR.as_dvec3() * SKY);
-    }
-}
-
-#[test]
-fn vertex_colours_shade_walls() {
-    let mut wall = scene_of(vec![square(0.0, 1.0, true, 0)], vec![material(Surface::Lambert, COLOUR)], vec![environment()]);
-    // Dark at one side, where x is least.
-    wall.meshes[0].colours = wall.meshes[0].positions.iter().map(|at| DVec3::splat(at.x * 0.5 + 0.5)).collect();
-    for (x, share) in [(-0.75, 0.125), (0.0, 0.5), (0.75, 0.875)] {
-        let seen = radiance(&wall, DVec3::new(x, 0.3, 1.0), DVec3::new(x, 0.3, 0.0), 20);
-        assert_meets("wall", seen.mean.total(), DVec3::splat(1e-6), share * COLOUR.as_dvec3() * SKY);
+    let mut of_texture = plate_under(wall, environment());
+    of_texture.textures.push(ramp());
+    let mut of_vertices = plate_under(material(Surface::Lambert, COLOUR), environment());
+    of_vertices.meshes[0].colours = of_vertices.meshes[0].positions.iter().map(|at| DVec3::splat(at.x * 0.5 + 0.5)).collect();
+    for (wall, error, dark) in [(of_texture, 1e-8, 0.0), (of_vertices, 1e-6, 0.125)] {
+        for (x, share) in [(-0.75, dark), (0.0, 0.5), (0.75, 1.0 - dark)] {
+            let seen = radiance(&wall, DVec3::new(x, 0.3, 1.0), DVec3::new(x, 0.3, 0.0), 20);
+            assert_meets("wall", seen.mean.total(), DVec3::splat(error), share * COLOUR.as_dvec3() * SKY);
+        }
     }
 }
 
@@ -401,14 +397,14 @@ fn shading_normals_bend_reflections() {
     let mut mirror = square(0.0, 1.0, true, 0);
     mirror.normals = vec![DVec3::new(sin, 0.0, cos); 4];
     let side = Mesh::parallelogram("lamp", DVec3::new(2.0, -0.1, 1.9), DVec3::Z * 0.2, DVec3::Y * 0.2, 1);
-    let lit = scene_of(vec![mirror, side], vec![material(Surface::Mirror, COLOUR), lamp(Vec3::ONE)], vec![]);
+    let lit = scene_of(vec![mirror, side], vec![material(Surface::Mirror, COLOUR), lamp_of(Vec3::ONE)], vec![]);
     assert_total("lamp", &radiance(&lit, DVec3::Z, DVec3::ZERO, 2), COLOUR.as_dvec3());
 }
 
 #[test]
 fn pictures_stand_upright() {
     let top_left = Mesh::parallelogram("lamp", DVec3::new(-1.0, 0.0, 0.0), DVec3::X, DVec3::Y, 0);
-    let lit = scene_of(vec![top_left], vec![lamp(Vec3::ONE)], vec![]);
+    let lit = scene_of(vec![top_left], vec![lamp_of(Vec3::ONE)], vec![]);
     let camera = Camera::looking_at("front", DVec3::Z, DVec3::ZERO, DVec3::Y, PI / 2.0);
     let Image { width, height, pixels } = Judge::new(&lit, 0).image(&camera, 2, 2, 50, 1);
     assert_eq!((width, height, pixels.len()), (2, 2, 4));
@@ -429,11 +425,9 @@ fn results_depend_on_the_seed_and_not_on_threads() {
     let one = picture(&scene, 7, 1);
     assert_eq!(one, picture(&scene, 7, 2));
     assert_ne!(one, picture(&scene, 8, 2));
-    let sum = |part: fn(&Estimate) -> DVec3| one.pixels.iter().map(part).sum::<DVec3>();
-    let parts = [sum(|p| p.mean.direct), sum(|p| p.mean.specular), sum(|p| p.mean.caustic), sum(|p| p.mean.indirect)];
+    let parts = Part::EACH.map(|part| one.pixels.iter().map(|pixel| pixel.mean[part]).sum::<DVec3>());
     assert!(parts.iter().all(|part| part.min_element() > 0.0), "{parts:?}");
-    let total = sum(|p| p.mean.total());
-    assert_meets("total", parts.iter().sum(), DVec3::ZERO, total);
+    assert_meets("total", parts.iter().sum(), DVec3::ZERO, one.pixels.iter().map(|pixel| pixel.mean.total()).sum());
     // A single sample, too, has nothing but its parts.
     let camera = &scene.cameras[0];
     let judge = Judge::new(&scene, 10);
@@ -454,7 +448,7 @@ fn standard_errors_are_what_means_scatter_by() {
 
     // Parts of a sample depend on each other: a lamp in front of a mirror under as bright a sky.
     let half = Mesh::parallelogram("lamp", DVec3::new(-1.0, -1.0, 0.5), DVec3::X, 2.0 * DVec3::Y, 0);
-    let materials = vec![lamp(Vec3::ONE), material(Surface::Mirror, Vec3::ONE)];
+    let materials = vec![lamp_of(Vec3::ONE), material(Surface::Mirror, Vec3::ONE)];
     let lit = scene_of(vec![half, square(0.0, 1.0, true, 1)], materials, vec![LightKind::Environment { radiance: Vec3::ONE }]);
     let camera = Camera::looking_at("down", DVec3::Z, DVec3::ZERO, DVec3::Y, 0.5);
     let estimate = Judge::new(&lit, NO_LIMIT).image(&camera, 1, 1, 10_000, 1).pixels[0];
@@ -506,7 +500,7 @@ fn solid(roughness: f32, ior: f32, transmittance: Vec3) -> Layers {
 
 /// A plate under nothing but this light, seen at this cosine.
 fn plate(material: Material, light: LightKind, cosine: f64, samples: u32) -> Estimate {
-    let lit = scene_of(vec![square(0.0, 1.0, true, 0)], vec![material], vec![light]);
+    let lit = plate_under(material, light);
     radiance(&lit, 0.5 * DVec3::new((1.0 - cosine * cosine).sqrt(), 0.0, cosine), DVec3::ZERO, samples)
 }
 
@@ -540,12 +534,15 @@ fn layered_plates_return_their_albedo_of_the_sky() {
 fn lamps_of_all_sizes_light_lobes_of_all_widths() {
     let (wo, emitted) = (DVec3::new(0.6, 0.0, 0.8), DVec3::new(1.0, 2.0, 3.0));
     for roughness in [0.1f32, 0.3, 0.7] {
-        for (half, samples, count) in [(0.02, 20_000, 40), (0.3, 40_000, 400), (2.0, 40_000, 2000)] {
+        for (half, samples, count) in [(0.02, 20_000, 40), (0.3, 40_000, 400), (2.0, 40_000, 1000)] {
             let centre = DVec3::new(-0.75, 0.0, 1.0);
             let corner = centre - DVec3::new(half, half, 0.0);
             let above = Mesh::parallelogram("lamp", corner, 2.0 * half * DVec3::Y, 2.0 * half * DVec3::X, 1);
-            let lit =
-                scene_of(vec![square(0.0, 0.1, true, 0), above], vec![layered(COLOUR, &metal(roughness)), lamp(emitted.as_vec3())], vec![]);
+            let lit = scene_of(
+                vec![square(0.0, 0.1, true, 0), above],
+                vec![layered(COLOUR, &metal(roughness)), lamp_of(emitted.as_vec3())],
+                vec![],
+            );
             let seen = radiance(&lit, 0.5 * wo, DVec3::ZERO, samples);
             let alpha = f64::from(roughness) * f64::from(roughness);
             let inputs = lobes::Inputs {
@@ -584,74 +581,6 @@ fn lamps_of_all_sizes_light_lobes_of_all_widths() {
             assert!(noise < 3.0, "roughness {roughness}, lamp {half}: a sample scatters by {noise}");
         }
     }
-}
-
-/// Layered walls, all of which shine alike, and what they scatter in all.
-fn layered_furnace(walls: [Material; 6]) -> Scene {
-    let shining = |material: Material| Material { emission: Vec3::new(1.0, 2.0, 3.0), ..material };
-    scene_of(faces(DVec3::new(1.0, 0.7, 0.5), true, [0, 1, 2, 3, 4, 5]), walls.map(shining).to_vec(), vec![])
-}
-
-#[test]
-fn layered_furnaces_glow_evenly_and_in_the_right_parts() {
-    let (eye, floor) = (DVec3::new(0.2, 0.1, -0.1), DVec3::new(0.3, 0.5, -0.5));
-    let colour = COLOUR.as_dvec3();
-    let expected = EMITTED / (1.0 - colour);
-    let matt = || plain(COLOUR);
-    let all_matt = layered_furnace([(); 6].map(|()| matt()));
-    let seen = radiance(&all_matt, eye, floor, 20_000);
-    assert_total("matt", &seen, expected);
-    assert_meets("direct", seen.mean.direct, seen.standard_error.direct, EMITTED * (1.0 + colour));
-    assert_eq!((seen.mean.specular, seen.mean.caustic), (DVec3::ZERO, DVec3::ZERO));
-    let on_floor = irradiance(&all_matt, floor, DVec3::Z, 20_000);
-    assert_total("irradiance", &on_floor, PI * expected);
-    assert_meets("direct", on_floor.mean.direct, on_floor.standard_error.direct, PI * EMITTED);
-
-    // Metal reflects its base colour along the normal alone: a smooth wall of F0 = F90 comes from an ior of 0.
-    let mirror = || layered(Vec3::ZERO, &Layers { ior: 0.0, specular_colour: COLOUR, specular: 1.0, ..dielectric(0.0) });
-    let mut walls = [(); 6].map(|()| matt());
-    walls[1] = mirror();
-    let shiny = layered_furnace(walls);
-    let seen = radiance(&shiny, eye, floor, 40_000);
-    assert!(seen.mean.caustic.min_element() > 0.01 && seen.mean.indirect.min_element() > 0.01, "{seen:?}");
-    assert_eq!(seen.mean.specular, DVec3::ZERO);
-    let above = radiance(&shiny, eye, DVec3::new(0.3, 0.5, 0.5), 20_000);
-    assert_eq!(above.mean.direct, EMITTED);
-    assert_eq!(above.mean.caustic + above.mean.indirect, DVec3::ZERO);
-    // Rough lobes of the same kinds: what is sharp and what is not.
-    for (roughness, is_sharp) in [(0.499f32, true), (0.5, false)] {
-        let mut walls = [(); 6].map(|()| matt());
-        walls[0] = layered(COLOUR, &metal(roughness));
-        let lit = layered_furnace(walls);
-        let seen = radiance(&lit, eye, floor, 2000).mean;
-        assert_eq!(seen.direct == EMITTED, is_sharp, "{seen:?}");
-        assert_eq!(seen.specular == DVec3::ZERO, !is_sharp, "{seen:?}");
-        assert_eq!(seen.indirect == DVec3::ZERO, is_sharp, "{seen:?}");
-        let from_wall = radiance(&lit, eye, DVec3::new(0.3, 0.7, 0.1), 20_000).mean;
-        assert_eq!(from_wall.caustic == DVec3::ZERO, !is_sharp, "{from_wall:?}");
-    }
-}
-
-#[test]
-fn layered_bounces_are_a_geometric_series() {
-    let lit = layered_furnace([(); 6].map(|()| plain(COLOUR)));
-    let camera = Camera::looking_at("ray", DVec3::ZERO, DVec3::new(0.3, 0.5, -0.5), DVec3::Z, 1.0);
-    let (mut expected, mut term) = (DVec3::ZERO, EMITTED);
-    for max_bounces in 0..5 {
-        expected += term;
-        term *= COLOUR.as_dvec3();
-        assert_total("radiance", &Judge::new(&lit, max_bounces).image(&camera, 1, 1, 10_000, 3).pixels[0], expected);
-    }
-    // A thin pane scatters nothing.
-    let lit = scene_of(
-        vec![square(0.0, 1.0, true, 0), square(-1.0, 1.0, true, 1)],
-        vec![layered(COLOUR, &clear(0.0, 1.5)), lamp(Vec3::ONE)],
-        vec![],
-    );
-    let camera = Camera::looking_at("down", DVec3::Z, DVec3::ZERO, DVec3::Y, 1e-9);
-    let seen = Judge::new(&lit, 0).image(&camera, 1, 1, 10_000, 3).pixels[0];
-    assert_total("pane", &seen, 0.96 * COLOUR.as_dvec3());
-    assert_eq!(seen.mean.direct, seen.mean.total());
 }
 
 #[test]
@@ -694,7 +623,7 @@ fn slab(half_thickness: f64, material: usize) -> Vec<Mesh> {
 fn through(meshes: Vec<Mesh>, materials: Vec<Material>, sine: f64) -> Estimate {
     let mut meshes = meshes;
     meshes.push(square(-3.0, 90.0, true, materials.len()));
-    let materials = materials.into_iter().chain([lamp(Vec3::ONE)]).collect();
+    let materials = materials.into_iter().chain([lamp_of(Vec3::ONE)]).collect();
     let lit = scene_of(meshes, materials, vec![]);
     let direction = DVec3::new(sine, 0.0, (1.0 - sine * sine).sqrt());
     radiance(&lit, DVec3::new(0.3, 0.2, 0.0) + 2.0 * direction, DVec3::new(0.3, 0.2, 0.0), 40_000)
@@ -707,48 +636,34 @@ fn slab_transmits(reflectance: f64, kept: DVec3) -> DVec3 {
 
 #[test]
 fn slabs_of_glass_reflect_and_absorb() {
+    let clear = material(Surface::Dielectric { ior: 1.5 }, Vec3::ONE);
     let transmittance = Vec3::new(1.0, 0.3, 0.05);
+    let tinted = |colour| layered(colour, &solid(0.0, 1.5, transmittance));
     for sine in [0.0, 0.5, 0.9f64] {
-        let inside = (1.0 - (sine / 1.5f64).powi(2)).sqrt();
-        let way = 0.2 / inside;
+        let way = 0.2 / (1.0 - (sine / 1.5f64).powi(2)).sqrt();
         let kept = transmittance.as_dvec3().map(|share| share.powf(way));
         let reflectance = fresnel((1.0 - sine * sine).sqrt(), 1.0, 1.5);
-        let seen = through(slab(0.1, 0), vec![layered(Vec3::ONE, &solid(0.0, 1.5, transmittance))], sine);
-        assert_total(&format!("slab at {sine}"), &seen, slab_transmits(reflectance, kept));
-        assert_eq!(seen.mean.specular, seen.mean.total());
         // The base colour tints at each surface.
-        let tinted = through(slab(0.1, 0), vec![layered(COLOUR, &solid(0.0, 1.5, transmittance))], sine);
         let colour = COLOUR.as_dvec3();
-        let expected = colour * colour * (1.0 - reflectance).powi(2) * kept / (1.0 - (reflectance * kept).powf(2.0));
-        assert_total("tinted", &tinted, expected);
+        for (material, expected) in [
+            (clear.clone(), slab_transmits(reflectance, DVec3::ONE)),
+            (tinted(Vec3::ONE), slab_transmits(reflectance, kept)),
+            (tinted(COLOUR), colour * colour * (1.0 - reflectance).powi(2) * kept / (1.0 - (reflectance * kept).powf(2.0))),
+        ] {
+            let seen = through(slab(0.1, 0), vec![material], sine);
+            assert_total(&format!("slab at {sine}"), &seen, expected);
+            assert_eq!(seen.mean.specular, seen.mean.total());
+        }
     }
     // Glass that is all but smooth, with lobes of its own instead of deltas.
     let rough = through(slab(0.1, 0), vec![layered(Vec3::ONE, &solid(0.03, 1.5, transmittance))], 0.0);
     let expected = slab_transmits(0.04, transmittance.as_dvec3().map(|share| share.powf(0.2)));
     assert_meets("rough", rough.mean.specular, rough.standard_error.specular + 1e-3, expected);
-    // Nothing is lost under an even sky, and inside radiance is n^2 times as high.
-    let lit = scene_of(slab(0.1, 0), vec![layered(Vec3::ONE, &solid(0.0, 1.5, Vec3::ONE))], vec![environment()]);
-    assert_total("slant", &radiance(&lit, DVec3::new(0.3, 0.2, 3.0), DVec3::new(1.0, 0.5, 0.0), 20_000), SKY);
-    assert_total("inside", &radiance(&lit, DVec3::ZERO, DVec3::Z, 20_000), 2.25 * SKY);
-}
-
-#[test]
-fn layered_glass_is_the_glass_of_old() {
-    let ball = |material: Material| {
-        let mut lit = scene_of(vec![Mesh::sphere("ball", DVec3::ZERO, 0.5, 24, 0)], vec![material], vec![environment()]);
-        lit.meshes.push(square(-0.6, 3.0, true, 1));
-        lit.materials.push(Material::lambert("floor", COLOUR));
-        let camera = Camera::looking_at("ball", DVec3::new(1.0, 0.5, 2.0), DVec3::ZERO, DVec3::Z, 0.6);
-        let image = Judge::new(&lit, 24).image(&camera, 4, 4, 4000, 1);
-        image.pixels
-    };
-    let old = ball(material(Surface::Dielectric { ior: 1.5 }, Vec3::ONE));
-    let new = ball(layered(Vec3::ONE, &solid(0.0, 1.5, Vec3::ONE)));
-    for (old, new) in old.iter().zip(&new) {
-        for part in Part::EACH {
-            let noise = (old.standard_error[part].powf(2.0) + new.standard_error[part].powf(2.0)).map(f64::sqrt);
-            assert_meets(&format!("{part:?}"), new.mean[part], noise, old.mean[part]);
-        }
+    // Nothing is lost: under an even sky glass is invisible, and inside radiance is n^2 times as high.
+    for material in [clear, layered(Vec3::ONE, &solid(0.0, 1.5, Vec3::ONE))] {
+        let lit = scene_of(slab(0.1, 0), vec![material], vec![environment()]);
+        assert_total("slant", &radiance(&lit, DVec3::new(0.3, 0.2, 3.0), DVec3::new(1.0, 0.5, 0.0), 20_000), SKY);
+        assert_total("inside", &radiance(&lit, DVec3::ZERO, DVec3::Z, 20_000), 2.25 * SKY);
     }
 }
 
@@ -793,7 +708,7 @@ fn eyes_and_receivers_know_what_they_are_in() {
     let mut meshes = faces(DVec3::splat(2.0), false, [0; 6]);
     meshes.push(square(-1.0, 0.5, true, 2));
     let glass = |transmittance| layered(Vec3::ONE, &solid(0.0, 1.5, transmittance));
-    let materials = vec![glass(tinted), glass(Vec3::ONE), lamp(Vec3::ONE)];
+    let materials = vec![glass(tinted), glass(Vec3::ONE), lamp_of(Vec3::ONE)];
     let lit = scene_of(meshes.clone(), materials.clone(), vec![]);
     assert_total("one", &radiance(&lit, DVec3::ZERO, -DVec3::Z, 2), kept(1.0));
     meshes.extend(faces(DVec3::splat(0.25), false, [1; 6]));
@@ -815,9 +730,9 @@ fn alpha_covers_its_share() {
     let sheet = |coverage: Coverage| Material { coverage, two_sided: true, ..plain(Vec3::ZERO) };
     let stack = |coverage, count: u32| {
         let sheets = (0..count).map(|index| square(0.5 + 0.1 * f64::from(index), 5.0, index % 2 == 0, 0));
-        let mut lit = scene_of(sheets.collect(), vec![sheet(coverage), lamp(Vec3::new(1.0, 2.0, 3.0))], vec![]);
+        let mut lit = scene_of(sheets.collect(), vec![sheet(coverage), lamp_of(Vec3::new(1.0, 2.0, 3.0))], vec![]);
         lit.meshes.push(square(-1.0, 5.0, true, 1));
-        lit.lights.push(light(LightKind::Directional { direction: -DVec3::Z, irradiance: Vec3::new(1.0, 2.0, 3.0) }));
+        lit.lights.push(lamp(LightKind::Directional { direction: -DVec3::Z, irradiance: Vec3::new(1.0, 2.0, 3.0) }));
         lit
     };
     for count in [1, 3, 6] {
@@ -837,8 +752,7 @@ fn alpha_covers_its_share() {
     }
     // Factors, textures and vertices multiply.
     let mut lit = stack(Coverage::Blend { alpha: 0.8 }, 1);
-    let texels = Texels::Srgb(vec![[255, 255, 255, 51]]);
-    lit.textures.push(Texture { name: "alpha".into(), width: 1, height: 1, texels, wrap: [Wrap::Repeat; 2], filter: Default::default() });
+    lit.textures.push(texture_of(1, Texels::Srgb(vec![[255, 255, 255, 51]])));
     lit.materials[0].base_colour_texture = Some(TextureUse::of(0, 0));
     lit.meshes[0].alphas = vec![0.5; 4];
     assert_total("all", &irradiance(&lit, DVec3::ZERO, DVec3::Z, 2), (1.0 - 0.8f32 as f64 * 0.2 * 0.5) * EMITTED);
@@ -862,7 +776,7 @@ fn backs_are_not_there_for_the_eye_alone() {
     assert_total("receiver", &irradiance(&lit, -DVec3::Z, DVec3::Z, 200), DVec3::ZERO);
     let mut lit =
         scene_of(vec![square(0.0, 500.0, true, 0), square(-1.0, 5.0, true, 1)], vec![one_sided, layered(Vec3::ONE, &metal(0.0))], vec![]);
-    lit.lights.push(light(sky));
+    lit.lights.push(lamp(sky));
     assert_total("mirrored", &radiance(&lit, DVec3::Z * -0.5, -DVec3::Z, 2), SKY);
     // The same for a lobe that is sampled by lamps and by itself: white metal loses nothing at such a roughness.
     lit.materials[1].layers.roughness = 0.1;
@@ -900,19 +814,8 @@ fn unlit_surfaces_are_seen_and_light_nothing() {
     assert_eq!(irradiance(&with(metal(1.0), vec![sun]), DVec3::Z * 0.5, DVec3::Z, 2).mean.total(), DVec3::ZERO);
 }
 
-fn light(kind: LightKind) -> Light {
-    Light { name: "light".into(), kind }
-}
-
 fn texture(texel: [u8; 4]) -> Texture {
-    Texture {
-        name: "one".into(),
-        width: 1,
-        height: 1,
-        texels: Texels::Linear(vec![texel]),
-        wrap: [Wrap::Repeat; 2],
-        filter: Default::default(),
-    }
+    texture_of(1, Texels::Linear(vec![texel]))
 }
 
 #[test]
@@ -960,7 +863,7 @@ fn normal_maps_turn_the_light() {
         let (u, v) = (0.02 * wi).any_orthonormal_pair();
         let (u, v) = (u.normalize() * 0.02, v.normalize() * 0.02);
         let lamp_mesh = Mesh::parallelogram("lamp", 0.5 * wi - 0.5 * (u + v), u, v, 1);
-        let mut lit = scene_of(vec![mesh, lamp_mesh], vec![plate, Material { two_sided: true, ..lamp(Vec3::ONE) }], vec![]);
+        let mut lit = scene_of(vec![mesh, lamp_mesh], vec![plate, Material { two_sided: true, ..lamp_of(Vec3::ONE) }], vec![]);
         lit.textures.push(texture(code));
         let expected = 0.04 + 0.96 * (1.0 - n.z).powi(5);
         let eye = if coat_map { DVec3::Z } else { DVec3::Z * 0.4 };
@@ -976,43 +879,22 @@ fn normal_maps_turn_the_light() {
 fn textures_of_layers_have_their_channels() {
     // 51, 102 and 153 are 0.2, 0.4 and 0.6 of 255. A texture is the same as factors; channels that do not count are 255.
     type SetTexture = fn(&mut Layers, Option<TextureUse>);
-    type Case = (&'static str, [u8; 4], SetTexture, fn(&mut Layers));
-    let cases: [Case; 10] = [
-        (
-            "roughness",
-            [255, 102, 255, 255],
-            |layers, texture| layers.metallic_roughness_texture = texture,
-            |layers| layers.roughness *= 0.4,
-        ),
-        ("metalness", [255, 255, 51, 255], |layers, texture| layers.metallic_roughness_texture = texture, |layers| layers.metallic *= 0.2),
-        ("specular", [255, 255, 255, 51], |layers, texture| layers.specular_texture = texture, |layers| layers.specular *= 0.2),
-        (
-            "specular colour",
-            [51, 102, 153, 255],
-            |layers, texture| layers.specular_colour_texture = texture,
-            |layers| layers.specular_colour *= Vec3::new(0.2, 0.4, 0.6),
-        ),
-        ("transmission", [51, 255, 255, 255], |layers, texture| layers.transmission_texture = texture, |layers| layers.transmission *= 0.2),
-        ("coat", [51, 255, 255, 255], |layers, texture| layers.coat_texture = texture, |layers| layers.coat *= 0.2),
-        (
-            "coat roughness",
-            [255, 102, 255, 255],
-            |layers, texture| layers.coat_roughness_texture = texture,
-            |layers| layers.coat_roughness *= 0.4,
-        ),
-        (
-            "sheen",
-            [51, 102, 153, 255],
-            |layers, texture| layers.sheen_colour_texture = texture,
-            |layers| layers.sheen_colour *= Vec3::new(0.2, 0.4, 0.6),
-        ),
-        (
-            "sheen roughness",
-            [255, 255, 255, 102],
-            |layers, texture| layers.sheen_roughness_texture = texture,
-            |layers| layers.sheen_roughness *= 0.4,
-        ),
-        ("none", [255; 4], |_, _| {}, |_| {}),
+    type Scale = fn(&mut Layers);
+    macro_rules! cases {
+        ($([$($texel:expr),*] of $texture:ident is $factor:ident * $share:expr,)*) => {
+            [$((stringify!($texture), [$($texel),*], |of, map| of.$texture = map, |of| of.$factor *= $share)),*]
+        };
+    }
+    let cases: [(&str, [u8; 4], SetTexture, Scale); 9] = cases![
+        [255, 102, 255, 255] of metallic_roughness_texture is roughness * 0.4,
+        [255, 255, 51, 255] of metallic_roughness_texture is metallic * 0.2,
+        [255, 255, 255, 51] of specular_texture is specular * 0.2,
+        [51, 102, 153, 255] of specular_colour_texture is specular_colour * Vec3::new(0.2, 0.4, 0.6),
+        [51, 255, 255, 255] of transmission_texture is transmission * 0.2,
+        [51, 255, 255, 255] of coat_texture is coat * 0.2,
+        [255, 102, 255, 255] of coat_roughness_texture is coat_roughness * 0.4,
+        [51, 102, 153, 255] of sheen_colour_texture is sheen_colour * Vec3::new(0.2, 0.4, 0.6),
+        [255, 255, 255, 102] of sheen_roughness_texture is sheen_roughness * 0.4,
     ];
     let all = Layers {
         metallic: 0.5,
@@ -1039,6 +921,6 @@ fn textures_of_layers_have_their_channels() {
         // The same random numbers make the same paths.
         let (by_texture, by_factor) = (seen(textured, texel), seen(scaled, texel));
         assert_meets(what, by_texture, 1e-5 * by_factor, by_factor);
-        assert_eq!((by_factor - plain).abs().max_element() < 1e-3, what == "none", "{what} changes nothing: {plain}, {by_factor}");
+        assert!((by_factor - plain).abs().max_element() >= 1e-3, "{what} changes nothing: {plain}, {by_factor}");
     }
 }

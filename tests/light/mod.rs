@@ -17,4 +17,3 @@ pub mod random_rooms;
 pub mod skies;
 pub mod strangers_scenes;
 pub mod transport;
-pub mod walls;

@@ -1,16 +1,25 @@
 //! Light from beyond the scene that comes in through a small opening: rays and photons are aimed at it.
 
+use std::sync::Arc;
+
 use crate::common::estimate_check;
 use crate::common::prelude::*;
 use crate::engine::unseen_light::room_without_floor;
+use crate::light::skies::{sky, sunny};
 use glam::dvec3;
 use photonmill::engine::scene::{RunResult, Target, render};
 
-/// A room of 4 x 4 x 3 m under a sky of 1 W/m2/sr that it sees through a square hole in its ceiling; of 80 m2 of walls the hole is 1 %
-/// with a half edge of 0.447 m.
-fn room_under_the_sky(hole: f64) -> Scene {
-    let meshes = [room_without_floor(hole), vec![level(0.0, [4.0, 4.0], true, 0)]].concat();
-    scene_of(meshes, vec![matt(0.5)], vec![LightKind::Environment { radiance: Vec3::ONE }])
+/// Half the edge of the hole, which has 1 % of 80 m2 of walls.
+const HALF: f64 = 0.447;
+
+/// A room of 4 x 4 x 3 m that sees a light from beyond the scene through a square hole in its ceiling.
+pub fn room_under(light: LightKind) -> Scene {
+    let meshes = [room_without_floor(HALF), vec![level(0.0, [4.0, 4.0], true, 0)]].concat();
+    scene_of(meshes, vec![matt(0.5)], vec![light])
+}
+
+fn room_under_an_even_sky() -> Scene {
+    room_under(LightKind::Environment { radiance: Vec3::ONE })
 }
 
 /// Irradiance on the floor below the middle of the hole, at a quarter of it from each side: four corners of a rectangle that is parallel
@@ -36,28 +45,44 @@ fn settings(part: Part, aim: bool) -> SceneSettings {
     SceneSettings { photons: 20_000, rounds: 32, part, aim, ..by_rounds() }
 }
 
-/// The light is what a path tracer finds, and its variance less than a tenth of that of rays and photons that are not aimed.
+/// Skies with and without a sun have one set of kernels.
+pub fn direct(aim: bool) -> SceneSettings {
+    SceneSettings { with: vec![Effect::DirectionalLights], ..settings(Part::Direct, aim) }
+}
+
+fn indirect(aim: bool) -> SceneSettings {
+    settings(Part::Indirect, aim)
+}
+
+/// The light is what a path tracer finds, and its variance less than a tenth of that of rays and photons that are not aimed: under an
+/// even sky, and under a picture with a sun.
 #[test]
 fn a_small_window_lights_a_room_in_a_tenth_of_the_time() {
     let Some(gpu) = device() else { return };
-    let scene = room_under_the_sky(0.447);
-    let judged = Judge::new(&scene, 32).irradiance_at(&points(), 40_000, 1);
-    let scattered = judged.iter().map(|point| point.mean.indirect.x).sum::<f64>() / judged.len() as f64;
-    assert!((scattered / SCATTERED - 1.0).abs() < 0.02, "{scattered}");
-    for part in [Part::Direct, Part::Indirect] {
-        let [aimed, other] = [true, false].map(|aim| lit(&gpu, &scene, &settings(part, aim)));
-        assert_eq!(aimed.plan.trial.as_ref().map(|trial| trial.openings.len()), Some(1), "{part:?}");
-        let [little, much] = [&aimed, &other].map(|lit| lit.film.relative_error());
-        println!("{part:?}: {:.2} % and {:.2} %", 100.0 * little, 100.0 * much);
-        assert!((much / little).powi(2) > 10.0, "{part:?}: {little} and {much}");
-        for (point, judged) in judged.iter().enumerate() {
-            let (found, error) = red(&aimed, point);
-            let (expected, judges_error) = match part {
-                Part::Direct => (judged.mean.direct.x, judged.standard_error.direct.x),
-                _ => (judged.mean.indirect.x, judged.standard_error.indirect.x),
-            };
-            assert!(judges_error < 0.1 * expected, "{part:?}, point {point}: {expected} +- {judges_error}");
-            assert_holds(format!("{part:?}, point {point}"), z_check("aimed", found, expected, error.hypot(judges_error)));
+    for (sky, picture) in [("even", sky(4, 2, |_, _| Vec3::ONE)), ("sunny", sunny(32, 300.0))] {
+        let scene = room_under(LightKind::Sky(Arc::new(picture)));
+        let judged = Judge::new(&scene, 32).irradiance_at(&points(), 10_000, 1);
+        let scattered = judged.iter().map(|point| point.mean.indirect.x).sum::<f64>() / judged.len() as f64;
+        assert!(sky == "sunny" || (scattered / SCATTERED - 1.0).abs() < 0.02, "{scattered}");
+        for (part, settings) in [(Part::Direct, direct as fn(bool) -> SceneSettings), (Part::Indirect, indirect)] {
+            let [aimed, other] = [true, false].map(|aim| lit(&gpu, &scene, &settings(aim)));
+            assert_eq!(aimed.plan.trial.as_ref().map(|trial| trial.openings.len()), Some(1), "{sky}, {part:?}");
+            let [little, much] = [&aimed, &other].map(|lit| lit.film.relative_error());
+            println!("{sky}, {part:?}: {:.2} % and {:.2} %", 100.0 * little, 100.0 * much);
+            assert!((much / little).powi(2) > 10.0, "{sky}, {part:?}: {little} and {much}");
+            // Paths seldom meet the sun, so that points together are asked for its light.
+            for together in judged.iter().enumerate().collect::<Vec<_>>().chunks(if sky == "even" { 1 } else { judged.len() }) {
+                let [mut found, mut expected, mut error, mut judges_error] = [0.0; 4];
+                for &(point, judged) in together {
+                    let (mean, own) = red(&aimed, point);
+                    let judges = judged.standard_error[part].x;
+                    (found, expected) = (found + mean, expected + judged.mean[part].x);
+                    (error, judges_error) = (error + own.hypot(judges), judges_error + judges);
+                }
+                let what = format!("{sky}, {part:?}, {:?}", together[0].0);
+                assert!(judges_error < 0.15 * expected, "{what}: {expected} +- {judges_error}");
+                assert_holds(&what, z_check("aimed", found, expected, error));
+            }
         }
     }
 }
@@ -65,9 +90,9 @@ fn a_small_window_lights_a_room_in_a_tenth_of_the_time() {
 /// Direct light below the middle of the hole is that of the closed form, and the light of all points that of the photons of many more
 /// rounds.
 pub fn light_through_a_window(gpu: &Gpu) -> Check<Complaint> {
-    let scene = room_under_the_sky(0.447);
+    let scene = room_under_an_even_sky();
     let direct = lit(gpu, &scene, &SceneSettings { shadow_rays: 64, ..settings(Part::Direct, true) });
-    let ((found, error), exact) = (red(&direct, 7), below_the_hole(0.447, 3.0));
+    let ((found, error), exact) = (red(&direct, 7), below_the_hole(HALF, 3.0));
     assert!(error < 0.02 * found, "{found} +- {error}");
     estimate_check("below the hole", found, exact, error)?;
     let indirect = lit(gpu, &scene, &settings(Part::Indirect, true));
@@ -75,16 +100,10 @@ pub fn light_through_a_window(gpu: &Gpu) -> Check<Complaint> {
     estimate_check("scattered light", mean_red(&indirect), SCATTERED, errors / points().len() as f64)
 }
 
-#[test]
-fn a_sky_through_a_window_is_as_light_as_the_closed_form_says() {
-    let Some(gpu) = device() else { return };
-    assert_holds("the window", light_through_a_window(&gpu));
-}
-
 /// A niche with a hole of its own, three centimetres wide, that one point of two hundred sees beside the window: rays are aimed at the
 /// window, and of the hole's light it is said that it may be missing.
 pub fn second_opening(gpu: &Gpu) -> Check<Complaint> {
-    let mut room = room_under_the_sky(0.447);
+    let mut room = room_under_an_even_sky();
     room.materials[0] = Material { two_sided: true, ..matt(0.0) };
     room.meshes.retain(|mesh| mesh.name != "right");
     let sheet = |origin: DVec3, u: DVec3, v: DVec3| Mesh::parallelogram("sheet", origin, u, v, 0);
@@ -118,14 +137,13 @@ pub fn second_opening(gpu: &Gpu) -> Check<Complaint> {
     Ok(())
 }
 
+/// In a picture it is next to nothing beside the light of all pixels.
 #[test]
-fn a_second_opening_that_few_points_see_is_said_to_be_hidden() {
+#[ignore = "long: ten seconds on a software device"]
+fn a_second_opening_is_next_to_nothing_in_a_picture() {
     let Some(gpu) = device() else { return };
-    assert_holds("a niche", second_opening(&gpu));
-    // In a picture it is next to nothing beside the light of all pixels.
     let eye = Camera::looking_at("eye", dvec3(-1.9, 2.0, -1.9), dvec3(0.5, 0.5, 0.5), DVec3::Y, 1.0);
-    let bright = Scene { materials: vec![matt(0.5)], ..room_under_the_sky(0.447) };
-    let seen = render(&gpu, &bright, &by_rounds(), Target::Picture(&eye, [64, 64])).unwrap();
+    let seen = render(&gpu, &room_under_an_even_sky(), &by_rounds(), Target::Picture(&eye, [64, 64])).unwrap();
     let hidden = seen.film.unknown(0.95).hidden;
     assert!(hidden.of_mean < 0.01, "{hidden:?}");
 }
@@ -134,9 +152,14 @@ fn a_second_opening_that_few_points_see_is_said_to_be_hidden() {
 #[test]
 fn an_open_scene_has_no_openings_and_the_same_bits() {
     let Some(gpu) = device() else { return };
-    let mut scene = scene("sky-over-plane");
-    scene.meshes.push(Mesh::sphere("ball", dvec3(0.0, 0.3, 0.0), 0.2, 16, 0));
-    let [aimed, other] = [true, false].map(|aim| lit(&gpu, &scene, &settings(Part::All, aim)));
-    assert!(aimed.plan.trial.as_ref().is_none_or(|trial| trial.openings.is_empty()));
-    assert_eq!(aimed.film.sums, other.film.sums);
+    let mut scene = room_under(LightKind::Sky(Arc::new(sunny(32, 300.0))));
+    // The floor and one wall.
+    scene.meshes.retain(|mesh| ["level", "right"].contains(&mesh.name.as_str()));
+    assert_eq!(scene.meshes.len(), 2);
+    for settings in [direct, indirect] {
+        let [aimed, other] = [true, false].map(|aim| lit(&gpu, &scene, &SceneSettings { rounds: 4, ..settings(aim) }));
+        assert!(aimed.plan.trial.as_ref().is_none_or(|trial| trial.openings.is_empty()));
+        assert!(aimed.film.sums.iter().any(|sum| *sum > 0));
+        assert_eq!(aimed.film.sums, other.film.sums);
+    }
 }

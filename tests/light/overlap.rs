@@ -1,5 +1,6 @@
 //! Surfaces that lie in one plane, or next to it: their light is that of one, and of each.
 
+use crate::common::known::kept;
 use crate::common::prelude::*;
 use photonmill::constants::HIDDEN;
 use photonmill::scene::material::{Coverage, Layers, Medium};
@@ -55,7 +56,7 @@ fn irradiance(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, points: &[(DVe
 }
 
 fn settings() -> SceneSettings {
-    mapped(20_000, 16, by_rounds().bounces, 0.3)
+    kept(mapped(10_000, 16, by_rounds().bounces, 0.3))
 }
 
 /// Complains where a scene is not lit as another at some points.
@@ -64,7 +65,7 @@ fn compare(gpu: &Gpu, what: &str, scene: &Scene, points: &[(DVec3, DVec3)], expe
     let pairs = points.iter().zip(found.iter().zip(expected));
     pairs
         .filter_map(|((at, _), ((found, error), (expected, other)))| {
-            assert!(*error < 0.03 * expected && *expected > 0.1, "{what}: {found} +- {error} at {at}, {expected} expected");
+            assert!(*error < 0.05 * expected && *expected > 0.1, "{what}: {found} +- {error} at {at}, {expected} expected");
             z_check(&format!("{what}, {at}"), *found, *expected, error.hypot(*other)).err()
         })
         .collect()
@@ -76,14 +77,14 @@ fn a_rug_on_the_floor_is_lit_like_the_floor() {
     let Some(gpu) = device() else { return };
     let expected = irradiance(&gpu, &room(), &settings(), &points(0.0));
     let mut complaints = Vec::new();
-    for (height, cells) in [(0.0, 1), (0.0, 7), (1e-7, 1), (1e-6, 1), (1e-5, 7), (3e-5, 1), (1e-4, 1), (1e-3, 1)] {
-        for is_turned in [false, true] {
-            let mut scene = room();
-            scene.meshes.push(rug(DVec3::ZERO, 2.0, height, cells));
-            let (scene, points) = turned(is_turned, scene, &points(height));
-            let what = format!("{height} m above, {cells} x {cells} cells, turned {is_turned}");
-            complaints.extend(compare(&gpu, &what, &scene, &points, &expected));
-        }
+    let heights = [(0.0, 1), (0.0, 7), (1e-7, 1), (1e-6, 1), (1e-5, 7), (3e-5, 1), (1e-4, 1), (1e-3, 1)];
+    for (k, (height, cells)) in heights.into_iter().enumerate() {
+        let is_turned = k % 2 == 1;
+        let mut scene = room();
+        scene.meshes.push(rug(DVec3::ZERO, 2.0, height, cells));
+        let (scene, points) = turned(is_turned, scene, &points(height));
+        let what = format!("{height} m above, {cells} x {cells} cells, turned {is_turned}");
+        complaints.extend(compare(&gpu, &what, &scene, &points, &expected));
     }
     assert!(complaints.is_empty(), "{}", complaints.join("\n"));
 }
@@ -140,7 +141,7 @@ fn a_lamp_in_the_plane_of_the_ceiling_shines() {
             assert_holds("in the ceiling", z_check("in the ceiling", *found, *expected, error.hypot(*other)));
         }
         let place = |at: DVec3| if is_turned { tilted(at) } else { at };
-        let direct = SceneSettings { rounds: 1, part: Part::Direct, shadow_rays: 1, ..by_rounds() };
+        let direct = kept(SceneSettings { rounds: 1, part: Part::Direct, shadow_rays: 1, ..by_rounds() });
         for eye in [DVec3::new(0.1, 0.3, 0.2), DVec3::new(1.9, 0.4, -1.7), DVec3::new(-1.9, 2.8, 0.3)] {
             let angle = 0.05 / eye.distance(DVec3::Y * 3.0);
             let camera = Camera::looking_at("eye", place(eye), place(DVec3::Y * 3.0), DVec3::X, angle);
@@ -181,7 +182,7 @@ fn sheets_in_one_plane_cover_their_union() {
     closed.materials[0] = matt(0.9);
     closed.meshes.extend([carpet(0.1, 0.2, 2.0, 7), carpet(0.9, 0.0, 1.5, 3)]);
     let (closed, points) = turned(true, closed, &points(0.0)[..1]);
-    let lit = received(&gpu, &closed, &flights(100_000, 8), &points);
+    let lit = received(&gpu, &closed, &kept(flights(50_000, 8)), &points);
     let fates = lit.fates[0].ledger();
     assert!(fates.escaped == 0, "{} photons of {} left the room", fates.escaped, lit.fates[0].emitted);
 }
@@ -230,11 +231,11 @@ fn the_judge_counts_an_overlap_once() {
         strip(-1.0, 1.0, [2.0, 1.0]),
     ]);
     let points = [(DVec3::new(0.5, 0.0, 0.4), DVec3::Y), (DVec3::new(0.2, 3.0, 0.9), DVec3::NEG_Y)];
-    let [found, expected] = [(&scene, 1), (&expected, 2)].map(|(scene, seed)| Judge::new(scene, 8).irradiance_at(&points, 20_000, seed));
+    let [found, expected] = [(&scene, 1), (&expected, 2)].map(|(scene, seed)| Judge::new(scene, 8).irradiance_at(&points, 8000, seed));
     for ((found, expected), (at, _)) in found.iter().zip(&expected).zip(points) {
         let error = found.total_standard_error.x.hypot(expected.total_standard_error.x);
         let [found, expected] = [found.mean.total().x, expected.mean.total().x];
-        assert!(error < 0.03 * expected, "{at}: {error} of {expected}");
+        assert!(error < 0.05 * expected, "{at}: {error} of {expected}");
         assert_holds("judge", z_check(&format!("{at}"), found, expected, error));
     }
 }
@@ -244,7 +245,7 @@ fn the_judge_counts_an_overlap_once() {
 fn short_rays_see_what_counts() {
     let Some(gpu) = device() else { return };
     let lamp = point(DVec3::Y * 2.0);
-    let settings = SceneSettings { photons: 1, rounds: 1, shadow_rays: 1, ..by_rounds() };
+    let settings = kept(SceneSettings { photons: 1, rounds: 1, shadow_rays: 1, ..by_rounds() });
     for (what, lift) in [("on the floor", 0.0), ("above the floor", 3e-6), ("below the floor", -3e-6)] {
         let floor = level(0.0, [10.0; 2], true, 0);
         let mut rug = level(0.0, [2.0; 2], true, 1);

@@ -1,17 +1,16 @@
 //! Lighting scenes of triangles: bits that no split, builder or unused effect may change, parts that add
 //! up, radiometry, leaks, and plans that the device's work is counted against.
 
-use std::collections::HashMap;
-
-use crate::common::known;
 use crate::common::lit::{light, run};
 use crate::common::pairwise::pairwise;
 use crate::common::prelude::*;
 use photonmill::constants::GATHER_SLICE;
-use photonmill::engine::scene::{self, RunResult, View};
+use photonmill::engine::scene::{self, RunResult, Target, View};
+use photonmill::scene::Projection;
 use photonmill::scene::material::{Coverage, Layers, Medium, NormalMap};
 use photonmill::settings::scene::Kernel;
 use photonmill::verify::judge::Verdict;
+use photonmill::verify::selfcheck::Estimate;
 
 const SIZE: u32 = 24;
 
@@ -19,9 +18,18 @@ fn small() -> SceneSettings {
     SceneSettings { photons: 3000, caustic_photons: 3000, rounds: 3, shadow_rays: 2, ..by_rounds() }
 }
 
-pub fn picture(gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> RunResult {
-    let (geometry, plan) = scene_plan(gpu, scene, settings, square_picture(SIZE)).unwrap();
-    light(gpu, &View { geometry: &geometry, camera: Some(&scene.first_camera()), phases: &[] }, plan)
+fn picture(gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> RunResult {
+    picture_of(SIZE, gpu, scene, settings)
+}
+
+fn picture_of(side: u32, gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> RunResult {
+    lit(gpu, scene, settings, Target::Picture(&scene.first_camera(), [side; 2]))
+}
+
+/// A run of a scene without what the settings leave out.
+fn lit(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, target: Target) -> RunResult {
+    let (geometry, plan) = scene_plan(gpu, scene, settings, target.sensor()).unwrap();
+    light(gpu, &View { geometry: &geometry, camera: target.camera(), phases: &target.phases(&geometry) }, plan)
 }
 
 /// Mean and standard error of the irradiance at points, W/m2.
@@ -48,34 +56,33 @@ pub fn appends_agree(gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> Chec
     others.try_for_each(|builder| same_film(builder.name(), &of(builder), &ballot))
 }
 
+/// Nor does a scale by a power of two, for a camera that goes with it.
 #[test]
 fn no_split_and_no_builder_changes_a_bit() {
     let Some(gpu) = device() else { return };
-    let scene = scene("cornell-spheres");
+    let spheres = scene("cornell-spheres");
     let usual = || SceneSettings { samples: 2, ..small() };
-    let reference = picture(&gpu, &scene, &usual());
-    let builders = [
+    let reference = picture(&gpu, &spheres, &usual());
+    for (what, settings) in [
+        ("again", usual()),
         ("ballot builder", SceneSettings { builder: Some(Builder::Ballot), ..usual() }),
         ("chunks of 701", SceneSettings { chunk: Some(701), ..usual() }),
         ("work groups of 32", SceneSettings { group_size: 32, ..usual() }),
-    ];
-    for (what, settings) in builders {
-        assert_holds(what, same_film(what, &picture(&gpu, &scene, &settings), &reference));
+    ] {
+        assert_holds(what, same_film(what, &picture(&gpu, &spheres, &settings), &reference));
     }
-    assert_holds("all builders", appends_agree(&gpu, &scene, &usual()));
-    assert_holds("again", same_film("again", &picture(&gpu, &scene, &usual()), &reference));
-    let other = picture(&gpu, &scene, &SceneSettings { seed: 2, ..usual() });
+    let mut scaled = moved(spheres.clone(), |at| at * 2f64.powi(-20));
+    scaled.cameras[0].eye *= 2f64.powi(-20);
+    assert_holds("scaled", same_film("scaled by 2^-20", &picture(&gpu, &scaled, &usual()), &reference));
+    let other = picture(&gpu, &spheres, &SceneSettings { seed: 2, ..usual() });
     assert_complains("another seed", same_film("another seed", &other, &reference));
+
+    // A device without 64-bit atomics makes its kernels anew: those of a map alone will do.
+    let (room, of_map) = (scene("furnace"), SceneSettings { illumination: Illumination::Photons, ..usual() });
+    let reference = picture(&gpu, &room, &of_map);
     drop(gpu);
-
     let Some(gpu) = device_with(Options { without_int64_atomics: true, ..Options::default() }) else { return };
-    assert_holds("two words", same_film("two words", &picture(&gpu, &scene, &usual()), &reference));
-}
-
-#[test]
-fn crowded_points_miss_no_photon() {
-    let Some(gpu) = device() else { return };
-    assert_holds("crowded points", crowd_check(&gpu));
+    assert_holds("two words", same_film("two words", &picture(&gpu, &room, &of_map), &reference));
 }
 
 /// Points near which more photons lie than an invocation tests: others share them, as small chunks do.
@@ -90,35 +97,30 @@ pub fn crowd_check(gpu: &Gpu) -> Check<Complaint> {
     same_film("crowded points", &whole, &parts)
 }
 
-/// Cameras and lookups take pixels in tiles, which no picture need be a multiple of.
+/// Cameras and lookups take pixels in tiles, which no picture need be a multiple of. Where walls only shine, all pixels are the same to
+/// the bit: none is left out, and none is taken twice.
 #[test]
 fn every_pixel_is_lit_whatever_the_size_of_the_picture() {
     let Some(gpu) = device() else { return };
-    let scene = scene("furnace");
-    for (width, height) in [(1, 1), (3, 2), (8, 4), (13, 7), (21, 9)] {
-        let lit = seen(&gpu, &scene, &small(), &scene.first_camera(), [width, height]);
-        let pixels: Vec<u64> = lit.film.sums.chunks(3).map(|sums| sums[0]).collect();
-        let mean = pixels.iter().sum::<u64>() as f64 / pixels.len() as f64;
-        for (pixel, sum) in pixels.iter().enumerate() {
-            let share = *sum as f64 / mean;
-            assert!((0.4..1.6).contains(&share), "{width} x {height}: pixel {pixel} has {share} of the mean");
+    let furnace = scene("furnace");
+    let mut shining_room = furnace.clone();
+    shining_room.materials.iter_mut().for_each(|material| *material = shining(0.0));
+    let (similar, same) = (0.4..1.6, 1.0 - 1e-12..1.0 + 1e-12);
+    for (room, size, range) in [
+        (&furnace, [1, 1], &similar),
+        (&furnace, [13, 7], &similar),
+        (&furnace, [21, 9], &similar),
+        (&shining_room, [13, 7], &same),
+        (&shining_room, [64, 64], &same),
+        (&shining_room, [5, 67], &same),
+        (&shining_room, [131, 70], &same),
+    ] {
+        let sums = seen(&gpu, room, &small(), &room.first_camera(), size).film.of_blocks.sums;
+        assert_eq!(sums.len() as u32, 3 * size[0] * size[1]);
+        let mean = sums.iter().sum::<u64>() as f64 / sums.len() as f64;
+        for (place, sum) in sums.iter().enumerate() {
+            assert!(range.contains(&(*sum as f64 / mean)), "{size:?}: pixel {} has {sum}, and {mean} is the mean", place / 3);
         }
-    }
-}
-
-/// Where walls only shine, all pixels are the same to the bit: none is left out, and none is taken twice.
-#[test]
-fn every_pixel_of_walls_that_shine_is_the_same() {
-    let Some(gpu) = device() else { return };
-    let mut room = scene("furnace");
-    for material in &mut room.materials {
-        material.base_colour = Vec3::ZERO;
-        material.emission = Vec3::ONE;
-    }
-    for (width, height) in [(1, 1), (13, 7), (64, 64), (67, 9), (5, 67), (131, 70)] {
-        let sums = seen(&gpu, &room, &small(), &room.first_camera(), [width, height]).film.of_blocks.sums;
-        assert_eq!(sums.len() as u32, 3 * width * height);
-        assert!(sums[0] > 0 && sums.iter().all(|sum| *sum == sums[0]), "{width} x {height}");
     }
 }
 
@@ -132,34 +134,42 @@ fn persistent_photons_are_the_same_in_several_dispatches() {
     assert_holds(what, same_film(what, &of(Builder::Persistent), &of(Builder::Ballot)));
 }
 
-/// With the paper's way too, where one map holds everything, and with a final gather.
+/// Parts that are kept apart are each what they are alone, and add up to the whole.
+fn parts_add_up(gpu: &Gpu, settings: &SceneSettings, alone: &[Part]) {
+    let scene = scene("cornell-spheres");
+    let whole = picture(gpu, &scene, settings);
+    let apart = picture(gpu, &scene, &SceneSettings { keeps_parts: true, ..settings.clone() });
+    assert!(apart.film == whole.film && whole.film.parts.is_none(), "parts change the whole");
+    let of_part = |number| (0..whole.film.pixels()).flat_map(|pixel| apart.film.sum_of_part(number, pixel).unwrap()).collect();
+    let kept: [Vec<u64>; 4] = [0, 1, 2, 3].map(of_part);
+    for (place, sum) in whole.film.sums.iter().enumerate() {
+        assert_eq!(*sum, kept.iter().map(|part| part[place]).sum::<u64>(), "sum {place}, {:?}", settings.illumination);
+    }
+    for (number, part) in Part::EACH.into_iter().enumerate() {
+        assert!(kept[number].iter().any(|sum| *sum > 0), "{part:?} light is dark");
+        assert_eq!(kept[number].iter().sum::<u64>(), whole.film.part_totals[number], "total of {part:?} light");
+        if alone.contains(&part) {
+            let found = picture(gpu, &scene, &SceneSettings { part, ..settings.clone() });
+            assert!(kept[number] == found.film.sums, "{part:?} light, {:?}, is not what it is alone", settings.illumination);
+            assert_eq!(found.film.part_totals.iter().sum::<u64>(), whole.film.part_totals[number]);
+        }
+    }
+}
+
+/// With the paper's way too, where one map holds everything, and with a final gather. Each part alone has kernels of its own.
 #[test]
 fn the_four_parts_add_up_to_the_whole_to_the_bit() {
     let Some(gpu) = device() else { return };
-    let scene = scene("cornell-spheres");
-    for settings in [
-        small(),
-        SceneSettings { samples: 4, ..small() },
-        SceneSettings { samples: 4, final_gather: true, ..small() },
-        SceneSettings { illumination: Illumination::Photons, ..small() },
-    ] {
-        let whole = picture(&gpu, &scene, &settings);
-        let apart = picture(&gpu, &scene, &SceneSettings { keeps_parts: true, ..settings.clone() });
-        assert!(apart.film == whole.film && whole.film.parts.is_none(), "parts change the whole");
-        let parts: Vec<RunResult> = Part::EACH.map(|part| picture(&gpu, &scene, &SceneSettings { part, ..settings.clone() })).into();
-        for (sum, place) in whole.film.sums.iter().zip(0..) {
-            let of_parts: u64 = parts.iter().map(|part| part.film.sums[place]).sum();
-            assert_eq!(*sum, of_parts, "sum {place}, {:?}", settings.illumination);
-        }
-        for (number, part) in parts.iter().enumerate() {
-            assert!(part.film.sums.iter().any(|sum| *sum > 0), "part {number} is dark");
-            let own: u64 = part.film.part_totals.iter().sum();
-            assert_eq!(own, whole.film.part_totals[number], "total of part {number}");
-            let pixels = 0..whole.film.pixels();
-            let kept: Vec<u64> = pixels.flat_map(|pixel| apart.film.sum_of_part(number, pixel).unwrap()).collect();
-            assert!(kept == part.film.sums, "part {number} of {:?} is not what it is alone", settings.illumination);
-        }
-    }
+    parts_add_up(&gpu, &SceneSettings { samples: 4, ..small() }, &Part::EACH);
+    parts_add_up(&gpu, &SceneSettings { samples: 4, final_gather: true, ..small() }, &[Part::Indirect]);
+    parts_add_up(&gpu, &SceneSettings { illumination: Illumination::Photons, ..small() }, &[Part::Caustic]);
+}
+
+#[test]
+#[ignore = "long: half a minute on a software device"]
+fn each_part_of_photons_alone_is_what_it_is_beside_others() {
+    let Some(gpu) = device() else { return };
+    parts_add_up(&gpu, &SceneSettings { illumination: Illumination::Photons, ..small() }, &Part::EACH);
 }
 
 /// Effects that a scene does not need change nothing where they are forced on: all of them at once, or each with and without each
@@ -184,17 +194,15 @@ fn unneeded_effects_change_no_bit(gpu: &Gpu, name: &str, each: bool) {
     }
 }
 
-/// Each combination has kernels of its own, and making them is what takes time.
+/// Each combination has kernels of its own, and making them is what takes time. This scene lacks what the other has, and more.
 #[test]
 fn an_effect_that_the_scene_lacks_changes_no_bit() {
     let Some(gpu) = device() else { return };
-    for name in ["cornell", "cornell-spheres"] {
-        unneeded_effects_change_no_bit(&gpu, name, false);
-    }
+    unneeded_effects_change_no_bit(&gpu, "cornell", false);
 }
 
 #[test]
-#[ignore = "minutes on a software device"]
+#[ignore = "long: minutes on a software device"]
 fn pairs_of_effects_that_the_scene_lacks_change_no_bit() {
     let Some(gpu) = device() else { return };
     for name in ["cornell", "cornell-spheres"] {
@@ -202,155 +210,189 @@ fn pairs_of_effects_that_the_scene_lacks_change_no_bit() {
     }
 }
 
-/// A scene in which every effect shows but those of layered materials.
-fn rich_scene() -> Scene {
-    let mut scene = scene("cornell-spheres");
-    scene.materials[0].surface = Surface::Glossy { exponent: 20.0 };
-    scene.materials[1].two_sided = true;
-    scene.materials.push(Material {
-        base_colour_texture: Some(TextureUse::of(0, 0)),
-        two_sided: true,
-        ..Material::lambert("tiles", Vec3::ONE)
-    });
-    let texels = vec![Vec3::splat(0.9), Vec3::splat(0.05), Vec3::splat(0.05), Vec3::splat(0.9)];
-    let wrap = [Wrap::Repeat; 2];
-    scene.textures.push(Texture { name: "tiles".into(), width: 2, height: 2, texels: texels.into(), wrap, filter: Default::default() });
-    let tiles = scene.materials.len() - 1;
-    scene.meshes[2].material = tiles;
-    scene.meshes[3].colours = [0.0, 0.3, 0.6, 0.1].map(DVec3::splat).to_vec();
-    // Coarse enough for its smooth normals to matter.
-    let mirror = scene.meshes.iter_mut().find(|mesh| mesh.name == "mirror sphere").unwrap();
-    *mirror = Mesh::sphere("mirror sphere", DVec3::new(0.3, 0.19, 0.34), 0.18, 10, mirror.material);
-    // Turned away from the camera: only its second side is seen.
-    scene.meshes.push(Mesh::parallelogram("screen", DVec3::new(0.4, 0.5, 0.6), DVec3::Y * 0.3, DVec3::X * 0.3, tiles));
-    scene.lights = every_kind_of_light(1.0, 2.0, EmissionLaw::Cosine);
-    scene
-}
-
-/// Plates before the camera in a box, each with something that no other has.
-fn layered_scene() -> Scene {
-    let mut scene = scene("cornell");
-    let plastic = Layers { metallic: 0.0, roughness: 0.7, ..Layers::default() };
-    let bump = Texels::Linear(vec![[230, 128, 190, 255]]);
-    scene.textures.push(Texture {
-        name: "bump".into(),
-        width: 1,
-        height: 1,
-        texels: bump,
-        wrap: [Wrap::Repeat; 2],
-        filter: Default::default(),
-    });
-    let map = NormalMap { texture: TextureUse::of(scene.textures.len() - 1, 0), scale: 1.0 };
-    let glass = Layers {
-        roughness: 0.0,
-        transmission: 1.0,
-        ior: 1.0,
-        medium: Some(Medium { transmittance: Vec3::splat(1e-3), metres: 1.0 }),
-        ..plastic
+/// Plates of 1 m in rows of five before a wall and under a sun: each shows an effect, and a pixel sees it alone.
+fn plates() -> (Scene, Vec<Effect>) {
+    let texture = |name: &str, texel| {
+        let (texels, wrap) = (Texels::Linear(vec![texel]), [Wrap::Repeat; 2]);
+        Texture { name: name.into(), width: 1, height: 1, texels, wrap, filter: Default::default() }
     };
-    let grey = |layers| Material::layered("plate", Vec3::splat(0.6), layers);
-    let materials = [
+    let map = NormalMap { texture: TextureUse::of(1, 0), scale: 1.0 };
+    let plastic = Layers { metallic: 0.0, roughness: 0.7, ..Layers::default() };
+    let pane = Layers { roughness: 0.0, transmission: 1.0, ior: 1.0, ..plastic };
+    let layered = |albedo: f32, layers| Material::layered("plate", Vec3::splat(albedo), layers);
+    let plates = [
+        (Effect::Glossy, Material { surface: Surface::Glossy { exponent: 20.0 }, ..matt(0.5) }),
+        (Effect::Textures, Material { base_colour_texture: Some(TextureUse::of(0, 0)), ..matt(1.0) }),
+        (Effect::VertexColours, matt(0.5)),
+        (Effect::TwoSided, Material { two_sided: true, ..matt(0.5) }),
+        (Effect::SmoothNormals, matt(0.5)),
         // Over black: what coat and sheen reflect is about what they take from a surface under them.
-        Material::layered("plate", Vec3::ZERO, Layers { coat: 1.0, coat_roughness: 0.6, specular: 0.0, ..plastic }),
-        Material::layered("plate", Vec3::ZERO, Layers { sheen_colour: Vec3::ONE, sheen_roughness: 0.6, specular: 0.0, ..plastic }),
-        Material { coverage: Coverage::Blend { alpha: 0.3 }, ..grey(plastic) },
-        Material { normal_map: Some(map), ..grey(plastic) },
-        grey(glass),
-        grey(Layers { diffuse_transmission: 1.0, specular: 0.0, ..plastic }),
-        Material::layered("plate", Vec3::ZERO, Layers { iridescence: 1.0, film_ior: 2.0, film_thickness: [0.0, 300.0], ..plastic }),
-        Material::layered("plate", Vec3::ONE, Layers { metallic: 1.0, anisotropy: 1.0, ..plastic }),
-        grey(Layers { ior: 1.5, dispersion: 20.0, medium: Some(Medium::CLEAR), ..glass }),
+        (Effect::ClearCoat, layered(0.0, Layers { coat: 1.0, coat_roughness: 0.6, specular: 0.0, ..plastic })),
+        (Effect::Sheen, layered(0.0, Layers { sheen_colour: Vec3::ONE, sheen_roughness: 0.6, specular: 0.0, ..plastic })),
+        (Effect::Alpha, Material { coverage: Coverage::Blend { alpha: 0.3 }, ..layered(0.6, plastic) }),
+        (Effect::NormalMaps, Material { normal_map: Some(map), ..layered(0.6, plastic) }),
+        (Effect::DiffuseTransmission, layered(0.6, Layers { diffuse_transmission: 1.0, specular: 0.0, ..plastic })),
+        (Effect::Iridescence, layered(0.0, Layers { iridescence: 1.0, film_ior: 2.0, film_thickness: [0.0, 300.0], ..plastic })),
+        (Effect::Anisotropy, layered(1.0, Layers { metallic: 1.0, anisotropy: 1.0, ..plastic })),
+        (Effect::Transmission, layered(0.6, pane)),
+        (Effect::Media, layered(0.6, Layers { medium: Some(Medium { transmittance: Vec3::splat(1e-3), metres: 1.0 }), ..pane })),
+        (Effect::Dispersion, layered(0.6, Layers { ior: 1.5, dispersion: 20.0, medium: Some(Medium::CLEAR), ..pane })),
+        (Effect::SpecularChains, mirror(0.9)),
+        (Effect::Layers, layered(0.6, Layers { metallic: 1.0, ..plastic })),
+        (Effect::Direct, matt(0.5)),
     ];
-    for (place, material) in materials.into_iter().enumerate() {
-        // A large wedge, where colours part.
-        let is_wedge = material.layers.dispersion > 0.0;
-        let (size, tilt) = if is_wedge { (0.42, DVec3::Z * 0.15) } else { (0.15, DVec3::ZERO) };
-        let y = if is_wedge { 0.2 } else { 0.7 - 0.2 * (place / 5) as f64 };
-        let corner = DVec3::new(0.08 + 0.17 * (place % 5) as f64, y, 0.6);
+    let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
+    // The wall ends behind the middle of the wedge, so that colours which this parts go different ways.
+    let wall = Mesh::parallelogram("wall", DVec3::new(-3.0, -3.0, -1.0), 5.0 * x, 6.0 * y, 0);
+    let below_the_mirror = Mesh::parallelogram("floor", DVec3::new(-2.6, -2.5, -0.5), 2.0 * z, 1.2 * x, 1);
+    let unlit = layered(1.0, Layers { is_unlit: true, ..Layers::default() });
+    let mut scene = scene_of(vec![wall, below_the_mirror], vec![unlit, matt(1.0)], vec![sun(DVec3::new(0.0, -0.6, -0.8))]);
+    scene.textures = vec![texture("grey", [80, 80, 80, 255]), texture("bump", [230, 128, 190, 255])];
+    for (place, (effect, material)) in plates.iter().enumerate() {
         let number = scene.materials.len();
-        let plate = Mesh::parallelogram("plate", corner, DVec3::X * size, DVec3::Y * size, number);
-        let behind = Mesh::parallelogram("plate", corner - DVec3::Z * 0.3, DVec3::Y * size, DVec3::X * size + tilt, number);
-        let tangents = vec![[DVec4::new(1.0, 0.0, 0.0, 1.0); 3]; 2];
-        scene.meshes.push(Mesh { tangents: if material.tangent_coordinates().is_some() { tangents } else { Vec::new() }, ..plate });
-        // The back of the slab.
-        scene.meshes.extend(material.enclosed_medium().map(|_| behind));
-        scene.materials.push(material);
+        let corner = DVec3::new((place % 5) as f64 - 2.5, 1.0 - (place / 5) as f64, 0.0);
+        let (u, v) = match effect {
+            Effect::TwoSided => (y, x),
+            // It leans towards the eye.
+            Effect::SpecularChains => (x, y + z),
+            _ => (x, y),
+        };
+        let mut plate = Mesh::parallelogram("plate", corner, u, v, number);
+        match effect {
+            Effect::VertexColours => plate.colours = vec![DVec3::splat(0.3); 4],
+            Effect::SmoothNormals => plate.normals = vec![DVec3::new(0.0, 0.6, 0.8); 4],
+            Effect::NormalMaps | Effect::Anisotropy => plate.tangents = vec![[x.extend(1.0); 3]; 2],
+            Effect::Media => scene.meshes.push(Mesh::parallelogram("back", corner - 0.3 * z, y, x, number)),
+            Effect::Dispersion => scene.meshes.push(Mesh::parallelogram("back", corner - 0.6 * z, y, x + 0.5 * z, number)),
+            _ => {}
+        }
+        scene.meshes.push(plate);
+        scene.materials.push(material.clone());
     }
-    scene
+    (scene, plates.iter().map(|(effect, _)| *effect).collect())
 }
 
-/// The part of a picture in which an effect shows by itself. A part needs fewer kernels than all light, and the same error has less
-/// light to hide in.
-fn part_that_shows(effect: Effect) -> Part {
-    match effect {
-        Effect::ReflectiveCaustics | Effect::RefractiveCaustics => Part::Caustic,
-        // The sky is not seen from the camera but in the mirror.
-        Effect::SpecularChains
-        | Effect::SmoothNormals
-        | Effect::Environment
-        | Effect::Transmission
-        | Effect::Media
-        | Effect::Dispersion => Part::Specular,
-        Effect::Indirect => Part::Indirect,
-        _ => Part::Direct,
+/// Red mean of all pixels.
+fn estimate(lit: &RunResult) -> Estimate {
+    let squares: f64 = standard_errors(lit).iter().map(|error| error.x.powi(2)).sum();
+    Estimate { mean: mean_red(lit), standard_error: squares.sqrt() / lit.film.pixels() as f64 }
+}
+
+/// Whether an estimate differs by more than both errors and two per cent of what it was.
+fn differs(before: &RunResult, after: &RunResult, place: usize) -> bool {
+    let errors = before.film.standard_error(place) + after.film.standard_error(place);
+    let allowed = 4.0 * errors + 0.02 * before.film.mean(place).max_element();
+    (before.film.mean(place) - after.film.mean(place)).abs().cmpgt(allowed).any()
+}
+
+/// A run without some effects more, which its plan says that the scene needs.
+fn without(effects: &[Effect], settings: &SceneSettings, run: impl Fn(&SceneSettings) -> RunResult) -> RunResult {
+    let found = run(&SceneSettings { without: [effects, &settings.without].concat(), ..settings.clone() });
+    let missing: HashSet<Effect> = found.plan.missing().into_iter().collect();
+    assert_eq!(missing, found.plan.settings.without.iter().copied().collect());
+    found
+}
+
+/// Each plate is another without its effect, and a plain one as before.
+fn plates_are_missed(gpu: &Gpu, groups: &[&[Effect]]) {
+    let (scene, effects) = plates();
+    let eye = Camera::looking_at("eye", 2.0 * DVec3::Z, DVec3::ZERO, DVec3::Y, 1.0);
+    let eye = Camera { projection: Projection::Orthographic { half_height: 2.0 }, ..eye };
+    // What photons bring is missed elsewhere.
+    let no_photons = vec![Effect::Indirect, Effect::ReflectiveCaustics, Effect::RefractiveCaustics];
+    let settings = SceneSettings { samples: 64, rounds: 128, without: no_photons, ..small() };
+    let run = |settings: &SceneSettings| lit(gpu, &scene, settings, Target::Picture(&eye, [5, 4]));
+    let reference = run(&settings);
+    for group in groups {
+        let without = without(group, &settings, run);
+        for (place, effect) in effects.iter().enumerate().filter(|(_, effect)| group.contains(effect) || **effect == Effect::Direct) {
+            println!("{effect:?}, without {group:?}: {} and {}", reference.film.mean(place), without.film.mean(place));
+            assert_eq!(differs(&reference, &without, place), group.contains(effect), "{effect:?}, without {group:?}");
+        }
     }
 }
 
-/// Each way to leave out an effect has kernels of its own: scenes with all of them would make these large.
+/// Points that are lit by a kind of light each are dark without it, and not without others.
+fn lights_are_missed(gpu: &Gpu, groups: &[&[Effect]]) {
+    let (above, down) = (|x: f64| DVec3::new(x, 1.0, 0.0), DVec3::NEG_Y);
+    let [intensity, power] = [400.0, 200.0].map(Vec3::splat);
+    let lamp = Mesh::parallelogram("lamp", DVec3::new(11.75, 1.0, -0.25), DVec3::X * 0.5, DVec3::Z * 0.5, 0);
+    let lights = vec![
+        LightKind::Point { position: above(0.0), intensity: 0.25 * intensity },
+        LightKind::Spot { position: above(4.0), direction: down, intensity, inner_angle: 0.3, outer_angle: 0.4 },
+        LightKind::Disc { centre: above(8.0), normal: down, radius: 0.1, power, law: EmissionLaw::Cosine },
+        LightKind::Directional { direction: DVec3::NEG_X, irradiance: Vec3::splat(10.0) },
+        LightKind::Environment { radiance: Vec3::ONE },
+    ];
+    // Rays choose the sun and the sky by the size of the scene.
+    let floor = Mesh::parallelogram("floor", DVec3::new(-1.0, -0.5, -1.0), DVec3::Z * 2.0, DVec3::X * 15.0, 1);
+    let shining = Material { emission: Vec3::splat(100.0), ..matt(0.0) };
+    let scene = scene_of(vec![lamp, floor], vec![shining, matt(0.0)], lights);
+    let below = |x: f64| (DVec3::X * x, DVec3::Y);
+    let points = [
+        (Effect::PointLights, below(0.0)),
+        (Effect::SpotLights, below(4.0)),
+        (Effect::DiscLights, below(8.0)),
+        (Effect::MeshLights, below(12.0)),
+        // Over the bulb nothing else comes from the side.
+        (Effect::DirectionalLights, (4.0 * DVec3::Y, DVec3::X)),
+        (Effect::Environment, (4.0 * DVec3::Y, DVec3::NEG_X)),
+    ];
+    let settings = SceneSettings { part: Part::Direct, shadow_rays: 64, rounds: 64, ..small() };
+    let places = points.map(|(_, point)| point);
+    let run = |settings: &SceneSettings| lit(gpu, &scene, settings, Target::Points(&places));
+    let reference = run(&settings);
+    for group in groups {
+        let without = without(group, &settings, run);
+        for (place, (effect, _)) in points.iter().enumerate() {
+            let [before, after] = [&reference, &without].map(|lit| red(lit, place).0);
+            println!("{effect:?}, without {group:?}: {before} and {after}");
+            assert_eq!(after < 0.5 * before, group.contains(effect), "{effect:?}, without {group:?}: {before} and {after}");
+        }
+    }
+}
+
+/// Each way to leave out effects has kernels of its own, so that many are left out at once: of a group none takes part in what shows
+/// another, but layers in most.
 #[test]
 fn an_effect_that_the_scene_needs_is_missed_when_it_is_left_out() {
+    use Effect::*;
     let Some(gpu) = device() else { return };
-    let (of_layers, others): (Vec<Effect>, Vec<Effect>) = Effect::ALL.into_iter().partition(|effect| OF_LAYERS.contains(effect));
-    effects_are_missed(&gpu, &rich_scene(), &others);
-    effects_are_missed(&gpu, &layered_scene(), &of_layers);
+    let surfaces: [&[Effect]; 4] = [
+        &[Glossy, Textures, VertexColours, TwoSided, SmoothNormals, ClearCoat, Sheen, Iridescence, Transmission],
+        &[Alpha, NormalMaps, DiffuseTransmission, Anisotropy, Media, Dispersion],
+        &[SpecularChains, Layers],
+        &[Direct],
+    ];
+    let lights: [&[Effect]; 2] = [&[MeshLights, PointLights, SpotLights], &[DirectionalLights, DiscLights, Environment]];
+    let of_photons = [(Part::Indirect, Indirect), (Part::Caustic, ReflectiveCaustics), (Part::Caustic, RefractiveCaustics)];
+    let all = surfaces.concat().into_iter().chain(lights.concat()).chain(of_photons.map(|(_, effect)| effect)).chain([Bvh]);
+    assert_eq!(all.collect::<HashSet<_>>(), Effect::ALL.into_iter().collect());
+    plates_are_missed(&gpu, &surfaces);
+    lights_are_missed(&gpu, &lights);
+
+    let spheres = scene("cornell-spheres");
+    for (part, effect) in of_photons {
+        let settings = SceneSettings { part, rounds: 24, caustic_photons: 60_000, ..small() };
+        let run = |settings: &SceneSettings| picture(&gpu, &spheres, settings);
+        let (before, after) = (run(&settings), without(&[effect], &settings, run));
+        // Over the whole picture, or somewhere.
+        let of_all = same_light(effect.name(), estimate(&after), estimate(&before)).is_err();
+        assert!(of_all || (0..before.film.pixels()).any(|place| differs(&before, &after, place)), "{}", effect.name());
+    }
+    // So many triangles cannot be a list; of few the bits are the same, as the test above shows.
+    let no_tree = SceneSettings { without: vec![Bvh], ..small() };
+    let refused = scene_plan(&gpu, &spheres, &no_tree, square_picture(SIZE)).unwrap_err().to_string();
+    assert!(refused.starts_with("--without bvh"), "{refused}");
 }
 
-const OF_LAYERS: [Effect; 11] = [
-    Effect::Layers,
-    Effect::Transmission,
-    Effect::DiffuseTransmission,
-    Effect::Iridescence,
-    Effect::Anisotropy,
-    Effect::Media,
-    Effect::Dispersion,
-    Effect::ClearCoat,
-    Effect::Sheen,
-    Effect::NormalMaps,
-    Effect::Alpha,
-];
-
-fn effects_are_missed(gpu: &Gpu, scene: &Scene, effects: &[Effect]) {
-    let settings = SceneSettings { rounds: 12, ..small() };
-    let (_, whole) = scene_plan(gpu, scene, &settings, square_picture(SIZE)).unwrap();
-    // Direct light flies no photons, so that rounds of it are cheap, and a spot lights few pixels.
-    let of = |part| SceneSettings { part, rounds: if part == Part::Direct { 96 } else { 12 }, ..settings.clone() };
-    let mut references = HashMap::new();
-    for &effect in effects {
-        let decision = whole.decisions.iter().find(|decision| decision.effect == effect).unwrap();
-        assert!(decision.needed && decision.kept, "{}: {}", effect.name(), decision.evidence);
-        if effect == Effect::Bvh {
-            // So many triangles cannot be a list; of few the bits are the same, as the test above shows.
-            let settings = SceneSettings { without: vec![effect], ..settings.clone() };
-            assert!(scene_plan(gpu, scene, &settings, whole.sensor).unwrap_err().to_string().starts_with("--without bvh"));
-            continue;
-        }
-        let part = part_that_shows(effect);
-        let reference = references.entry(part as u32).or_insert_with(|| picture(gpu, scene, &of(part)));
-        let without = picture(gpu, scene, &SceneSettings { without: vec![effect], ..of(part) });
-        assert_eq!(without.plan.missing(), [effect]);
-        // Somewhere, or over the whole picture, the two differ by more than their errors.
-        let (mut worst, mut sum, mut variance) = (0.0f64, 0.0, 0.0);
-        for pixel in 0..reference.film.pixels() {
-            let difference = reference.film.mean(pixel) - without.film.mean(pixel);
-            let error = reference.film.standard_error(pixel) + without.film.standard_error(pixel);
-            worst = worst.max((difference.abs() / error.max(DVec3::splat(1e-9))).max_element());
-            sum += difference.element_sum();
-            variance += error.length_squared();
-        }
-        let whole = sum.abs() / variance.sqrt();
-        println!("without {}: {worst:.2} and {whole:.2} errors apart", effect.name());
-        assert!(worst > 3.0 || whole > 3.0, "without {}: {worst:.2} and {whole:.2} errors apart", effect.name());
-    }
+#[test]
+#[ignore = "long: two minutes on a software device"]
+fn each_effect_that_the_scene_needs_is_missed_by_itself() {
+    use Effect::*;
+    let Some(gpu) = device() else { return };
+    plates_are_missed(&gpu, &plates().1.chunks(1).collect::<Vec<_>>());
+    lights_are_missed(&gpu, &[&[PointLights], &[SpotLights], &[DiscLights], &[MeshLights], &[DirectionalLights], &[Environment]]);
 }
 
 /// Passes, buffers and pipelines are those of the plan.
@@ -378,34 +420,11 @@ fn what_is_dropped_is_not_there() {
     assert!(needed.plan.bytes <= all.plan.bytes && direct.plan.bytes < needed.plan.bytes);
     // Of pipelines only those of the plan, each made once.
     let fresh = fresh_device().unwrap();
-    let before = fresh.pipeline_count();
+    let before = fresh.work().pipelines;
     let lit = picture(&fresh, &cornell, &SceneSettings { part: Part::Direct, ..small() });
     assert_eq!(lit.pipelines, scene::modules(&lit.plan, fresh.facts()).len());
-    assert_eq!(fresh.pipeline_count() - before, lit.pipelines);
+    assert_eq!(fresh.work().pipelines - before, lit.pipelines);
     assert_eq!(lit.pipelines, 2);
-}
-
-/// Scaled and moved by powers of two, and seen by a camera that goes with it, a scene is the same picture.
-#[test]
-fn scaling_by_a_power_of_two_changes_no_bit() {
-    let Some(gpu) = device() else { return };
-    let reference = picture(&gpu, &scene("cornell-spheres"), &small());
-    for k in [-20, 13] {
-        let factor = 2f64.powi(k);
-        let mut scaled = scene("cornell-spheres");
-        scaled.meshes.iter_mut().flat_map(|mesh| &mut mesh.positions).for_each(|position| *position *= factor);
-        scaled.cameras.iter_mut().for_each(|camera| camera.eye *= factor);
-        let found = picture(&gpu, &scaled, &small());
-        assert_holds(k, same_film(&format!("scaled by 2^{k}"), &found, &reference));
-    }
-}
-
-#[test]
-fn no_number_of_samples_changes_the_light() {
-    let Some(gpu) = device() else { return };
-    for (samples, final_gather) in [(1, false), (4, false), (16, false), (4, true)] {
-        assert_holds("a furnace with glass", known::glass_in_a_furnace(&gpu, samples, final_gather));
-    }
 }
 
 /// Samples of a pixel are strata of it, of the lamps and of what glass mirrors: noise falls faster than by their number.
@@ -414,10 +433,11 @@ fn samples_of_a_pixel_leave_little_noise() {
     let Some(gpu) = device() else { return };
     let error = |samples, shadow_rays, rounds| {
         let settings = SceneSettings { part: Part::Direct, samples, shadow_rays, rounds, ..small() };
-        let lit = picture(&gpu, &scene("cornell"), &settings);
-        lit.film.relative_error()
+        let lit = picture(&gpu, &scene("cornell-spheres"), &settings);
+        (lit.film.relative_error(), estimate(&lit))
     };
-    let (by_chance, even) = (error(1, 1, 64), error(16, 1, 4));
+    let ((by_chance, light), (even, same)) = (error(1, 1, 64), error(16, 1, 4));
+    assert_holds("samples", same_light("samples", same, light));
     println!("64 paths a pixel: {:.2} % of error by rounds, {:.2} % by samples", 100.0 * by_chance, 100.0 * even);
     assert!(2.0 * even < by_chance, "{even} and {by_chance}");
 }
@@ -432,20 +452,15 @@ fn a_furnace_is_equally_bright_everywhere() {
         (DVec3::new(0.0, 0.37, 0.998), DVec3::X),
         (DVec3::new(0.31, 0.44, 0.52), DVec3::new(0.6, 0.0, 0.8)),
     ];
-    let settings = SceneSettings { rounds: 40, photons: 20_000, bounces: 200, ..by_rounds() };
-    for kernel in [Kernel::Box, Kernel::Cone, Kernel::Epanechnikov] {
-        for illumination in [Illumination::Split, Illumination::Photons] {
-            let settings = SceneSettings { kernel, illumination, ..settings.clone() };
-            let exact = PI / (1.0 - 0.5);
-            let found = irradiance(&gpu, &scene("furnace"), &settings, &points);
-            for ((point, _), (mean, error)) in pairs(&points, &found) {
-                let what = format!("{kernel:?}, {illumination:?}, {point}");
-                assert!(error.x < 0.1 * exact, "{what}: error {error}");
-                assert_holds(&what, z_check("irradiance", mean.x, exact, error.x));
-            }
-        }
+    let settings = SceneSettings { rounds: 32, photons: 20_000, bounces: 200, ..by_rounds() };
+    let settings = SceneSettings { kernel: Kernel::Cone, illumination: Illumination::Photons, ..settings };
+    let exact = PI / (1.0 - 0.5);
+    let found = irradiance(&gpu, &scene("furnace"), &settings, &points);
+    for ((point, _), (mean, error)) in pairs(&points, &found) {
+        assert!(error.x < 0.1 * exact, "{point}: error {error}");
+        assert_holds(point, z_check("irradiance", mean.x, exact, error.x));
     }
-    let uncorrected = SceneSettings { edge_correction: false, illumination: Illumination::Photons, ..settings };
+    let uncorrected = SceneSettings { edge_correction: false, ..settings };
     let edge = irradiance(&gpu, &scene("furnace"), &uncorrected, &points)[1];
     assert_complains("an edge without correction", z_check("edge", edge.0.x, PI / 0.5, edge.1.x));
 }
@@ -462,7 +477,7 @@ fn radiance_and_irradiance_of_a_wall_agree() {
     let settings = SceneSettings { rounds: 60, photons: 4000, shadow_rays: 8, ..by_rounds() };
     for final_gather in [false, true] {
         let settings = SceneSettings { final_gather, ..settings.clone() };
-        let lit = seen(&gpu, &scene, &settings, &scene.cameras[0], [1, 1]);
+        let lit = picture_of(1, &gpu, &scene, &settings);
         let (radiance, radiance_error) = (lit.film.mean(0), lit.film.standard_error(0));
         let other = SceneSettings { seed: 9, ..settings };
         let (irradiance, irradiance_error) = irradiance(&gpu, &scene, &other, &[(target, DVec3::Z)])[0];
@@ -476,40 +491,6 @@ fn radiance_and_irradiance_of_a_wall_agree() {
             assert_complains("twice the irradiance", doubled);
         }
     }
-}
-
-/// A dark room beside a lit one, a thin wall of two sides between: no light comes through, whatever the
-/// radius.
-#[test]
-fn no_light_leaks_through_thin_walls() {
-    let Some(gpu) = device() else { return };
-    let mut scene = scene("furnace");
-    scene.materials = vec![matt(0.7), Material { emission: Vec3::splat(10.0), ..matt(0.5) }];
-    let (y, z) = (DVec3::Y, DVec3::Z);
-    // The wall is a fiftieth of the radius thick and faces both rooms.
-    scene.meshes.push(Mesh::parallelogram("thin, lit side", DVec3::X * 0.5, z, y, 0));
-    scene.meshes.push(Mesh::parallelogram("thin, dark side", DVec3::X * 0.502, y, z, 0));
-    scene.meshes.push(Mesh::parallelogram("lamp", DVec3::new(0.1, 0.9, 0.3), DVec3::X * 0.2, z * 0.2, 1));
-    let settings = SceneSettings { radius: Some(0.1), photons: 20_000, rounds: 6, ..by_rounds() };
-    let lit_side = (DVec3::new(0.5, 0.5, 0.5), DVec3::NEG_X);
-    let dark = [
-        (DVec3::new(0.502, 0.5, 0.5), DVec3::X),
-        (DVec3::new(0.51, 0.0, 0.5), DVec3::Y),
-        (DVec3::new(0.75, 0.0, 0.5), DVec3::Y),
-        (DVec3::new(1.0, 0.5, 0.5), DVec3::NEG_X),
-    ];
-    let points: Vec<_> = std::iter::once(lit_side).chain(dark).collect();
-    let found = irradiance(&gpu, &scene, &settings, &points);
-    assert!(found[0].0.x > 0.1, "the lit side has {}", found[0].0);
-    for ((point, _), (mean, _)) in pairs(&points, &found).skip(1) {
-        assert_eq!(*mean, DVec3::ZERO, "{point}");
-    }
-}
-
-#[test]
-fn no_light_leaks_from_one_shelf_to_the_next() {
-    let Some(gpu) = device() else { return };
-    assert_holds("the shelf", known::shelf(&gpu));
 }
 
 /// The radii of Knaus and Zwicker's schedule, and their mean over a million passes where it is known.
@@ -540,12 +521,12 @@ fn a_scene_without_light_is_black_and_costs_no_photon() {
     assert_eq!(lit.fates[0].emitted, 0);
 }
 
-/// The stated error is that of many runs: the spread of means over seeds, pixel by pixel.
+/// The stated error is that of many runs: the spread of means over seeds, pixel by pixel. A tenth more or less is noticed.
 #[test]
 fn stated_errors_are_the_spread_over_seeds() {
     let Some(gpu) = device() else { return };
     let scene = scene("cornell");
-    let runs: Vec<RunResult> = (0..120).map(|seed| picture(&gpu, &scene, &SceneSettings { seed, rounds: 8, ..small() })).collect();
+    let runs: Vec<RunResult> = (0..60).map(|seed| picture(&gpu, &scene, &SceneSettings { seed, rounds: 8, ..small() })).collect();
     let pixels = runs[0].film.pixels();
     let (mut stated, mut spread) = (0.0, 0.0);
     for pixel in 0..pixels {
@@ -558,25 +539,33 @@ fn stated_errors_are_the_spread_over_seeds() {
     assert!((0.9..1.1).contains(&ratio), "stated errors are {ratio} of the spread");
 }
 
-/// Pictures against the path tracer, within what both state.
+/// Pictures of so many pixels a side against the path tracer, within what both state. Paths from the eye seldom find caustics, and of few
+/// samples do not know how seldom.
+fn agrees_with_the_judge(gpu: &Gpu, scene: &Scene, side: u32, [photons, rounds]: [u32; 2], samples: u32) {
+    let settings = SceneSettings { photons, caustic_photons: photons, rounds, ..by_rounds() };
+    let lit = picture_of(side, gpu, scene, &settings);
+    let judged = Judge::new(scene, settings.bounces).image(&scene.first_camera(), side, side, samples, 77);
+    let verdict = |share: f64| {
+        let means: Vec<DVec3> = lit.film.means().map(|mean| share * mean).collect();
+        Verdict::new(&means, &standard_errors(&lit), rounds, &judged, None)
+    };
+    assert!(verdict(1.0).agrees(), "{}: {}", scene.name, verdict(1.0));
+    assert!(!verdict(1.3).agrees(), "{}, a third brighter, is not noticed", scene.name);
+}
+
 #[test]
 fn pictures_agree_with_the_judge() {
     let Some(gpu) = device() else { return };
-    for (name, photons, rounds, samples) in [
-        ("cornell", 5000, 48, 192),
-        ("open-box-phong", 5000, 48, 192),
-        // Paths from the eye seldom find caustics, and of few samples do not know how seldom.
-        ("cornell-spheres", 10_000, 64, 1536),
-        ("caustic-sphere", 20_000, 64, 768),
-    ] {
-        let scene = scene(name);
-        let settings = SceneSettings { photons, caustic_photons: photons, rounds, ..by_rounds() };
-        let lit = picture(&gpu, &scene, &settings);
-        let judged = Judge::new(&scene, settings.bounces).image(&scene.first_camera(), SIZE, SIZE, samples, 77);
-        let (means, errors) = (means(&lit), standard_errors(&lit));
-        let verdict = Verdict::new(&means, &errors, rounds, &judged, None);
-        assert!(verdict.agrees(), "{name}: {verdict}");
-        let brighter: Vec<DVec3> = means.iter().map(|mean| 1.3 * *mean).collect();
-        assert!(!Verdict::new(&brighter, &errors, rounds, &judged, None).agrees(), "{name}, a third brighter, is not noticed");
-    }
+    agrees_with_the_judge(&gpu, &scene("open-box-phong"), 12, [5000, 48], 192);
+    agrees_with_the_judge(&gpu, &scene("cornell-spheres"), 12, [10_000, 64], 1536);
+}
+
+#[test]
+#[ignore = "long: half a minute on a software device"]
+fn larger_pictures_agree_with_the_judge() {
+    let Some(gpu) = device() else { return };
+    agrees_with_the_judge(&gpu, &scene("cornell"), SIZE, [5000, 48], 192);
+    agrees_with_the_judge(&gpu, &scene("open-box-phong"), SIZE, [5000, 48], 192);
+    agrees_with_the_judge(&gpu, &scene("cornell-spheres"), SIZE, [10_000, 64], 1536);
+    agrees_with_the_judge(&gpu, &scene("caustic-sphere"), SIZE, [20_000, 64], 768);
 }

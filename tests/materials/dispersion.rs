@@ -2,10 +2,9 @@
 //! photons.
 
 use crate::common::estimate_check;
+use crate::common::layered::without_maps;
 use crate::common::prelude::*;
-use photonmill::engine::scene::{self, Target};
 use photonmill::scene::material::{Layers, Medium};
-use photonmill::verify::judge::Verdict;
 
 /// Of glass with an Abbe number of 5, which no real one has: effects are large.
 const IOR: f32 = 1.6;
@@ -40,8 +39,7 @@ struct Passed {
     /// Where it leaves, and its direction then.
     at: DVec3,
     along: DVec3,
-    /// Angles to the normal, inside at the left face and outside at the right one.
-    inside: f64,
+    /// Angle to the normal of the right face.
     leaving: f64,
     transmitted: f64,
     way: f64,
@@ -78,7 +76,7 @@ impl Prism {
         let way = -entry.dot(right) / refracted.dot(right);
         let along = leaving.cos() * right + leaving.sin() * DVec3::new(sin, -cos, 0.0);
         let transmitted = (1.0 - reflectance(self.incidence.cos(), ior)) * (1.0 - reflectance(leaving.cos(), ior));
-        Passed { at: entry + way * refracted, along, inside, leaving, transmitted, way }
+        Passed { at: entry + way * refracted, along, leaving, transmitted, way }
     }
 
     /// Its base is black, so that nothing goes on that is reflected inside. The first material is the glass, the second is black.
@@ -107,10 +105,11 @@ fn unlit() -> Material {
 
 /// Of the ray from an eye: means and errors of what is seen of a white screen, and at which height each colour sees it.
 fn heights_seen(gpu: &Gpu, meshes: &[Mesh], materials: Vec<Material>, [eye, target]: [DVec3; 2], screen: Mesh) -> [(f64, f64, f64); 3] {
-    let without = vec![Effect::Indirect, Effect::ReflectiveCaustics, Effect::RefractiveCaustics];
-    let settings = SceneSettings { rounds: 16, samples: 16, without, ..by_rounds() };
+    let settings = without_maps(SceneSettings { rounds: 16, samples: 16, ..by_rounds() });
     let see = |screen: Mesh| {
-        let scene = Scene { meshes: [meshes, &[screen]].concat(), materials: materials.clone(), ..Scene::default() };
+        // So little that it counts for nothing: other questions have lights, and so the same kernels.
+        let sky = LightKind::Environment { radiance: Vec3::splat(1e-9) };
+        let scene = scene_of([meshes, &[screen]].concat(), materials.clone(), vec![sky]);
         let camera = Camera::looking_at("ray", eye, target, DVec3::Z, 1e-5);
         means(&seen(gpu, &scene, &settings, &camera, [16, 16]))
     };
@@ -149,9 +148,7 @@ pub fn prism_check(gpu: &Gpu, transmittance: f32) -> Check<Complaint> {
 #[test]
 fn a_prism_deviates_each_colour_by_its_index() {
     let Some(gpu) = device() else { return };
-    for transmittance in [1.0, 0.3] {
-        assert_holds("a prism", prism_check(&gpu, transmittance));
-    }
+    assert_holds("a prism", prism_check(&gpu, 0.3));
 }
 
 /// A ray beside the axis crosses it behind a ball of radius 1 at h / sin(2 (i - r)), sin i = h and sin r = h / n: close to the axis at
@@ -160,7 +157,7 @@ fn a_prism_deviates_each_colour_by_its_index() {
 fn a_ball_has_a_focal_length_for_each_colour() {
     let Some(gpu) = device() else { return };
     let at = 3.0;
-    let ball = Mesh::sphere("ball", DVec3::ZERO, 1.0, 512, 0);
+    let ball = Mesh::sphere("ball", DVec3::ZERO, 1.0, 256, 0);
     for height in [0.05, 0.4] {
         let rays = [DVec3::new(-9.0, height, 0.0), DVec3::new(0.0, height, 0.0)];
         let materials = vec![dispersive(Vec3::ONE), unlit()];
@@ -194,14 +191,8 @@ pub fn prism_photons(gpu: &Gpu) -> Check<Complaint> {
     let radius = 0.07;
     let heights = [edges[0] + 0.1, 0.5 * (edges[0] + edges[1]), 0.5 * (edges[1] + edges[2]), edges[2] - 0.1]
         .map(|y| (DVec3::new(at, y, 0.0), DVec3::NEG_X));
-    let settings = SceneSettings {
-        part: Part::Caustic,
-        caustic_photons: 400_000,
-        caustic_radius: Some(radius),
-        alpha: 1.0,
-        rounds: 16,
-        ..by_rounds()
-    };
+    let caustic = SceneSettings { part: Part::Caustic, caustic_photons: 400_000, caustic_radius: Some(radius), ..by_rounds() };
+    let settings = SceneSettings { alpha: 1.0, rounds: 16, ..caustic };
     let lit = received(gpu, &scene, &settings, &heights);
     for (place, (found, error)) in pairs(means(&lit), standard_errors(&lit)).enumerate() {
         for channel in 0..3 {
@@ -221,14 +212,7 @@ pub fn prism_photons(gpu: &Gpu) -> Check<Complaint> {
     Ok(())
 }
 
-#[test]
-fn photons_of_each_colour_leave_a_prism_in_its_direction() {
-    let Some(gpu) = device() else { return };
-    assert!(PRISM.pass(0.0, indices()[0]).inside > 0.0);
-    assert_holds("a prism", prism_photons(&gpu));
-}
-
-/// What has no dispersion has the same bits beside what has: its kernels have more code, and no path chooses a colour.
+/// What has no dispersion has the same bits beside what has: its kernels have more code, and no path and no photon chooses a colour.
 #[test]
 fn glass_without_dispersion_keeps_its_bits() {
     let Some(gpu) = device() else { return };
@@ -237,34 +221,9 @@ fn glass_without_dispersion_keeps_its_bits() {
     let scene = scene_of(meshes, vec![clear, matt(0.5)], vec![LightKind::Environment { radiance: Vec3::ONE }]);
     let camera = Camera::looking_at("eye", DVec3::new(0.0, 1.0, 3.0), DVec3::Y * 0.4, DVec3::Y, 0.6);
     let sums = [vec![], vec![Effect::Dispersion]].map(|with| {
-        let settings = SceneSettings { photons: 5000, rounds: 2, math: Math::Strict, with, ..by_rounds() };
+        let settings = SceneSettings { with, ..mapped(5000, 2, 8, 0.2) };
         seen(&gpu, &scene, &settings, &camera, [16, 16]).film.sums.clone()
     });
     assert!(sums[0].iter().any(|sum| *sum > 0));
     assert_eq!(sums[0], sums[1]);
-}
-
-/// Two balls, one of which absorbs, and a lamp that they focus on the floor.
-#[test]
-fn dispersive_balls_agree_with_the_judge() {
-    const SIZE: u32 = 24;
-    let Some(gpu) = device() else { return };
-    let lamp = Material { emission: Vec3::splat(20.0), ..matt(0.0) };
-    let rough = Material { layers: Layers { roughness: 0.4, ..dispersive(Vec3::ONE).layers }, ..dispersive(Vec3::ONE) };
-    let materials = vec![matt(0.6), lamp, dispersive(Vec3::new(0.3, 0.6, 0.9)), rough];
-    let meshes = vec![
-        level(0.0, [2.4, 2.4], true, 0),
-        level(1.2, [0.5, 0.5], false, 1),
-        Mesh::sphere("ball", DVec3::new(-0.35, 0.3, 0.0), 0.25, 32, 2),
-        Mesh::sphere("rough ball", DVec3::new(0.35, 0.3, 0.1), 0.25, 32, 3),
-    ];
-    let mut scene = scene_of(meshes, materials, vec![LightKind::Environment { radiance: Vec3::splat(0.5) }]);
-    scene.cameras.push(Camera::looking_at("camera", DVec3::new(0.1, 0.6, 1.3), DVec3::new(0.0, 0.3, 0.0), DVec3::Y, 0.8));
-    let settings = SceneSettings { photons: 20_000, caustic_photons: 20_000, samples: 4, rounds: 32, ..by_rounds() };
-    let camera = scene.first_camera();
-    let lit = scene::render(&gpu, &scene, &settings, Target::Picture(&camera, [SIZE; 2])).unwrap();
-    let judged = Judge::new(&scene, 64).image(&camera, SIZE, SIZE, 1024, 77);
-    let verdict = Verdict::new(&means(&lit), &standard_errors(&lit), 32, &judged, None);
-    println!("{verdict}");
-    assert!(verdict.agrees(), "{verdict}");
 }

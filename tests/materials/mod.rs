@@ -1,6 +1,5 @@
 //! Materials: their lobes, media and textures.
 
-pub mod anisotropy;
 pub mod dispersion;
 pub mod hard_materials;
 pub mod iridescence;
@@ -8,6 +7,5 @@ pub mod layers;
 pub mod lobe_sampling;
 pub mod lobes;
 pub mod media;
-pub mod plates;
 pub mod scattering;
 pub mod translucent;

@@ -15,6 +15,11 @@ use photonmill::records::{LightPath, Tally};
 const SAMPLES: u32 = 1 << 17;
 const BOTH: [Math; 2] = [Math::Fast, Math::Strict];
 
+/// One incidence of several is traced with strict arithmetic.
+fn math_at(incidence: f64) -> Math {
+    if incidence == 60.0 { Math::Strict } else { Math::Fast }
+}
+
 /// A plane of 1 m around the origin and one light.
 fn scene(normal: DVec3, material: Material, kind: LightKind) -> Scene {
     let frame = frame(normal, DVec3::X);
@@ -151,7 +156,7 @@ fn lights_emit_as_their_kinds_have_it() {
     assert!(point.emitted.iter().all(|path| path.position == position.as_vec3()));
     assert_holds("point", sphere_check("point light", &Traced::directions(&point.emitted)));
 
-    for (inner, outer) in [(20f64, 40f64), (0.0, 30.0), (1.0, 1.5), (0.02, 0.05), (59.0, 60.0), (45.0, 90.0)] {
+    for (inner, outer) in [(0f64, 30f64), (0.02, 0.05), (45.0, 90.0)] {
         let (inner_angle, outer_angle) = (inner.to_radians() as f32, outer.to_radians() as f32);
         let spot =
             tracer.trace(&lit(LightKind::Spot { position, direction: AXIS.normalize(), intensity: Vec3::ONE, inner_angle, outer_angle }));
@@ -258,35 +263,34 @@ fn beam_at(traced: &Traced) -> (DVec3, DVec3) {
 fn lambertian_surfaces_scatter_by_the_cosine() {
     let Some(gpu) = device() else { return };
     let colour = Vec3::new(0.75, 0.3, 0.1);
-    for math in BOTH {
+    for (incidence, from_behind) in [(0.0, false), (60.0, false), (89.0, false), (45.0, true)] {
+        let math = math_at(incidence);
         let tracer = Tracer { gpu: &gpu, math };
-        for (incidence, from_behind) in [(0.0, false), (60.0, false), (89.0, false), (45.0, true)] {
-            let what = format!("{math:?}, Lambert at {incidence} degrees");
-            let traced =
-                tracer.trace(&beam(Material { two_sided: from_behind, ..Material::lambert("grey", colour) }, incidence, from_behind));
-            let normal = beam_at(&traced).1;
-            let frame = frame(normal, DVec3::X);
-            let places: Vec<(f64, f64)> = traced.survivors.iter().map(|path| polar(frame, path.direction)).collect();
-            let scattered = |albedo: f64, density: &dyn Fn(DVec3) -> f64| {
-                let grid = angles(even(0.0, FRAC_PI_2, 20));
-                density_check(&what, &places, SAMPLES as usize, &grid, (albedo, 1e-6), &on_sphere(frame, |wi| albedo * density(wi)))
-            };
-            let albedo = f64::from(colour.x);
-            assert_holds(&what, scattered(albedo, &|wi| wi.dot(normal) / PI));
-            assert_complains("a uniform density", scattered(albedo, &|_| 1.0 / TAU));
-            assert_complains("an albedo 3 % off", scattered(0.97 * albedo, &|wi| wi.dot(normal) / PI));
-            assert_holds(&what, share_check("survivors", u64::from(traced.tally.stored), u64::from(SAMPLES), albedo));
-            assert_complains("an albedo 1 % off", share_check("fault", u64::from(traced.tally.stored), u64::from(SAMPLES), 0.99 * albedo));
-            assert_eq!(traced.tally.stored + traced.tally.absorbed, SAMPLES);
-            // Roulette by the largest channel; the others lose what it did not take.
-            for path in &traced.survivors {
-                let off = (path.flux - traced.emitted[0].flux * colour / colour.x).abs().max_element();
-                assert!(off < 1e-6, "{what}: {path:?}");
-            }
+        let what = format!("{math:?}, Lambert at {incidence} degrees");
+        let traced = tracer.trace(&beam(Material { two_sided: from_behind, ..Material::lambert("grey", colour) }, incidence, from_behind));
+        let normal = beam_at(&traced).1;
+        let frame = frame(normal, DVec3::X);
+        let places: Vec<(f64, f64)> = traced.survivors.iter().map(|path| polar(frame, path.direction)).collect();
+        let scattered = |albedo: f64, density: &dyn Fn(DVec3) -> f64| {
+            let grid = angles(even(0.0, FRAC_PI_2, 20));
+            density_check(&what, &places, SAMPLES as usize, &grid, (albedo, 1e-6), &on_sphere(frame, |wi| albedo * density(wi)))
+        };
+        let albedo = f64::from(colour.x);
+        assert_holds(&what, scattered(albedo, &|wi| wi.dot(normal) / PI));
+        assert_complains("a uniform density", scattered(albedo, &|_| 1.0 / TAU));
+        assert_complains("an albedo 3 % off", scattered(0.97 * albedo, &|wi| wi.dot(normal) / PI));
+        assert_holds(&what, share_check("survivors", u64::from(traced.tally.stored), u64::from(SAMPLES), albedo));
+        assert_complains("an albedo 1 % off", share_check("fault", u64::from(traced.tally.stored), u64::from(SAMPLES), 0.99 * albedo));
+        assert_eq!(traced.tally.stored + traced.tally.absorbed, SAMPLES);
+        // Roulette by the largest channel; the others lose what it did not take.
+        for path in &traced.survivors {
+            let off = (path.flux - traced.emitted[0].flux * colour / colour.x).abs().max_element();
+            assert!(off < 1e-6, "{what}: {path:?}");
         }
-        // A back that does not scatter.
-        assert_eq!(tracer.trace(&beam(Material::lambert("grey", colour), 45.0, true)).tally.stored, 0);
     }
+    // A back that does not scatter.
+    let tracer = Tracer { gpu: &gpu, math: Math::Fast };
+    assert_eq!(tracer.trace(&beam(Material::lambert("grey", colour), 45.0, true)).tally.stored, 0);
 }
 
 /// Albedo of the lobe (n + 2) / 2 pi cos^n at incidences 0, 30, 60, 80, 89.9 degrees, of the part above the horizon.
@@ -305,13 +309,14 @@ const INCIDENCES: [f64; 5] = [0.0, 30.0, 60.0, 80.0, 89.9];
 #[test]
 fn glossy_surfaces_scatter_by_their_lobe() {
     let Some(gpu) = device() else { return };
-    for (n, albedos) in ALBEDOS {
-        for (albedo, incidence) in albedos.into_iter().zip(INCIDENCES).filter(|(albedo, _)| albedo.is_finite()) {
+    for (k, (n, albedos)) in ALBEDOS.into_iter().enumerate() {
+        // Each exponent has every other incidence.
+        for (albedo, incidence) in albedos.into_iter().zip(INCIDENCES).skip(k % 2).step_by(2).filter(|(albedo, _)| albedo.is_finite()) {
             // A colour for which the weight f cosine / pdf is the cosine: survivors are distributed by f cosine.
             let colour = (n + 1.0) / (n + 2.0);
             let glossy = |colour: f64| Material { surface: Surface::Glossy { exponent: n as f32 }, ..matt(colour as f32) };
             let what = format!("lobe {n} at {incidence} degrees");
-            let tracer = Tracer { gpu: &gpu, math: if incidence == 60.0 { Math::Strict } else { Math::Fast } };
+            let tracer = Tracer { gpu: &gpu, math: math_at(incidence) };
             let traced = tracer.trace(&beam(glossy(colour), incidence, false));
             let (wo, normal) = beam_at(&traced);
             let mirror = (2.0 * wo.dot(normal) * normal - wo).normalize();
@@ -389,37 +394,36 @@ fn glass_reflects_by_fresnel_and_refracts_by_snell() {
     let inside = [0.0, 30.0, 41.0, 41.7, 41.82, 60.0, 89.9].map(|incidence| (1.5f32, incidence, true));
     let others =
         [(2.4f32, 30.0, false), (2.4, 24.5, true), (2.4, 24.7, true), (1.0001, 89.9, false), (0.8, 40.0, false), (0.8, 60.0, false)];
-    for math in BOTH {
-        let tracer = Tracer { gpu: &gpu, math };
-        for (ior, incidence, from_behind) in outside.into_iter().chain(inside).chain(others) {
-            let what = format!("{math:?}, index {ior} at {incidence} degrees from {}", if from_behind { "within" } else { "without" });
-            let traced = tracer.trace(&beam(glass(ior), incidence, from_behind));
-            let (wo, normal) = beam_at(&traced);
-            let cos_i = wo.dot(normal);
-            let eta = if from_behind { f64::from(ior) } else { 1.0 / f64::from(ior) };
-            assert_holds(&what, smooth_check(&what, &traced, eta, reflectance(cos_i, eta)));
-            if ior == 1.5 && incidence > 0.0 {
-                assert_complains("an index upside down", smooth_check("fault", &traced, 1.0 / eta, reflectance(cos_i, 1.0 / eta)));
-            }
+    // Each arithmetic has every other one.
+    for (k, (ior, incidence, from_behind)) in outside.into_iter().chain(inside).chain(others).enumerate() {
+        let math = BOTH[k % 2];
+        let what = format!("{math:?}, index {ior} at {incidence} degrees from {}", if from_behind { "within" } else { "without" });
+        let traced = Tracer { gpu: &gpu, math }.trace(&beam(glass(ior), incidence, from_behind));
+        let (wo, normal) = beam_at(&traced);
+        let cos_i = wo.dot(normal);
+        let eta = if from_behind { f64::from(ior) } else { 1.0 / f64::from(ior) };
+        assert_holds(&what, smooth_check(&what, &traced, eta, reflectance(cos_i, eta)));
+        if ior == 1.5 && incidence > 0.0 {
+            assert_complains("an index upside down", smooth_check("fault", &traced, 1.0 / eta, reflectance(cos_i, 1.0 / eta)));
         }
-        // An interface between equals is none, however it is met.
-        for incidence in [0.0, 60.0, 89.9, 89.99] {
-            let traced = tracer.trace(&beam(glass(1.0), incidence, false));
-            assert_holds(incidence, smooth_check(&format!("{math:?}, index 1 at {incidence} degrees"), &traced, 1.0, 0.0));
-        }
-        for incidence in [0.0, 60.0, 89.9] {
-            let traced = tracer.trace(&beam(mirror(1.0), incidence, false));
-            assert_holds(incidence, smooth_check(&format!("{math:?}, mirror at {incidence} degrees"), &traced, 1.0, 1.0));
-        }
-        let dim = tracer.trace(&beam(mirror(0.8), 30.0, false));
-        assert_holds("a dim mirror", share_check("survivors", u64::from(dim.tally.stored), u64::from(SAMPLES), f64::from(0.8f32)));
-        assert_complains("a mirror 1 % brighter", share_check("fault", u64::from(dim.tally.stored), u64::from(SAMPLES), 0.808));
     }
+    // An interface between equals is none, however it is met, and a mirror reflects all.
+    let tracer = Tracer { gpu: &gpu, math: Math::Fast };
+    for (material, incidence, reflected) in [0.0, 60.0, 89.99].into_iter().flat_map(|at| [(glass(1.0), at, 0.0), (mirror(1.0), at, 1.0)]) {
+        let what = format!("{:?} at {incidence} degrees", material.surface);
+        assert_holds(&what, smooth_check(&what, &tracer.trace(&beam(material, incidence, false)), 1.0, reflected));
+    }
+    let dim = tracer.trace(&beam(mirror(0.8), 30.0, false));
+    assert_holds("a dim mirror", share_check("survivors", u64::from(dim.tally.stored), u64::from(SAMPLES), f64::from(0.8f32)));
+    assert_complains("a mirror 1 % brighter", share_check("fault", u64::from(dim.tally.stored), u64::from(SAMPLES), 0.808));
 }
 
 /// The first photons of seed 1 whose 24 bits of a word are all zeros, and all ones.
-fn edge_photons(block: u32, word: usize) -> [u32; 2] {
-    [0, 0x00ff_ffff].map(|bits| (0..u32::MAX).find(|photon| philox([*photon, 0, block, 0], [1, 0])[word] >> 8 == bits).unwrap())
+fn edge_photons(word: usize) -> [u32; 2] {
+    let block = if word < 2 { 1 } else { EMISSION_BLOCKS };
+    let photons = [[6_983_761, 25_324_145], [27_077_537, 9_474_925], [1_944_736, 7_501_678], [6_095_361, 3_647_491]][word];
+    assert_eq!(photons.map(|photon| philox([photon, 0, block, 0], [1, 0])[word] >> 8), [0, 0x00ff_ffff]);
+    photons
 }
 
 /// The same words where photons draw them: one in 16 million does.
@@ -443,7 +447,7 @@ fn photons_with_words_at_their_ends_fly_on() {
         ("point", lit(point(DVec3::ZERO)), DVec3::ZERO, -1.0),
         ("sky", lit(LightKind::Environment { radiance: Vec3::ONE }), DVec3::ZERO, -1.0),
     ];
-    for photon in [0, 1].into_iter().flat_map(|word| edge_photons(1, word)) {
+    for photon in [0, 1].into_iter().flat_map(edge_photons) {
         for (what, scene, axis, least) in &lights {
             let path = tracer.trace_photons(scene, (photon, 1)).emitted[0];
             assert_holds(format!("photon {photon}"), is_unit(what, path.direction, 4.0 * ULP));
@@ -451,7 +455,7 @@ fn photons_with_words_at_their_ends_fly_on() {
             assert!(path.direction.as_dvec3().dot(*axis) > *least, "photon {photon}, {what}: {path:?}");
         }
     }
-    for photon in [2, 3].into_iter().flat_map(|word| edge_photons(EMISSION_BLOCKS, word)) {
+    for photon in [2, 3].into_iter().flat_map(edge_photons) {
         for surface in [Surface::Lambert, Surface::Glossy { exponent: 0.5 }, Surface::Glossy { exponent: 48_826.0 }] {
             let traced = tracer.trace_photons(&beam(Material { surface, ..white() }, 0.0, false), (photon, 1));
             let what = format!("photon {photon} on {surface:?}");

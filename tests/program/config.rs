@@ -131,7 +131,7 @@ fn files_that_are_wrong_are_refused_in_one_line() {
 fn messages_are_more_or_fewer() {
     let place = Place::new();
     let [quiet, usual] = ["-q", ""].map(|option| place.succeed(&format!("--mesh 8 -o a.png {option}")));
-    let verbose = place.succeed("render cornell -o a.png --size 16 --rounds 2 --photons 500 -v");
+    let verbose = place.succeed("render cornell -o a.png --size 8 --rounds 2 --photons 500 -v");
     assert!(quiet.1.is_empty() && usual.1.contains("photonmill: device: "), "{}{}", quiet.1, usual.1);
     // What is printed every few seconds of a slow run has whole seconds.
     let steps = |stderr: &str| {

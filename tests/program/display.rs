@@ -3,14 +3,16 @@
 
 use std::io::Read;
 use std::net::{TcpListener, TcpStream};
-use std::process::Stdio;
+use std::sync::mpsc::{self, Receiver};
 use std::thread::JoinHandle;
 
 use crate::common::prelude::*;
-use crate::common::program::{on_device, text};
+use crate::common::program::{PATIENCE, on_device};
 use photonmill::output::exr_file;
 
-const SMALL: &str = "render cornell-spheres --size 24x17 --photons 500 -q -o a.exr";
+const SMALL: &str = "render cornell --size 8x5 --photons 500 -q";
+/// A run that goes on until a signal ends it.
+const ENDLESS: &str = "render cornell --size 8x5 --photons 500 -q -o a.exr --rounds 1000000";
 
 /// A packet of the protocol: a length of 32 bits that counts itself, a type, and little-endian fields.
 struct Packet(std::vec::IntoIter<u8>);
@@ -99,8 +101,9 @@ impl Shown {
     }
 }
 
-/// Takes one connection at this address, and stops after so many packets.
-fn recorder(address: &str, most: usize) -> (u16, JoinHandle<Shown>) {
+/// Takes one connection at this address, and stops after so many packets, of each of which it sends word.
+fn recorder(address: &str, most: usize) -> (u16, Receiver<()>, JoinHandle<Shown>) {
+    let (taken, packets) = mpsc::channel();
     let listener = TcpListener::bind((address, 0)).unwrap();
     let port = listener.local_addr().unwrap().port();
     let record = move || {
@@ -109,21 +112,30 @@ fn recorder(address: &str, most: usize) -> (u16, JoinHandle<Shown>) {
         for _ in 0..most {
             let Some(packet) = Packet::receive(&mut stream) else { break };
             shown.take(packet);
+            // A test may have heard enough.
+            let _ = taken.send(());
         }
         shown
     };
-    (port, std::thread::spawn(record))
+    (port, packets, std::thread::spawn(record))
 }
 
+/// The run is ended once a picture on the way is there, however long that takes.
 #[test]
 fn a_viewer_shows_the_picture_its_parts_and_its_error() {
     let Some(_) = device() else { return };
     let place = Place::new();
-    let (port, recorded) = recorder("127.0.0.1", usize::MAX);
-    // Long enough for a picture on the way.
-    place.succeed(&format!("{SMALL} --time 2.5s --display 127.0.0.1:{port}"));
+    let (port, packets, recorded) = recorder("127.0.0.1", usize::MAX);
+    let run = place.start(&on_device(&format!("{ENDLESS} --display 127.0.0.1:{port}")));
+    for what in ["a name", "a picture"] {
+        packets.recv_timeout(PATIENCE).unwrap_or_else(|_| panic!("{what} does not come"));
+    }
+    run.signal("INT");
+    let (code, said, _) = run.end();
+    assert_eq!(code, Some(130), "{said:?}");
     let shown = recorded.join().unwrap();
-    assert_eq!((shown.name.as_str(), shown.size, shown.created), ("a.exr", (24, 17), 1));
+    assert_eq!((shown.name.as_str(), shown.size, shown.created), ("a.exr", (8, 5), 1));
+    // The last one is that of the file.
     assert!(shown.updated >= 2, "{}", shown.updated);
     let (_, of_file) = exr_file::decode(&std::fs::read(place.at("a.exr")).unwrap()).unwrap();
     let of_file: BTreeMap<String, Vec<f32>> = of_file.into_iter().map(|channel| (channel.name, channel.values)).collect();
@@ -142,12 +154,11 @@ fn a_viewer_shows_the_picture_its_parts_and_its_error() {
 fn a_png_is_shown_with_its_parts() {
     let Some(_) = device() else { return };
     let place = Place::new();
-    let run = "render cornell-spheres --size 24x17 --photons 500 -q --rounds 4 -o";
-    place.succeed(&format!("{run} a.png"));
+    place.succeed(&format!("{SMALL} --rounds 4 -o a.png"));
     let has_ipv6 = TcpListener::bind("[::1]:0").is_ok();
-    let (port, recorded) = recorder(if has_ipv6 { "::1" } else { "127.0.0.1" }, usize::MAX);
+    let (port, _, recorded) = recorder(if has_ipv6 { "::1" } else { "127.0.0.1" }, usize::MAX);
     let host = if has_ipv6 { "[::1]" } else { "localhost" };
-    place.succeed(&format!("{run} b.png --display {host}:{port}"));
+    place.succeed(&format!("{SMALL} --rounds 4 -o b.png --display {host}:{port}"));
     let shown = recorded.join().unwrap();
     assert!(shown.channels.contains_key("caustic.G") && shown.channels["R"].iter().any(|value| *value > 0.0));
     assert!(std::fs::read(place.at("a.png")).unwrap() == std::fs::read(place.at("b.png")).unwrap());
@@ -157,14 +168,14 @@ fn a_png_is_shown_with_its_parts() {
 fn a_viewer_that_goes_away_ends_no_run() {
     let Some(_) = device() else { return };
     let place = Place::new();
-    let (port, recorded) = recorder("localhost", 1);
-    let line = on_device(&format!("{SMALL} --time 4s --display localhost:{port}"));
-    let output = place.command(&line).stderr(Stdio::piped()).output().unwrap();
+    let (port, _, recorded) = recorder("localhost", 1);
+    let mut run = place.start(&on_device(&format!("{ENDLESS} --display localhost:{port}")));
+    run.line_with(&format!("warning: --display localhost:{port}: the viewer has gone ("));
     assert_eq!(recorded.join().unwrap().updated, 0);
-    let stderr = text(&output.stderr);
-    assert!(output.status.success() && place.at("a.exr").exists(), "{stderr}");
-    let told = format!("warning: --display localhost:{port}: the viewer has gone (");
-    assert!(stderr.matches(&told).count() == 1 && stderr.lines().count() == 1, "{stderr}");
+    run.signal("INT");
+    let (code, said, _) = run.end();
+    assert!(code == Some(130) && place.at("a.exr").exists(), "{said:?}");
+    assert!(said.iter().all(|line| !line.contains("--display")), "{said:?}");
 }
 
 #[test]
@@ -174,9 +185,12 @@ fn a_viewer_that_is_absent_is_refused_before_the_run() {
     let absent = format!("--display 127.0.0.1:{port}");
     let place = Place::new();
     place.assert_refused([
-        (format!("{SMALL} {absent}"), &[absent.as_str(), "no viewer answers at port", "start tev there, or check host and port"][..]),
-        (format!("{SMALL} --display nowhere.invalid"), &["--display nowhere.invalid", "port 14158", "the host is not known"]),
-        (format!("{SMALL} --display localhost:0"), &["--display localhost:0", "must be HOST or HOST:PORT", "from 1 to 65535"]),
-        (format!("{SMALL} --display :14158"), &["--display :14158", "must be HOST or HOST:PORT"]),
+        (
+            format!("{SMALL} -o a.exr {absent}"),
+            &[absent.as_str(), "no viewer answers at port", "start tev there, or check host and port"][..],
+        ),
+        (format!("{SMALL} -o a.exr --display nowhere.invalid"), &["--display nowhere.invalid", "port 14158", "the host is not known"]),
+        (format!("{SMALL} -o a.exr --display localhost:0"), &["--display localhost:0", "must be HOST or HOST:PORT", "from 1 to 65535"]),
+        (format!("{SMALL} -o a.exr --display :14158"), &["--display :14158", "must be HOST or HOST:PORT"]),
     ]);
 }

@@ -24,16 +24,3 @@ fn the_gallery_has_its_pictures_and_a_page_that_loads_nothing() {
     place.succeed(command);
     assert_eq!(place.pixels("caustic.png"), place.pixels("g/caustic.png"));
 }
-
-#[test]
-fn what_cannot_be_made_is_named() {
-    if no_gpu() {
-        return;
-    }
-    let place = Place::new();
-    place.assert_refused([
-        ("gallery -o g --size 0 --quiet", ["--size", "0"]),
-        ("gallery -o g --error nonsense --quiet", ["--error", "nonsense"]),
-        ("gallery -o g --device no-such-device --quiet", ["--device", "no-such-device"]),
-    ]);
-}

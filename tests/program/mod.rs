@@ -10,4 +10,5 @@ pub mod guide;
 pub mod package;
 pub mod render_and_probe;
 pub mod study;
+pub mod tools;
 pub mod view;

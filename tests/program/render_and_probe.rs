@@ -4,16 +4,17 @@ use std::fmt::Display;
 use std::io::Write;
 use std::process::Stdio;
 
-use crate::common::gltf_file::{data_uri, floats};
+use crate::common::gltf_file;
 use crate::common::prelude::*;
 use crate::common::program::on_device;
 use photonmill::constants::RADIUS_CLASSES;
+use photonmill::output::exr_file;
 use serde_json::{Value, json};
 
 const EFFECTS: &str = "direct indirect glossy layers transmission diffuse-transmission iridescence anisotropy media dispersion clear-coat sheen normal-maps alpha reflective-caustics \
     refractive-caustics specular-chains textures vertex-colours environment mesh-lights point-lights spot-lights directional-lights disc-lights bvh two-sided smooth-normals";
 const BLENDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scenes/blender.glb");
-const TINY: &str = "--size 16x16 --photons 2000 --rounds 2 --block 1";
+const TINY: &str = "--size 8x8 --photons 500 --rounds 2 --block 1";
 
 /// A folder for runs on a device; `None` where `PHOTONMILL_NO_GPU=1` asks to go without.
 fn place_with_device() -> Option<Place> {
@@ -31,31 +32,20 @@ fn assert_refused<'a>(place: &Place, cases: impl IntoIterator<Item = (impl Displ
     place.assert_refused(cases.into_iter().map(|(line, named)| (format!("{line} --quiet"), named)));
 }
 
-/// A square of 2 m in the plane z = 0 that faces +z; `change` makes of it what a test needs.
+/// A white square of 2 m in the plane z = 0 that faces +z, under a bulb; `change` makes of it what a test needs.
 fn square(change: impl FnOnce(&mut Value)) -> String {
-    let mut bytes = floats(&[-1., -1., 0., 1., -1., 0., 1., 1., 0., -1., 1., 0.]);
-    bytes.extend([0u16, 1, 2, 0, 2, 3, 1, 1, 2].iter().flat_map(|index| index.to_le_bytes()));
-    let mut value = json!({
-        "asset": {"version": "2.0"}, "scenes": [{"nodes": [0, 1, 2, 3]}],
-        "nodes": [
-            {"name": "wall", "mesh": 0},
-            {"name": "eye", "camera": 0, "translation": [0, 0, 2]},
-            {"name": "side", "camera": 0, "translation": [0.5, 0, 1]},
-            {"name": "bulb", "translation": [0, 0, 1], "extensions": {"KHR_lights_punctual": {"light": 0}}}
-        ],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "material": 0}]}],
-        // White, and nothing but diffuse.
-        "materials": [{"pbrMetallicRoughness": {"metallicFactor": 0}, "extensions": {"KHR_materials_specular": {"specularFactor": 0}}}],
-        "cameras": [{"type": "perspective", "perspective": {"yfov": 0.7, "znear": 0.1}}],
-        "extensionsUsed": ["KHR_lights_punctual", "KHR_materials_specular"],
-        "extensions": {"KHR_lights_punctual": {"lights": [{"type": "point", "intensity": 683}]}},
-        "buffers": [{"byteLength": bytes.len(), "uri": data_uri("application/octet-stream", &bytes)}],
-        "bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": 48}, {"buffer": 0, "byteOffset": 48, "byteLength": 18}],
-        "accessors": [
-            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [-1, -1, 0], "max": [1, 1, 0]},
-            {"bufferView": 1, "componentType": 5123, "count": 6, "type": "SCALAR"}
-        ]
-    });
+    let mut value = gltf_file::square();
+    value["scenes"][0]["nodes"] = json!([0, 1, 2, 3]);
+    value["nodes"] = json!([
+        {"name": "wall", "mesh": 0, "translation": [-1, -1, 0], "scale": [2, 2, 1]},
+        {"name": "eye", "camera": 0, "translation": [0, 0, 2]},
+        {"name": "side", "camera": 0, "translation": [0.5, 0, 1]},
+        {"name": "bulb", "translation": [0, 0, 1], "extensions": {"KHR_lights_punctual": {"light": 0}}}
+    ]);
+    let no_gloss = json!({"KHR_materials_specular": {"specularFactor": 0}});
+    value["materials"] = json!([{"pbrMetallicRoughness": {"metallicFactor": 0}, "extensions": no_gloss}]);
+    value["extensionsUsed"] = json!(["KHR_lights_punctual", "KHR_materials_specular"]);
+    value["extensions"]["KHR_lights_punctual"]["lights"] = json!([{"type": "point", "intensity": 683}]);
     change(&mut value);
     value.to_string()
 }
@@ -176,12 +166,13 @@ fn a_probe_writes_a_row_a_point() {
     place.write("points.txt", points);
     let run = "probe cornell --photons 2000 --rounds 4";
     place.succeed(&format!("{run} --points points.txt -o a.csv"));
-    let mut child = place.command(&on_device(&format!("{run} --points - -o b.csv")));
-    let mut child = child.stdin(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap();
+    // The same table from standard input to standard output, and the report elsewhere.
+    let mut child = place.command(&on_device(&format!("{run} --points - -o -")));
+    let mut child = child.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
     child.stdin.take().unwrap().write_all(points.as_bytes()).unwrap();
-    assert!(child.wait().unwrap().success());
+    let output = child.wait_with_output().unwrap();
     let table = |name: &str| place.text(name);
-    assert_eq!(table("a.csv"), table("b.csv"));
+    assert!(output.status.success() && text(&output.stdout) == table("a.csv") && !place.at("-").exists(), "{}", text(&output.stdout));
     let lines: Vec<String> = table("a.csv").lines().map(str::to_owned).collect();
     assert_eq!((lines.len(), lines[0].as_str()), (5, "red,green,blue,red_error,green_error,blue_error"));
     let rows: Vec<Vec<f64>> = lines[1..].iter().map(|line| line.split(',').map(|field| field.parse().unwrap()).collect()).collect();
@@ -190,13 +181,8 @@ fn a_probe_writes_a_row_a_point() {
     assert!((rows[0][0] / rows[2][0] - 1.0).abs() < 1.0, "{rows:?}");
     assert_eq!(rows[3][..3], [0.0; 3], "{rows:?}");
 
-    // The same table on standard output, and the report elsewhere.
-    let (stdout, _) = place.succeed(&format!("{run} --points points.txt -o -"));
-    assert_eq!(stdout, table("a.csv"));
-    assert!(!place.at("-").exists());
-
     // Of one round no error is known.
-    place.succeed("probe cornell --points points.txt --rounds 1 --photons 1000 -o c.csv");
+    place.succeed("probe cornell --points points.txt --rounds 1 --photons 500 -o c.csv");
     assert!(table("c.csv").lines().nth(1).unwrap().ends_with(",inf,inf,inf"), "{}", table("c.csv"));
 }
 
@@ -208,35 +194,49 @@ fn an_exr_is_linear_and_a_png_obeys_its_exposure() {
     assert!(matches!(exr, image::DynamicImage::ImageRgb32F(_)), "{:?}", exr.color());
     // The lamp's own radiance stands in it, far above what a screen shows.
     assert!(linear.iter().any(|value| *value > 1.0) && linear.iter().all(|value| value.is_finite() && *value >= 0.0));
-    for stops in ["-2", "0", "1", "3.5"] {
-        place.succeed(&format!("render cornell {TINY} -o a.png --exposure {stops} --tone linear"));
-        let png = place.picture("a.png").into_rgb8().into_raw();
+    let png = |options: &str| {
+        let (stdout, _) = place.succeed(&format!("render cornell {TINY} -o a.png {options}"));
+        assert!(stdout.contains("wrote a.png at ") && stdout.contains("stops"), "{stdout}");
+        place.picture("a.png").into_rgb8().into_raw()
+    };
+    let [_, cut] = ["-2", "3.5"].map(|stops| {
+        let png = png(&format!("--exposure {stops} --tone linear"));
         let factor = stops.parse::<f32>().unwrap().exp2();
         for (code, value) in pairs(&png, &linear) {
             assert!((f32::from(*code) - srgb(value * factor)).abs() <= 0.51, "{stops} stops: {code} for {value}");
         }
-    }
+        png
+    });
     // By the tone curve the lamp is white, and not cut off at the same value as its surroundings.
-    place.succeed(&format!("render cornell {TINY} -o a.png --exposure 2"));
-    let toned = place.picture("a.png").into_rgb8().into_raw();
-    place.succeed(&format!("render cornell {TINY} -o a.png --exposure 2 --tone linear"));
-    let cut = place.picture("a.png").into_rgb8().into_raw();
-    assert!(toned.iter().filter(|code| **code == 255).count() < cut.iter().filter(|code| **code == 255).count());
+    let white = |png: &[u8]| png.iter().filter(|code| **code == 255).count();
+    assert!(white(&png("--exposure 3.5")) < white(&cut));
     // Left alone, it is neither dark nor burnt out.
-    let (stdout, _) = place.succeed(&format!("render cornell {TINY} -o a.png"));
-    assert!(stdout.contains("wrote a.png at ") && stdout.contains("stops"), "{stdout}");
-    let png = place.picture("a.png").into_luma8().into_raw();
-    let mean = png.iter().map(|code| f64::from(*code)).sum::<f64>() / png.len() as f64;
+    let usual = png("");
+    let mean = usual.iter().map(|code| f64::from(*code)).sum::<f64>() / usual.len() as f64;
     assert!((40.0..200.0).contains(&mean), "{mean}");
 }
 
+/// A camera by its name, what lights emit in their own units, and a triangle without area that is left out with a warning.
 #[test]
-fn a_camera_is_chosen_by_name() {
+fn a_file_is_seen_as_its_options_say() {
     let Some(place) = place_with_device() else { return };
     place.write("scene.gltf", square(|_| {}));
-    let first = exr(&place, "scene.gltf");
-    assert_eq!(exr(&place, "scene.gltf --camera eye"), first);
-    assert_ne!(exr(&place, "scene.gltf --camera side"), first);
+    let with_flat_triangle = square(|v| {
+        gltf_file::set_buffer(v, &[gltf_file::square_buffer(), vec![1, 0, 1, 0, 2, 0]].concat());
+        (v["bufferViews"][3]["byteLength"], v["accessors"][3]["count"]) = (json!(18), json!(9));
+    });
+    place.write("flat.gltf", with_flat_triangle);
+    let (_, stderr) = place.succeed(&format!("render flat.gltf {TINY} -o flat.exr --radiometric --quiet"));
+    assert!(stderr.contains("warning: 1 triangle without area left out") && stderr.lines().count() == 1, "{stderr}");
+    let lumens = exr(&place, "scene.gltf --camera eye");
+    assert!(lumens.iter().any(|value| *value > 0.1));
+    for (watt, lumen) in pairs(&place.pixels("flat.exr"), &lumens) {
+        assert!((watt - 683.0 * lumen).abs() <= 1e-4 * watt, "{watt} W, {lumen} lm");
+    }
+    assert_ne!(exr(&place, "scene.gltf --camera side"), lumens);
+    // 1 W/sr from 1 m on a white wall, seen in the middle: 1 / pi, and 3 % less within a pixel of it.
+    let middle = lumens[3 * (8 * 4 + 4)];
+    assert!((middle * std::f32::consts::PI - 0.97).abs() < 0.06, "{middle}");
 }
 
 /// Of a camera of 2 : 1, whole or as wide or as large as is asked for; the vertical field of view is kept.
@@ -258,26 +258,6 @@ fn a_picture_has_the_aspect_of_its_camera() {
     place.write("wrong.gltf", with_aspect(-1.0));
     let (table, stderr) = plan("wrong.gltf");
     assert!(table.contains("\n640 x 480 pixels\n") && stderr.contains("aspect ratio"), "{table}{stderr}");
-    if no_gpu() {
-        return;
-    }
-    place.succeed("render wide.gltf --size 16 --photons 10 --rounds 1 -o a.exr");
-    let picture = place.picture("a.exr");
-    assert_eq!((picture.width(), picture.height()), (16, 8));
-}
-
-#[test]
-fn four_parts_add_up_to_the_whole() {
-    let Some(place) = place_with_device() else { return };
-    for scene in ["cornell-spheres", BLENDER] {
-        let whole = exr(&place, scene);
-        let parts = ["direct", "specular", "caustic", "indirect"].map(|part| exr(&place, &format!("{scene} --part {part}")));
-        for (pixel, value) in whole.iter().enumerate() {
-            let sum: f32 = parts.iter().map(|part| part[pixel]).sum();
-            assert!((sum - value).abs() <= 1e-6 * value.max(1e-3), "{scene}, value {pixel}: {sum} instead of {value}");
-        }
-        assert_eq!(exr(&place, &format!("{scene} --part all")), whole);
-    }
 }
 
 /// Effect and whether it was kept, of each row of a table.
@@ -296,8 +276,8 @@ fn rows_of(table: &str) -> Vec<(String, bool)> {
 #[test]
 fn tables_and_json_tell_one_plan_with_a_row_an_effect() {
     let place = Place::new();
-    for scene in ["cornell", "cornell-spheres", "open-box", "glass-slab", BLENDER] {
-        for options in ["", "--part direct", "--with glossy,textures", "--without mesh-lights --illumination photons"] {
+    for scene in ["cornell", BLENDER] {
+        for options in ["--with glossy,textures", "--without mesh-lights --illumination photons"] {
             let (table, _) = place.succeed(&format!("plan {scene} {options}"));
             let (json, _) = place.succeed(&format!("plan {scene} --json {options}"));
             let json: Value = serde_json::from_str(&json).unwrap();
@@ -369,14 +349,14 @@ fn a_run_explains_itself_and_its_report_closes() {
     for ledger in ledgers {
         let count = |fate: &str| ledger[fate].as_u64().unwrap();
         assert_eq!(count("emitted"), count("absorbed") + count("escaped") + count("cut_off") + count("dropped"), "{ledger}");
-        assert_eq!((count("emitted"), count("dropped")), (4000, 0), "{ledger}");
+        assert_eq!((count("emitted"), count("dropped")), (1000, 0), "{ledger}");
     }
     assert_eq!((&report["rounds"], &report["end"]), (&json!(2), &json!("rounds")));
     let film = &report["film"];
     assert_eq!((&film["nonfinite_values"], &film["uncorrected_estimates"]), (&json!(0), &json!(0)));
     // Points of each map, by the classes of their radii: all that are seen.
     let points = |map: usize| film["radius_classes"][map].as_array().unwrap().iter().map(|count| count.as_u64().unwrap()).sum::<u64>();
-    assert!(points(0) == points(1) && (200..=256).contains(&points(0)), "{film}");
+    assert!(points(0) == points(1) && (50..=64).contains(&points(0)), "{film}");
     let settings = &report["settings"];
     assert_eq!(
         (&settings["bounces"], &settings["builder"], &report["nonfinite_values"]),
@@ -407,61 +387,34 @@ fn effects_are_forced_and_left_out_by_name() {
     let Some(place) = place_with_device() else { return };
     let reference = exr(&place, "cornell");
     assert_eq!(exr(&place, "cornell --with glossy,refractive-caustics --with textures"), reference);
-    assert_eq!(exr(&place, "cornell --without glossy,textures"), reference);
-    assert_ne!(exr(&place, "cornell --without indirect"), reference);
     let run = format!("render cornell {TINY} -o a.exr --without indirect --without glossy");
     for line in [run.as_str(), "plan cornell --without indirect,glossy"] {
         let (stdout, _) = place.succeed(line);
         let line = stdout.lines().find(|line| line.contains("left out") && !line.starts_with("indirect"));
         assert!(line.is_some_and(|line| line.contains("indirect") && !line.contains("glossy")), "{stdout}");
     }
+    assert_ne!(place.pixels("a.exr"), reference);
 }
 
-#[test]
-fn punctual_lights_are_photometric_unless_told() {
-    let Some(place) = place_with_device() else { return };
-    place.write("scene.gltf", square(|_| {}));
-    let lumens = exr(&place, "scene.gltf --part direct");
-    let watts = exr(&place, "scene.gltf --part direct --radiometric");
-    assert!(lumens.iter().any(|value| *value > 0.1));
-    for (watt, lumen) in pairs(&watts, &lumens) {
-        assert!((watt - 683.0 * lumen).abs() <= 1e-4 * watt, "{watt} W, {lumen} lm");
-    }
-    // 1 W/sr from 1 m on a white wall, seen in the middle: 1 / pi.
-    let middle = lumens[3 * (16 * 8 + 8)];
-    assert!((middle * std::f32::consts::PI - 1.0).abs() < 0.03, "{middle}");
-}
-
-#[test]
-fn an_environment_lights_the_scene_and_is_seen() {
-    let Some(place) = place_with_device() else { return };
-    place.write("dark.gltf", square(|v| v["scenes"][0]["nodes"] = json!([0, 1])));
-    let run = format!("render dark.gltf {TINY} -o a.exr --environment 2,1,0.5");
-    let (_, stderr) = place.succeed(&run);
-    assert!(!stderr.contains("nothing in this scene emits light"), "it is lit: {stderr}");
-    // A white wall under an even sky is as bright as the sky.
-    let pixels = place.pixels("a.exr");
-    let mean = |channel: usize| pixels.iter().skip(channel).step_by(3).sum::<f32>() / 256.0;
-    for (channel, sky) in [2.0, 1.0, 0.5].iter().enumerate() {
-        assert!((mean(channel) / sky - 1.0).abs() < 0.05, "channel {channel}: {} of {sky}", mean(channel));
-    }
-    // Grey by one number; off the wall the sky alone is seen, untouched.
-    place.succeed("render mirror-corridor --size 4x4 --photons 10 --rounds 2 --environment 3 -o b.exr");
-    assert_eq!(exr(&place, "dark.gltf --environment 0"), vec![0.0; 3 * 256]);
-}
-
+/// A white wall under an even sky is as bright as the sky. The camera is twice as wide as high, and so is its picture.
 #[test]
 fn a_scene_without_light_has_a_sky_and_a_line_says_so() {
     let Some(place) = place_with_device() else { return };
-    place.write("dark.gltf", square(|v| v["scenes"][0]["nodes"] = json!([0, 1])));
-    let (_, stderr) = place.succeed(&format!("render dark.gltf {TINY} -o a.exr"));
-    assert_eq!(stderr.matches("nothing in this scene emits light").count(), 1, "{stderr}");
-    let pixels = place.pixels("a.exr");
-    let mean = pixels.iter().sum::<f32>() / pixels.len() as f32;
-    assert!((mean - 1.0).abs() < 0.05, "a white wall under a sky of 1: {mean}");
-    let (_, stderr) = place.succeed(&format!("render dark.gltf {TINY} -o a.png --environment 0"));
-    assert!(!stderr.contains("shines"), "{stderr}");
-    assert!(place.picture("a.png").into_rgb8().into_raw().iter().all(|code| *code == 0));
+    let dark = square(|v| {
+        v["scenes"][0]["nodes"] = json!([0, 1]);
+        v["cameras"][0]["perspective"]["aspectRatio"] = json!(2);
+    });
+    place.write("dark.gltf", dark);
+    for (options, sky) in [("", [1.0; 3]), ("--environment 2,1,0.5", [2.0, 1.0, 0.5]), ("--environment 0", [0.0; 3])] {
+        let (_, stderr) = place.succeed(&format!("render dark.gltf --size 16 --photons 500 --rounds 2 -o a.exr {options}"));
+        assert_eq!(stderr.matches("nothing in this scene emits light").count(), usize::from(options.is_empty()), "{stderr}");
+        let picture = place.picture("a.exr").into_rgb32f();
+        assert_eq!(picture.dimensions(), (16, 8));
+        for (channel, sky) in sky.iter().enumerate() {
+            let mean = picture.pixels().map(|pixel| pixel.0[channel]).sum::<f32>() / 128.0;
+            assert!((mean - sky).abs() <= 0.05 * sky, "channel {channel}: {mean} of {sky}");
+        }
+    }
 }
 
 #[test]
@@ -469,22 +422,13 @@ fn a_scene_without_a_camera_is_seen_whole() {
     let Some(place) = place_with_device() else { return };
     place.write("scene.gltf", square(|v| v["scenes"][0]["nodes"] = json!([0, 3])));
     let pixels = exr(&place, "scene.gltf");
-    let lit = |i: usize, j: usize| pixels[3 * (16 * j + i)] > 0.0;
-    assert!(lit(8, 8), "the middle is dark");
-    assert!((0..16).all(|k| !lit(k, 0) && !lit(k, 15) && !lit(0, k) && !lit(15, k)), "the wall is cut off");
+    let lit = |i: usize, j: usize| pixels[3 * (8 * j + i)] > 0.0;
+    assert!(lit(4, 4), "the middle is dark");
+    assert!((0..8).all(|k| !lit(k, 0) && !lit(k, 7) && !lit(0, k) && !lit(7, k)), "the wall is cut off");
     assert_refused(&place, [("render scene.gltf -o b.exr --camera eye", ["--camera eye", "none"])]);
 }
 
-#[test]
-fn zero_area_triangles_are_a_warning_and_the_picture_is_right() {
-    let Some(place) = place_with_device() else { return };
-    place.write("plain.gltf", square(|_| {}));
-    place.write("flat.gltf", square(|v| v["accessors"][1]["count"] = json!(9)));
-    let (_, stderr) = place.succeed(&format!("render flat.gltf {TINY} -o flat.exr --quiet"));
-    assert!(stderr.contains("warning: 1 triangle without area left out") && stderr.lines().count() == 1, "{stderr}");
-    assert_eq!(place.pixels("flat.exr"), exr(&place, "plain.gltf"));
-}
-
+/// Whose parts add up to the whole, as those of matt walls, mirrors and glass do in tests/files/picture_files.rs.
 #[test]
 fn a_blender_file_renders_with_all_that_it_holds() {
     let Some(place) = place_with_device() else { return };
@@ -494,8 +438,17 @@ fn a_blender_file_renders_with_all_that_it_holds() {
     for effect in ["textures", "point-lights", "spot-lights", "directional-lights", "mesh-lights", "refractive-caustics", "bvh"] {
         assert!(kept.iter().any(|name| name == effect), "{effect}: {kept:?}");
     }
-    let pixels = place.pixels("a.exr");
-    assert!(pixels.iter().all(|value| value.is_finite()) && pixels.iter().filter(|value| **value > 0.0).count() > 300);
+    let (_, channels) = exr_file::decode(&std::fs::read(place.at("a.exr")).unwrap()).unwrap();
+    let channels: BTreeMap<String, Vec<f32>> = channels.into_iter().map(|channel| (channel.name, channel.values)).collect();
+    for channel in ["R", "G", "B"] {
+        let whole = &channels[channel];
+        assert!(whole.iter().all(|value| value.is_finite()) && whole.iter().filter(|value| **value > 0.0).count() > 20);
+        for (pixel, value) in whole.iter().enumerate() {
+            let sum: f32 =
+                ["direct", "specular", "caustic", "indirect"].map(|part| channels[&format!("{part}.{channel}")][pixel]).iter().sum();
+            assert!((sum - value).abs() <= 1e-6 * value.max(1e-3), "{channel} of pixel {pixel}: {sum} instead of {value}");
+        }
+    }
 }
 
 /// Results are of texels here, not of points.
@@ -505,30 +458,6 @@ fn a_bake_speaks_of_texels() {
     let (stdout, stderr) = place.succeed("bake cornell -o b --texels-per-metre 2 --photons 50 --rounds 1");
     assert!(stderr.contains(" texels; 1 round of 50 global photons"), "{stderr}");
     assert!(stdout.contains(" texels where some may arrive"), "{stdout}");
-}
-
-#[test]
-fn errors_of_pixels_are_written_beside_the_picture() {
-    let Some(place) = place_with_device() else { return };
-    place.succeed(&format!("render cornell {TINY} -o a.exr --error-image e.exr"));
-    let errors = place.pixels("e.exr");
-    // Of a pixel that nothing has reached the error is infinite.
-    assert!(errors.len() == 3 * 256 && errors.iter().all(|error| *error >= 0.0));
-    assert!(errors.iter().filter(|error| error.is_finite()).count() > 3 * 240);
-    assert_eq!(place.names(), ["a.exr", "e.exr"]);
-}
-
-/// A reader that goes away, a full disk.
-#[test]
-fn output_that_nobody_takes_is_no_panic() {
-    let place = Place::new();
-    place.assert_shell("photonmill plan cornell -q | true", 0, 0);
-    place.assert_shell("photonmill plan cornell -q --json | head -c 1 > /dev/null", 0, 0);
-    place.assert_shell("photonmill plan cornell -q > /dev/full", 2, 1);
-    if !no_gpu() {
-        place.assert_shell("photonmill render cornell --size 4x4 --photons 10 --rounds 1 -q -o a.png | true", 0, 0);
-        assert!(place.at("a.png").exists());
-    }
 }
 
 /// A plan needs a device's limits, not the device; a picture needs the device and says so.
@@ -549,30 +478,19 @@ fn a_picture_of_the_sky_is_turned_scaled_and_refused() {
     let Some(place) = place_with_device() else { return };
     place.write("dark.gltf", square(|v| v["scenes"][0]["nodes"] = json!([0, 1])));
     let sky = image::Rgb32FImage::from_fn(8, 4, |i, _| image::Rgb(if i < 4 { [4.0, 0.0, 1.0] } else { [0.0, 2.0, 1.0] }));
-    for name in ["sky.exr", "sky.hdr"] {
-        sky.save(place.at(name)).unwrap();
-    }
+    sky.save(place.at("sky.exr")).unwrap();
     let mean = |options: &str| -> [f32; 3] {
         place.succeed(&format!("render dark.gltf {TINY} -o a.exr {options}"));
         let pixels = place.pixels("a.exr");
-        [0, 1, 2].map(|channel| pixels.iter().skip(channel).step_by(3).sum::<f32>() / 256.0)
+        [0, 1, 2].map(|channel| pixels.iter().skip(channel).step_by(3).sum::<f32>() / 64.0)
     };
     // The wall faces +z, the middle of the right half, and sees no more than that half.
-    let near = |found: [f32; 3], expected: [f32; 3]| {
-        assert!(
-            found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 0.12 + 0.05 * expected),
-            "{found:?}, not {expected:?}"
-        );
-    };
-    for name in ["sky.exr", "sky.hdr"] {
-        near(mean(&format!("--environment {name}")), [0.05, 1.975, 1.0]);
-    }
-    near(mean("--environment sky.exr --environment-rotate 180 --environment-strength 0.5"), [1.975, 0.025, 0.5]);
-    // A wall that faces the sun: 100 klx and less, of which a white wall returns 1 / pi, over 683 lm/W.
-    let bright = mean("--sun 180,30")[1];
-    assert!((20.0..80.0).contains(&bright), "{bright}");
-    let halved = mean("--sun 180,30 --environment-strength 0.5")[1];
-    assert!((halved / bright - 0.5).abs() < 0.02, "{halved}, {bright}");
+    let found = mean("--environment sky.exr --environment-rotate 180 --environment-strength 0.5");
+    let is_near = pairs(found, [1.975, 0.025, 0.5]).all(|(found, expected)| (found - expected).abs() < 0.12 + 0.05 * expected);
+    assert!(is_near, "{found:?}");
+    // A wall that faces the sun: 100 klx and less, of which a white wall returns 1 / pi, over 683 lm/W; half of that.
+    let bright = mean("--sun 180,30 --environment-strength 0.5")[1];
+    assert!((13.0..33.0).contains(&bright), "{bright}");
     std::fs::write(place.at("text.hdr"), "no picture").unwrap();
     for (options, words) in [
         ("--environment none.exr", "none.exr"),

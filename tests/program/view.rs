@@ -19,24 +19,35 @@ use x11rb::protocol::xtest::ConnectionExt as _;
 use x11rb::rust_connection::RustConnection;
 
 use crate::common::prelude::*;
+use crate::common::program::PATIENCE;
 
 static NEVER: AtomicBool = AtomicBool::new(false);
 const SIZE: [u32; 2] = [12, 8];
 
-fn settings() -> SceneSettings {
-    SceneSettings { photons: 1 << 10, caustic_photons: 1 << 10, rounds: 1 << 16, keeps_parts: true, ..SceneSettings::default() }
+/// What a window of `cornell-spheres` is made of.
+struct Spheres {
+    geometry: Geometry,
+    camera: Camera,
+    plan: ScenePlan,
+}
+
+impl Spheres {
+    fn new(gpu: &Gpu) -> Spheres {
+        let scene = scene("cornell-spheres");
+        let (geometry, camera) = (Geometry::new(&scene).unwrap(), scene.first_camera());
+        let few = SceneSettings { photons: 1 << 10, caustic_photons: 1 << 10, ..SceneSettings::default() };
+        let settings = SceneSettings { rounds: 1 << 16, keeps_parts: true, ..few };
+        let view = View { geometry: &geometry, camera: Some(&camera), phases: &[] };
+        let plan = trial::plan(gpu, &scene, &view, &settings, Sensor::Picture { width: SIZE[0], height: SIZE[1] }).unwrap();
+        Spheres { geometry, camera, plan }
+    }
 }
 
 /// A camera that moves sees the photons that are kept, and what it sees is to the bit what a run of its own would.
 #[test]
 fn a_moved_camera_sees_kept_photons_and_the_picture_of_its_own_run() {
     let Some(gpu) = device() else { return };
-    let scene = Scene::open("cornell-spheres", false).unwrap();
-    let geometry = Geometry::new(&scene).unwrap();
-    let first = scene.first_camera();
-    let view = View { geometry: &geometry, camera: Some(&first), phases: &[] };
-    let sensor = Sensor::Picture { width: SIZE[0], height: SIZE[1] };
-    let plan = trial::plan(&gpu, &scene, &view, &settings(), sensor).unwrap();
+    let Spheres { geometry, camera: first, plan } = Spheres::new(&gpu);
     let moved = Camera { eye: first.eye + 0.3 * first.right + 0.2 * first.forward, ..first.clone() };
     let rounds = |live: &mut LiveScene, count: u32| (0..count).for_each(|_| live.round().unwrap());
 
@@ -64,12 +75,7 @@ fn a_moved_camera_sees_kept_photons_and_the_picture_of_its_own_run() {
 #[test]
 fn the_window_has_the_values_of_the_film_and_the_codes_of_its_file() {
     let Some(gpu) = device() else { return };
-    let scene = Scene::open("cornell-spheres", false).unwrap();
-    let geometry = Geometry::new(&scene).unwrap();
-    let camera = scene.first_camera();
-    let view = View { geometry: &geometry, camera: Some(&camera), phases: &[] };
-    let sensor = Sensor::Picture { width: SIZE[0], height: SIZE[1] };
-    let plan = trial::plan(&gpu, &scene, &view, &settings(), sensor).unwrap();
+    let Spheres { geometry, camera, plan } = Spheres::new(&gpu);
     let mut live = LiveScene::new(&gpu, &geometry, &camera, &plan, &NEVER).unwrap();
     let picture = Picture::new(&gpu, SIZE, SIZE).unwrap();
     let pixels = (SIZE[0] * SIZE[1]) as usize;
@@ -179,9 +185,6 @@ const KEY_R: u8 = 27;
 const KEY_F: u8 = 41;
 const KEY_H: u8 = 43;
 
-/// Of what takes long on a busy machine.
-const PATIENCE: Duration = Duration::from_secs(120);
-
 #[track_caller]
 fn wait_for<T>(what: &str, mut found: impl FnMut() -> Option<T>) -> T {
     let began = Instant::now();
@@ -254,14 +257,19 @@ impl Desktop {
     }
 }
 
-/// The next screenshot: its size and its codes.
-fn screenshot(desktop: &Desktop, place: &Place, number: u32) -> ([u32; 2], Vec<u8>) {
-    desktop.press(KEY_F);
-    let path = place.at(&format!("photonmill-{number}.png"));
-    wait_for("a screenshot", || {
-        let content = std::fs::read(&path).ok()?;
-        let image = image::load_from_memory(&content).ok()?.into_rgb8();
-        Some(([image.width(), image.height()], image.into_raw()))
+/// Screenshots one after another until one is as wanted: how many there are now, its size and its codes.
+#[track_caller]
+fn screenshot(desktop: &Desktop, place: &Place, what: &str, is_wanted: impl Fn([u32; 2], &[u8]) -> bool) -> (u32, Vec<u8>) {
+    let numbers = (1u32..).find(|number| !place.at(&format!("photonmill-{number}.png")).exists()).unwrap()..;
+    let mut next = numbers.map(|number| {
+        desktop.press(KEY_F);
+        let path = place.at(&format!("photonmill-{number}.png"));
+        let read = || image::load_from_memory(&std::fs::read(&path).ok()?).ok();
+        (number, wait_for("a screenshot", read).into_rgb8())
+    });
+    wait_for(what, || {
+        let (number, image) = next.next()?;
+        is_wanted([image.width(), image.height()], image.as_raw()).then(|| (number, image.into_raw()))
     })
 }
 
@@ -282,38 +290,32 @@ fn a_window_opens_resizes_hides_shows_renders_and_closes() {
     wait_for("a picture", || desktop.has_picture(window).then_some(()));
     // Without the panel the window is the picture.
     desktop.press(KEY_H);
-    std::thread::sleep(Duration::from_millis(500));
-    let (size, light) = screenshot(&desktop, &place, 1);
-    assert_eq!(size, [760, 570]);
+    let (_, light) = screenshot(&desktop, &place, "the picture alone", |size, _| size == [760, 570]);
     wait_for("the picture of the file on the screen", || {
-        (mean_difference(&light, desktop.colours(window).as_flattened()) < 8.0).then_some(())
+        let colours = desktop.colours(window);
+        (3 * colours.len() == light.len() && mean_difference(&light, colours.as_flattened()) < 8.0).then_some(())
     });
 
     desktop.press(KEY_6);
-    let (_, errors) = screenshot(&desktop, &place, 2);
-    assert!(mean_difference(&light, &errors) > 20.0);
+    screenshot(&desktop, &place, "the error", |_, errors| mean_difference(&light, errors) > 20.0);
 
     // Another size of the window.
     desktop.connection.configure_window(window, &ConfigureWindowAux::new().width(210).height(170)).unwrap();
     desktop.connection.flush().unwrap();
-    std::thread::sleep(Duration::from_millis(500));
-    let mut number = 3;
-    wait_for("the new size", || {
-        let (size, _) = screenshot(&desktop, &place, number);
-        number += 1;
-        (size == [210, 170]).then_some(())
-    });
+    screenshot(&desktop, &place, "the new size", |size, _| size == [210, 170]);
 
     // Away and back.
     desktop.connection.unmap_window(window).unwrap();
     desktop.connection.flush().unwrap();
-    std::thread::sleep(Duration::from_millis(700));
+    let is_shown = || u8::from(desktop.connection.get_window_attributes(window).unwrap().reply().unwrap().map_state) == 2;
+    wait_for("the window to go", || (!is_shown()).then_some(()));
+    // Some frames of it are asked for meanwhile.
+    std::thread::sleep(Duration::from_millis(500));
     desktop.connection.map_window(window).unwrap();
     desktop.connection.flush().unwrap();
     let window = desktop.window();
     wait_for("the picture again", || desktop.has_picture(window).then_some(()));
-    let (size, _) = screenshot(&desktop, &place, number);
-    assert_eq!(size, [210, 170]);
+    let (number, _) = screenshot(&desktop, &place, "its size again", |size, _| size == [210, 170]);
 
     // The picture as it is seen, by the command that the window names.
     desktop.press(KEY_R);

@@ -22,6 +22,7 @@ mod path;
 pub mod radiosity;
 mod verdict;
 
+use std::cell::Cell;
 use std::f64::consts::PI;
 use std::ops::{Add, Index, IndexMut};
 
@@ -95,6 +96,19 @@ fn uniform(rng: &mut Random) -> f64 {
     (rng.next_u64() >> 11) as f64 / (1u64 << 53) as f64
 }
 
+thread_local! {
+    static PATHS: Cell<u64> = const { Cell::new(0) };
+}
+
+/// Paths that this thread has asked judges for so far, a count that no clock disturbs.
+pub fn paths_traced() -> u64 {
+    PATHS.get()
+}
+
+fn count_paths(paths: u64) {
+    PATHS.set(PATHS.get() + paths);
+}
+
 impl<'a> Judge<'a> {
     /// `max_bounces`: surfaces that may scatter light on its way from the emitter to the eye, or to the
     /// point that irradiance is asked for; `u32::MAX` for no limit.
@@ -107,6 +121,7 @@ impl<'a> Judge<'a> {
 
     /// A picture. Samples are spread evenly over each pixel's square.
     pub fn image(&self, camera: &Camera, width: u32, height: u32, samples_per_pixel: u32, seed: u64) -> Image {
+        count_paths(u64::from(width) * u64::from(height) * u64::from(samples_per_pixel));
         let aspect = f64::from(width) / f64::from(height);
         let pixel = |number: u32| {
             let (column, row) = (f64::from(number % width), f64::from(number / width));
@@ -127,6 +142,7 @@ impl<'a> Judge<'a> {
 
     /// Irradiance at points, each with the unit normal of the side that is lit.
     pub fn irradiance_at(&self, points: &[(DVec3, DVec3)], samples: u32, seed: u64) -> Vec<Estimate> {
+        count_paths(points.len() as u64 * u64::from(samples));
         let estimate = |(index, (point, normal)): (usize, &(DVec3, DVec3))| {
             let mut rng = random(seed, index as u64);
             Estimate::of(samples, || self.irradiance(*point, *normal, &mut rng))

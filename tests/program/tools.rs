@@ -1,0 +1,60 @@
+//! Scripts beside the program: no test runs most of them, as they need other programs, a GPU or a night. Each must at least be one
+//! that its interpreter can read.
+
+use std::process::{Command, Output};
+
+use crate::common::prelude::*;
+use crate::common::program::entries;
+use crate::common::sources::root;
+
+/// Files below a folder.
+fn below(folder: &str) -> Vec<String> {
+    let paths = entries(&root(folder)).into_iter().map(|name| format!("{folder}/{name}"));
+    let is_made = |path: &String| ["corpus", "artifacts", "target", "__pycache__", "node_modules"].iter().any(|made| path.ends_with(made));
+    paths.filter(|path| !is_made(path)).flat_map(|path| if root(&path).is_dir() { below(&path) } else { vec![path] }).collect()
+}
+
+/// What reads a script without running it, by its first line or its name.
+fn reader(path: &str, first_line: &str) -> Option<[&'static str; 2]> {
+    let is = |interpreter: &str, end: &str| (first_line.starts_with("#!") && first_line.ends_with(interpreter)) || path.ends_with(end);
+    match () {
+        () if is("bash", ".sh") => Some(["bash", "-n"]),
+        () if is("python3", ".py") => Some(["python3", "-c"]),
+        () if is("node", ".mjs") || path.ends_with(".js") => Some(["node", "--check"]),
+        () => None,
+    }
+}
+
+/// `None` where the interpreter is not installed.
+fn parsed(path: &str, [program, argument]: [&str; 2]) -> Option<Output> {
+    let mut command = Command::new(program);
+    command.arg(argument);
+    if program == "python3" {
+        command.arg("import ast, sys; ast.parse(open(sys.argv[1], encoding='utf-8').read())");
+    }
+    command.arg(root(path)).output().ok()
+}
+
+#[test]
+fn every_script_can_be_read() {
+    let mut readers: BTreeMap<&str, usize> = BTreeMap::new();
+    for path in below("tools").into_iter().chain(below(".ci")) {
+        let content = std::fs::read(root(&path)).unwrap();
+        let first_line = String::from_utf8_lossy(content.split(|byte| *byte == b'\n').next().unwrap_or_default()).into_owned();
+        let Some(reader) = reader(&path, &first_line) else { continue };
+        *readers.entry(reader[0]).or_default() += 1;
+        match parsed(&path, reader) {
+            Some(output) => assert!(output.status.success(), "{path}: {}", text(&output.stderr)),
+            None => println!("SKIPPED: {path}, as there is no {}", reader[0]),
+        }
+    }
+    assert!(readers["bash"] > 10 && readers["python3"] > 15 && readers["node"] >= 2, "{readers:?}");
+
+    let place = Place::new();
+    for (name, content) in [("a.sh", "if true; then\n"), ("a.py", "def f(:\n")] {
+        place.write(name, content);
+        let path = place.at(name);
+        let path = path.to_str().unwrap();
+        assert!(parsed(path, reader(path, "").unwrap()).is_none_or(|output| !output.status.success()), "{name}");
+    }
+}
