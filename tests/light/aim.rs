@@ -35,7 +35,7 @@ fn kinds_bring_the_same_light(photons: u32, [precise_share, share]: [f64; 2]) {
 
 #[test]
 fn aimed_photons_bring_the_same_light_with_less_noise() {
-    kinds_bring_the_same_light(28_000, [0.085, 0.14]);
+    kinds_bring_the_same_light(40_000, [0.07, 0.14]);
 }
 
 #[test]
