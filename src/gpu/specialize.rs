@@ -28,6 +28,8 @@ mod op {
     pub const BRANCH_CONDITIONAL: u32 = 250;
     pub const SWITCH: u32 = 251;
     pub const ENTRY_POINT: u32 = 15;
+    pub const EXECUTION_MODE: u32 = 16;
+    pub const EXECUTION_MODE_ID: u32 = 331;
 }
 
 pub(super) const HEADER_WORDS: usize = 5;
@@ -247,7 +249,7 @@ fn reached<'a>(function: &[&'a [u32]]) -> Instructions<'a> {
 }
 
 fn is_execution_mode(instruction: &[u32]) -> bool {
-    matches!(opcode(instruction), 16 | 331)
+    matches!(opcode(instruction), op::EXECUTION_MODE | op::EXECUTION_MODE_ID)
 }
 
 /// Names and lines for debuggers, which change no program.
