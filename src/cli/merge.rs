@@ -11,7 +11,7 @@ use super::typed::Typed;
 use super::values::parse_stops;
 use super::{JsonArg, complain, optional_file, say_beside};
 use crate::engine::blocks::Share;
-use crate::engine::saved::{SavedFilm, SavedRun};
+use crate::engine::saved::{NotMerged, SavedFilm, SavedRun};
 use crate::engine::scene::SceneFilm;
 use crate::error::{Error, Result, require};
 use crate::output::colour::{Format, Tone};
@@ -122,19 +122,26 @@ fn merge(files: &[PathBuf]) -> Result<Merged> {
     let mut read_before = Vec::new();
     for path in files {
         let part = read("FILE", path)?;
-        let refuse = |reason: String| Err(Error::setting("FILE", path.display(), reason));
+        let refused = |reason: String| Error::setting("FILE", path.display(), reason);
         let Some(Merged { run, parts }) = &mut merged else {
             read_before.push((path, part.done.clone()));
             merged = Some(Merged { parts: vec![part.share], run: part });
             continue;
         };
         if let Some(difference) = run.identity.differs_from(&part.identity) {
-            return refuse(format!("{difference} (as {} is)", files[0].display()));
+            return Err(refused(format!("{difference} (as {} is)", files[0].display())));
         }
-        if let Err(block) = run.merge(&part) {
-            let (other, _) = read_before.iter().find(|(_, done)| done.contains(block)).expect("some file has the block");
-            return refuse(format!("holds block {block}, which {} holds too; give each part once", other.display()));
-        }
+        run.merge(&part).map_err(|reason| {
+            let damaged = "one of them is damaged; use an older copy, or compute that part anew";
+            refused(match reason {
+                NotMerged::Twice(block) => {
+                    let (other, _) = read_before.iter().find(|(_, done)| done.contains(block)).expect("some file has the block");
+                    format!("holds block {block}, which {} holds too; give each part once", other.display())
+                }
+                NotMerged::OtherShape => format!("holds other sums than {} holds, so {damaged}", files[0].display()),
+                NotMerged::TooLarge => format!("and the files before it hold more light than a run can, so {damaged}"),
+            })
+        })?;
         parts.push(part.share);
         read_before.push((path, part.done));
     }

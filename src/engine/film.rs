@@ -17,6 +17,21 @@ pub struct BlockSums {
     pub squares: Vec<u128>,
 }
 
+/// Of any place of a film.
+const MOST_SUM: u64 = 1 << 63;
+
+/// Sums of two parts do not fit into one, as those of a run do. What was to hold them holds nothing of use.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TooLarge;
+
+/// Adds others, place by place.
+pub fn add_all<T: Copy>(sums: &mut [T], others: &[T], add: impl Fn(T, T) -> Option<T>) -> Result<(), TooLarge> {
+    sums.iter_mut().zip(others).try_for_each(|(sum, others)| {
+        *sum = add(*sum, *others).ok_or(TooLarge)?;
+        Ok(())
+    })
+}
+
 /// What a block left at [`kept_count`] places.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KeptBlock {
@@ -38,11 +53,21 @@ impl BlockSums {
     }
 
     /// Adds the blocks of another part of the same run.
-    pub fn merge(&mut self, other: &BlockSums) {
-        self.rounds += other.rounds;
-        self.blocks += other.blocks;
-        self.sums.iter_mut().zip(&other.sums).for_each(|(sum, others)| *sum += others);
-        self.squares.iter_mut().zip(&other.squares).for_each(|(squares, others)| *squares += others);
+    pub fn merge(&mut self, other: &BlockSums) -> Result<(), TooLarge> {
+        self.rounds = self.rounds.checked_add(other.rounds).ok_or(TooLarge)?;
+        self.blocks = self.blocks.checked_add(other.blocks).ok_or(TooLarge)?;
+        add_all(&mut self.sums, &other.sums, u64::checked_add)?;
+        add_all(&mut self.squares, &other.squares, u128::checked_add)
+    }
+
+    /// Whether sums and squares can be those of so many blocks: where all else is equal, sums^2 <= blocks * squares, and one block
+    /// left it all where squares = sums^2.
+    pub fn is_sound(&self) -> bool {
+        let mut places = self.sums.iter().zip(&self.squares);
+        places.all(|(sum, squares)| {
+            let square = u128::from(*sum).pow(2);
+            *sum <= MOST_SUM && *squares <= square && squares.checked_mul(self.blocks.into()).is_none_or(|most| square <= most)
+        })
     }
 
     /// Variance of a place's sum; infinite of fewer than two blocks.
@@ -51,8 +76,7 @@ impl BlockSums {
             return f64::INFINITY;
         }
         let (blocks, sum) = (f64::from(self.blocks), u128::from(self.sums[place]));
-        // sum^2 <= blocks * squares, so what is left of the squares is not negative but for the division's remainder; and sums
-        // are at most 2^63.
+        // sum^2 <= blocks * squares, so what is left of the squares is not negative but for the division's remainder.
         let deviation = self.squares[place].saturating_sub(sum * sum / u128::from(self.blocks)) as f64;
         deviation * blocks / (blocks - 1.0)
     }

@@ -5,7 +5,7 @@ use sha2::{Digest, Sha256};
 
 use super::blocks::{Blocks, Share};
 use super::differences::Differences;
-use super::film::{BlockSums, KeptBlock, LatestBlocks};
+use super::film::{BlockSums, KeptBlock, LatestBlocks, TooLarge};
 use super::identity::Identity;
 use super::room::film::RoomFilm;
 use super::scene::film::SceneFilm;
@@ -39,6 +39,17 @@ pub enum SavedFilm {
     Scene(Box<SceneFilm>),
 }
 
+/// Why two saved runs are no parts of one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NotMerged {
+    /// Both hold this block.
+    Twice(u32),
+    /// Their sums are not of the same things.
+    OtherShape,
+    /// Together they hold more than any run does.
+    TooLarge,
+}
+
 impl From<RoomFilm> for SavedFilm {
     fn from(film: RoomFilm) -> SavedFilm {
         SavedFilm::Room(film)
@@ -68,18 +79,34 @@ impl SavedFilm {
 }
 
 impl SavedRun {
-    /// Adds the blocks of another part of the same run; fails with a block that both have.
-    pub fn merge(&mut self, other: &SavedRun) -> Result<(), u32> {
-        self.done.merge(&other.done)?;
+    /// Adds the blocks of another part of the same run. Where that fails, what is here is of no use any more.
+    pub fn merge(&mut self, other: &SavedRun) -> Result<(), NotMerged> {
+        if self.shape() != other.shape() {
+            return Err(NotMerged::OtherShape);
+        }
+        self.done.merge(&other.done).map_err(NotMerged::Twice)?;
         self.wanted = self.wanted.max(other.wanted);
         self.share = Share::default();
         self.fates.iter_mut().zip(&other.fates).for_each(|(fates, others)| fates.add(others));
-        match (&mut self.film, &other.film) {
+        let added = match (&mut self.film, &other.film) {
             (SavedFilm::Room(film), SavedFilm::Room(others)) => film.merge(others),
             (SavedFilm::Scene(film), SavedFilm::Scene(others)) => film.merge(others),
-            _ => unreachable!("identities of two worlds differ"),
-        }
-        Ok(())
+            _ => unreachable!("films of two worlds have other shapes"),
+        };
+        added.map_err(|TooLarge| NotMerged::TooLarge)?;
+        let is_sound = self.fates.iter().all(|fates| fates.is_sound(MOST_COUNTED)) && self.film.blocks().is_sound();
+        if is_sound { Ok(()) } else { Err(NotMerged::TooLarge) }
+    }
+
+    /// What parts of a run have in common: the world, bounces counted of each map, and lengths of sums.
+    fn shape(&self) -> (bool, Vec<usize>, Vec<usize>) {
+        let bounces = self.fates.iter().map(|fates| fates.bounces.len()).collect();
+        let film = match &self.film {
+            SavedFilm::Room(film) => vec![film.channel_count as usize],
+            SavedFilm::Scene(film) => vec![film.part_totals.len(), film.class_counts.len(), film.differences.0.len()],
+        };
+        let sums = self.film.blocks();
+        (matches!(self.film, SavedFilm::Room(_)), bounces, [film, vec![sums.sums.len(), sums.squares.len()]].concat())
     }
 
     /// Whether the parts of each pixel's light are kept apart.
@@ -320,7 +347,7 @@ impl SavedRun {
                 let of_surfaces = reader.next_sums("surfaces", rounds, done.count())?;
                 let rounds_per_block = plan.rounds_per_block;
                 let seen = if plan.sees_light { of_blocks.sums.len() } else { 0 };
-                if [of_surfaces.sums.len(), of_surfaces.squares.len()] != [seen; 2] {
+                if [of_surfaces.sums.len(), of_surfaces.squares.len()] != [seen; 2] || !of_surfaces.is_sound() {
                     return wrong("its sums of surfaces");
                 }
                 let film = SceneFilm {
@@ -351,14 +378,15 @@ impl SavedRun {
         };
         let saved = SavedRun { identity, share, wanted, done, sensor, fates, film };
         let sums: &BlockSums = saved.film.blocks();
-        if values == 0 || !sums.sums.len().is_multiple_of(values) || sums.squares.len() != sums.sums.len() {
+        let places = sums.sums.len();
+        if values == 0 || places == 0 || !places.is_multiple_of(values) || sums.squares.len() != places || !sums.is_sound() {
             return wrong("its sums");
         }
         if saved.done.count().checked_mul(rounds_per_block) != Some(rounds) {
             return wrong("its rounds");
         }
         let pixels = saved.sensor.map(|sensor| sensor.pixels() as usize);
-        if pixels.is_some_and(|pixels| pixels * 3 != sums.sums.len()) {
+        if pixels.is_some_and(|pixels| pixels * 3 != places) {
             return wrong("its size");
         }
         Ok(saved)

@@ -1,7 +1,7 @@
 //! Kernels: their reflected interfaces, and the pipelines made from them.
 
 use std::cell::RefCell;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::io::{Cursor, Write};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -104,12 +104,15 @@ pub(super) struct Pipelines {
     by_key: HashMap<PipelineKey, Arc<Pipeline>>,
     /// By kernel and content: constants that nothing of what is left of a kernel names make no pipeline of its own.
     made: HashMap<(&'static str, [u8; 32]), Arc<Pipeline>>,
+    /// Those of them that were made while other SPIR-V stood for the kernel.
+    of_replaced: HashSet<(&'static str, [u8; 32])>,
 }
 
 impl Pipelines {
-    /// Forgets which pipelines stand for a kernel. Those that were made stay for whoever asks for the same program again.
+    /// Forgets which pipelines stand for a kernel, and drops those of SPIR-V that stood for its own.
     pub(super) fn forget(&mut self, is_changed: impl Fn(&str) -> bool) {
         self.by_key.retain(|key, _| !is_changed(key.kernel));
+        self.of_replaced.drain().for_each(|key| drop(self.made.remove(&key)));
     }
 }
 
@@ -209,6 +212,9 @@ impl Gpu {
             let mut pipelines = self.pipelines.borrow_mut();
             self.add_work(Work { pipelines: 1, ..Work::default() });
             pipelines.made.insert((key.kernel, content), pipeline.clone());
+            if self.options.replaced.iter().any(|(name, _)| name == key.kernel) {
+                pipelines.of_replaced.insert((key.kernel, content));
+            }
             pipelines.by_key.insert(key, pipeline);
         }
         Ok(())

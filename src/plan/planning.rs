@@ -134,7 +134,7 @@ impl ScenePlan {
         tiles.map_or(Ok(()), |tiles| tiles.check(samples, sensor.size()))?;
         let of_tiles = "cannot name the pixels of tiles with more samples, as a pilot or --settings gives them; set --samples too";
         require(!settings.paranoid || tiles.is_none(), "--paranoid", "on", of_tiles)?;
-        let extra_samples = ExtraSamples::new(tiles, samples, sensor.size());
+        let extra_samples = ExtraSamples::new(tiles, samples, sensor.size(), limits.buffer_bytes)?;
         let most_samples = extra_samples.most;
         let points_per_path = if gather_rays == GATHER_NONE { 1 } else { 2 };
         let arrival_sets = if split { 2 } else { 3 };

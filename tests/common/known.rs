@@ -344,7 +344,7 @@ pub fn coarse_sphere_in_a_furnace(gpu: &Gpu, material: Material, segments: u32) 
     let scene = coarse_sphere(material, segments, LightKind::Environment { radiance: Vec3::ONE });
     let camera = Camera::looking_at("front", DVec3::new(0.3, 0.4, 4.0), DVec3::ZERO, DVec3::Y, 0.55);
     let settings = of_coarse_spheres(SceneSettings { samples: 1, rounds: 16, photons: 1000, ..by_rounds() });
-    let lit = seen(gpu, &scene, &settings, &camera, [48, 48]);
+    let lit = seen(gpu, &scene, &settings, &camera, [24, 24]);
     let pixels = (0..lit.film.pixels()).map(|pixel| lit.film.mean(pixel).x);
     let darkest = pixels.fold(f64::INFINITY, f64::min);
     println!("{segments} segments: {} on the mean, {darkest} at the darkest pixel", mean_red(&lit));

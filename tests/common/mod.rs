@@ -46,17 +46,15 @@ pub struct Device {
     gpu: Option<Gpu>,
     /// What it had done before this test.
     before: Work,
-    /// Of tests that may use it after this one; `None` where no other may.
-    idle: Option<&'static Idle>,
+    /// Whether other tests may use it after this one.
+    is_shared: bool,
 }
 
 /// Devices that no test uses at the moment, with the pipelines that tests have made: a software device compiles for longer than
 /// it runs.
-type Idle = Mutex<Vec<Gpu>>;
-
-static IDLE: Idle = Mutex::new(Vec::new());
-/// Of those that split work by the plan alone.
-static IDLE_COUNTING: Idle = Mutex::new(Vec::new());
+static IDLE: Mutex<Vec<Gpu>> = Mutex::new(Vec::new());
+/// A device that has made more is not used again: lavapipe holds some nine megabytes of each.
+const MOST_PIPELINES: usize = 150;
 
 impl Deref for Device {
     type Target = Gpu;
@@ -82,27 +80,22 @@ impl Drop for Device {
         }
         self.check_validation().unwrap();
         assert_eq!((self.held_memory().device_bytes, self.held_memory().staging_bytes), (0, 0), "buffers are left");
-        if let (Some(idle), Some(mut gpu)) = (self.idle, self.gpu.take()) {
+        if self.is_shared
+            && self.work().pipelines <= MOST_PIPELINES
+            && let Some(mut gpu) = self.gpu.take()
+        {
             gpu.replace(Vec::new());
-            idle.lock().unwrap().push(gpu);
+            IDLE.lock().unwrap().push(gpu);
         }
     }
 }
 
-/// The device of the tests; `None` where `PHOTONMILL_NO_GPU=1` asks to go without. No other test uses it at the same time.
+/// The device of the tests; `None` where `PHOTONMILL_NO_GPU=1` asks to go without. No other test uses it at the same time. It splits
+/// work by the plan alone, and so in the same way however busy the machine is.
 pub fn device() -> Option<Device> {
-    shared(&IDLE, Options::default())
-}
-
-/// The same for tests that count dispatches, which then do not depend on how busy the machine is.
-pub fn counting_device() -> Option<Device> {
-    shared(&IDLE_COUNTING, Options { by_plan: true, ..Options::default() })
-}
-
-/// A device that tests use one after another, or that no test has used before.
-fn shared(idle: &'static Idle, options: Options) -> Option<Device> {
-    let used = idle.lock().unwrap().pop();
-    used.or_else(|| open(options)).map(|gpu| Device { before: gpu.work(), gpu: Some(gpu), idle: Some(idle) })
+    let used = IDLE.lock().unwrap().pop();
+    let gpu = used.or_else(|| open(Options { by_plan: true, ..Options::default() }))?;
+    Some(Device { before: gpu.work(), gpu: Some(gpu), is_shared: true })
 }
 
 /// A device that has made no pipeline yet.
@@ -112,7 +105,7 @@ pub fn fresh_device() -> Option<Device> {
 
 /// The same with some of its abilities masked off.
 pub fn device_with(options: Options) -> Option<Device> {
-    open(options).map(|gpu| Device { before: Work::default(), gpu: Some(gpu), idle: None })
+    open(options).map(|gpu| Device { before: Work::default(), gpu: Some(gpu), is_shared: false })
 }
 
 /// Whether `PHOTONMILL_NO_GPU=1` asks to go without a device.

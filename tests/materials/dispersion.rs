@@ -191,7 +191,7 @@ pub fn prism_photons(gpu: &Gpu) -> Check<Complaint> {
     let radius = 0.07;
     let heights = [edges[0] + 0.1, 0.5 * (edges[0] + edges[1]), 0.5 * (edges[1] + edges[2]), edges[2] - 0.1]
         .map(|y| (DVec3::new(at, y, 0.0), DVec3::NEG_X));
-    let caustic = SceneSettings { part: Part::Caustic, caustic_photons: 400_000, caustic_radius: Some(radius), ..by_rounds() };
+    let caustic = SceneSettings { part: Part::Caustic, caustic_photons: 150_000, caustic_radius: Some(radius), ..by_rounds() };
     let settings = SceneSettings { alpha: 1.0, rounds: 16, ..caustic };
     let lit = received(gpu, &scene, &settings, &heights);
     for (place, (found, error)) in pairs(means(&lit), standard_errors(&lit)).enumerate() {

@@ -172,7 +172,7 @@ fn twenty_large_textures_are_read_each_from_its_own_buffer() {
     let mut wall = Scene::default();
     for k in 0..20 {
         wall.meshes.push(Mesh::parallelogram("square", DVec3::X * k as f64, DVec3::X, DVec3::Y, k));
-        wall.materials.push(Material { emission: Vec3::ONE, emission_texture: Some(TextureUse::of(k, 0)), ..matt(0.0) });
+        wall.materials.push(Material { base_colour_texture: Some(TextureUse::of(k, 0)), ..matt(1.0) });
         let texels = Texels::Srgb(vec![code(k); side * side]);
         let texture = Texture {
             name: format!("picture {k}"),
@@ -184,6 +184,8 @@ fn twenty_large_textures_are_read_each_from_its_own_buffer() {
         };
         wall.textures.push(texture);
     }
+    // What a matt wall returns of a sun straight before it is its colour.
+    wall.lights.push(lamp(LightKind::Directional { direction: DVec3::NEG_Z, irradiance: Vec3::splat(PI as f32) }));
     // Three pixels a square.
     let camera = Camera::looking_at("eye", DVec3::new(10.0, 0.5, 60.0), DVec3::new(10.0, 0.5, 0.0), DVec3::Y, 2.0 * (0.5f64 / 60.0).atan());
     let settings = SceneSettings { rounds: 1, part: Part::Direct, ..by_rounds() };

@@ -216,12 +216,6 @@ fn all_mixtures_agree(gpu: &Gpu, finer: u32, lacking: &[Lacking]) {
     }
 }
 
-#[test]
-fn a_picture_of_all_mixtures_agrees_with_the_judge() {
-    let Some(gpu) = device() else { return };
-    all_mixtures_agree(&gpu, 1, &LACKING[..1]);
-}
-
 /// Effects whose absence the small picture shows.
 const LACKING: [Lacking; 7] = [
     ("no coat and no sheen", |layers| (layers.coat, layers.sheen_colour) = (0.0, Vec3::ZERO)),

@@ -163,7 +163,7 @@ fn tuning_compares_what_a_pilot_chooses_with_a_search() {
 /// Launches that the roofline counts are those of the run, of every outermost pass; and memory is what the plan says.
 #[test]
 fn the_roofline_counts_every_dispatch() {
-    let Some(gpu) = counting_device() else { return };
+    let Some(gpu) = device() else { return };
     let (never, rates) = (AtomicBool::new(false), &some_rates());
     let check = |what: &str, timed: &Timed| {
         let outermost = timed.passes.iter().filter(|pass| !pass.name.contains('/'));

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use std::ops::{Deref, DerefMut};
 
 use crate::engine::error_bound::FilmError;
-use crate::engine::film::{BlockSums, KeptBlock, LatestBlocks, kept_value};
+use crate::engine::film::{BlockSums, KeptBlock, LatestBlocks, TooLarge, kept_value};
 use crate::engine::measure_of_error::ErrorMeasure;
 use crate::engine::unknown::{Unknown, most_hits};
 use crate::plan::RoomPlan;
@@ -84,10 +84,11 @@ impl RoomFilm {
     }
 
     /// Adds the rounds of another part of the same run.
-    pub fn merge(&mut self, other: &RoomFilm) {
-        self.of_blocks.merge(&other.of_blocks);
+    pub fn merge(&mut self, other: &RoomFilm) -> Result<(), TooLarge> {
+        self.of_blocks.merge(&other.of_blocks)?;
         self.latest.merge(&other.latest);
-        self.emitted += other.emitted;
+        self.emitted = self.emitted.checked_add(other.emitted).ok_or(TooLarge)?;
+        Ok(())
     }
 
     /// Standard error of [`RoomFilm::flux`], from the variance between rounds; infinite where fewer than two are whole.

@@ -10,7 +10,7 @@ use crate::constants::{
 use crate::engine::bias::Bias;
 use crate::engine::differences::Differences;
 use crate::engine::error_bound::{ErrorPlaces, FilmError};
-use crate::engine::film::{BlockSums, LatestBlocks};
+use crate::engine::film::{BlockSums, LatestBlocks, TooLarge, add_all};
 use crate::engine::measure_of_error::ErrorMeasure;
 use crate::engine::unknown::{Uncounted, Unknown, most_hits};
 use crate::plan::buffers::{ANOMALY_WORDS, PART_VALUES};
@@ -76,26 +76,30 @@ impl Deref for SceneFilm {
 
 impl SceneFilm {
     /// Adds the blocks of another part of the same run.
-    pub fn merge(&mut self, other: &SceneFilm) {
-        self.of_blocks.merge(&other.of_blocks);
-        self.of_surfaces.iter_mut().zip(&other.of_surfaces).for_each(|(surfaces, others)| surfaces.merge(others));
+    pub fn merge(&mut self, other: &SceneFilm) -> Result<(), TooLarge> {
+        self.of_blocks.merge(&other.of_blocks)?;
+        self.of_surfaces.iter_mut().zip(&other.of_surfaces).try_for_each(|(surfaces, others)| surfaces.merge(others))?;
         self.latest.merge(&other.latest);
         self.differences.merge(&other.differences);
         // The most that one hit would have added, and what has hit is more than any.
         self.one_hits.iter_mut().zip(&other.one_hits).for_each(|(most, other)| *most = (*most).max(*other));
-        self.part_totals.iter_mut().zip(&other.part_totals).for_each(|(total, other)| *total += other);
-        self.parts = self.parts.take().zip(other.parts.as_ref()).map(|(mut parts, others)| {
-            parts.iter_mut().zip(others).for_each(|(sum, others)| *sum += others);
-            parts
-        });
-        self.stored.iter_mut().zip(&other.stored).for_each(|(stored, other)| *stored += other);
+        add_all(&mut self.part_totals, &other.part_totals, u64::checked_add)?;
+        self.parts = match (self.parts.take(), &other.parts) {
+            (Some(mut parts), Some(others)) => {
+                add_all(&mut parts, others, u64::checked_add)?;
+                Some(parts)
+            }
+            _ => None,
+        };
+        add_all(&mut self.stored, &other.stored, u64::checked_add)?;
         for word in 0..4 {
             self.anomalies[word] = self.anomalies[word].saturating_add(other.anomalies[word]);
         }
         for word in (4..ANOMALY_WORDS).step_by(2) {
-            let sum = wide_count(&self.anomalies, word) + wide_count(&other.anomalies, word);
+            let sum = wide_count(&self.anomalies, word).checked_add(wide_count(&other.anomalies, word)).ok_or(TooLarge)?;
             (self.anomalies[word], self.anomalies[word + 1]) = (sum as u32, (sum >> 32) as u32);
         }
+        Ok(())
     }
 
     pub fn pixels(&self) -> usize {
