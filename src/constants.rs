@@ -94,9 +94,9 @@ constants! {
     LAYER_IRIDESCENCE_THICKNESS = 13;
     LAYER_ANISOTROPY = 14;
     LAYER_COUNT = 15;
-    /// What a texel's four bytes are; see `scene::texture::Texels`.
+    /// What a texel's bytes are; see `scene::texture::Texels`.
     TEXELS_SRGB = 0;
-    TEXELS_SHARED_EXPONENT = 1;
+    TEXELS_FLOAT = 1;
     TEXELS_LINEAR = 2;
     /// Rows and columns of the tables of directional albedos (`scene::albedo`): roughnesses, and roots of cosines.
     ALBEDO_ROUGHNESSES = 32;
@@ -149,7 +149,9 @@ constants! {
     HIT_UNSEEN_LIGHT = 3;
     /// Photons of the global map that are not dim.
     HIT_BRIGHT_PHOTON = 4;
-    HIT_KINDS = 5;
+    /// No light: the receiver lies on no surface, where photons could be counted.
+    HIT_OFF_SURFACE = 5;
+    HIT_KINDS = 6;
     /// What a point gathers in a round is dim where it is less than the inverse of this, of the flux of the brightest photon.
     DIM_PHOTONS = 16;
 

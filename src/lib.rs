@@ -18,7 +18,7 @@
 //!
 //! let mut gpus = vec![Gpu::open(&Options::default())?];
 //! let scene = PreparedScene::open("cornell-spheres")?;
-//! let request = Request { rounds: Some(8), photons: Some(4096), ..Request::default() };
+//! let request = Request { rounds: Some(32), photons: Some(4096), ..Request::default() };
 //! let size = PictureSize::WidthAndHeight(32, 32);
 //! let picture = scene.render(&mut gpus, None, Some(size), &request, &mut Control::default())?;
 //! picture.save("picture.png", &Style::default())?;

@@ -30,6 +30,14 @@ pub fn one_line(text: &str) -> String {
     echo(text.replace(|letter: char| letter.is_control(), " "))
 }
 
+/// A length that is small, in the unit that suits it.
+pub fn in_metres(metres: f64) -> String {
+    match metres {
+        ..0.01 => format!("{:.2} mm", 1e3 * metres),
+        _ => format!("{metres:.2} m"),
+    }
+}
+
 /// The first few of some names.
 pub fn some_of(names: impl ExactSizeIterator<Item = impl ToString>) -> String {
     const MOST: usize = 5;

@@ -205,9 +205,7 @@ uint triangle_within(Cover cover, Triangle triangle, vec3 front, float height, f
 void cover_triangle(inout Cover cover, uint index)
 {
     Triangle triangle = triangles[index];
-    // No photon is ever stored on a mirror or on glass.
-    uint kind = materials[triangle.material].surface;
-    if (triangle.plane >= HIDDEN || kind == SURFACE_MIRROR || kind == SURFACE_DIELECTRIC) {
+    if (triangle.plane >= HIDDEN || !keeps_photons(triangle.material)) {
         return;
     }
     float radius = cover.radius;

@@ -160,7 +160,12 @@ void gather_photons()
                         }
                         vec3 arrived = uintBitsToFloat(light.xyz);
                         if (is_layered) {
-                            arrived *= 3.14159265358979324 * matt_brdf(lobes, cover, film, albedos_at(lobes.alpha, cover, cosine), ns, wo, wi);
+                            float coat_cosine = cosine;
+                            if (HAS_COATS) {
+                                coat_cosine = abs(dot(wi, unpack_normal(cover.coat_normal)));
+                            }
+                            LayerAlbedos lit = albedos_at(lobes.alpha, cover, cosine, coat_cosine);
+                            arrived *= 3.14159265358979324 * matt_brdf(lobes, cover, film, lit, ns, wo, wi);
                         }
                         precise vec3 flux = arrived * weight;
                         note_unless(is_finite(flux), NONFINITE_ESTIMATE, 0, push.round, index % push.pixel_count);

@@ -31,7 +31,7 @@ void main()
     Target here = plain_target(position, position_error(position), ng, ns, ns, SURFACE_RECEIVER, 0.0);
     start_chain(position, ns, vec3(1.0));
     if (HAS_MEDIA) {
-        chain.media = media_at(position);
+        chain.media = media_at(position, ng);
         here.media = chain.media;
     }
     if (HAS_SHADOW_RAYS) {
@@ -42,6 +42,9 @@ void main()
     // around.
     uint plane = plane_below(receiver.position, ng, push.radius);
     bool on_surface = plane != NONE;
+    if (!on_surface) {
+        note_hit(index, HIT_OFF_SURFACE);
+    }
     bool gathers = GATHER_RAYS == GATHER_ALL || !on_surface;
     if (on_surface) {
         uint arrivals = arrivals_wanted(gathers);

@@ -10,7 +10,7 @@ layout(push_constant, scalar) uniform Push { ViewPush push; };
 
 #include "world/scene/camera_kernel.glsl"
 #include "world/scene/extra_samples.glsl"
-#include "world/scene/filter.glsl"
+#include "world/scene/seen_sky.glsl"
 #include "world/scene/tiles.glsl"
 
 void main()
@@ -33,6 +33,7 @@ void main()
     vec2 place = vec2(pixel % push.width, pixel / push.width) + 0.5 + push.footprint * filter_offsets(u.xy);
     vec2 picture = vec2(divide(2.0 * place.x, push.width) - 1.0, 1.0 - divide(2.0 * place.y, push.height));
     vec3 origin = push.eye;
+    vec3 start = vec3(0.0);
     vec3 way = push.forward + picture.x * push.right + picture.y * push.up;
     if (push.is_orthographic != 0) {
         origin += picture.x * push.right + picture.y * push.up;
@@ -40,15 +41,33 @@ void main()
     }
     if (push.lens_radius > 0.0) {
         vec2 at = stratified_at(number, pixel, LENS_BLOCK, push.draws).xy;
-        vec3 start = sample_disc(vec3(0.0), push.forward, push.lens_radius, at);
+        start = sample_disc(vec3(0.0), push.forward, push.lens_radius, at);
         origin += start;
         way = push.focus * way - start;
     }
     vec3 direction = normalize(way);
+    // From very far away distances to surfaces that touch are one number: the ray starts short of the scene.
+    float distance_to_middle = norm(origin);
+    if (distance_to_middle > 8.0) {
+        origin += (distance_to_middle - 1.5) * direction;
+    }
 
     start_chain(origin, direction, vec3(1.0));
     if (HAS_MEDIA) {
-        chain.media = media_at(origin);
+        chain.media = media_at(origin, direction);
+    }
+    if (HAS_SKY_PICTURE) {
+        Emitter sky = emitters[max(push.emitter_count, 1u) - 1];
+        bool has_peaks = push.emitter_count != 0 && sky.kind == EMITTER_ENVIRONMENT && sky.outer_versine > LEAST_PEAK_SHARE;
+        // Parallel rays see the sky in one direction, and a path in a medium leaves it by other ways.
+        if (has_peaks && push.is_orthographic == 0 && chain.media == 0) {
+            float focus = push.lens_radius > 0.0 ? push.focus : 1.0;
+            vec2 middle = vec2(pixel % push.width, pixel / push.width) + 0.5;
+            window = SkyWindow(true, uvec2(0), uvec2(0), start, focus, push.forward, push.right, push.up, vec2(push.width, push.height), middle,
+                               push.footprint);
+            open_window(sky);
+            see_peaks_of_sky(sky, push.eye + start, push.draws, pixel, number);
+        }
     }
     follow(pixel_count, push.draws, push.emitter_count, 0);
     note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), NONFINITE_LIGHT, push.draws.domain,

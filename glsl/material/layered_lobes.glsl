@@ -128,6 +128,18 @@ vec3 normal_of_refraction(Surface surface, vec3 wo, float eta, uint depth)
     return is_trapped ? surface.ng : surface.ns;
 }
 
+// Bound of what stretched facets reflect beyond even ones as sharp as they are across, at a cosine, by a reflectance that is 1 at the horizon.
+float stretch_excess(float cosine)
+{
+    return 0.004 + 0.1 * max(1.0 - 4.5 * cosine, 0.0);
+}
+
+// What layers reflect of all light from wi, on either side.
+LayerAlbedos albedos_towards(Surface surface, MattCover cover, vec3 wi)
+{
+    return albedos_at(surface.layers.alpha, cover, abs(dot(wi, surface.ns)), abs(dot(wi, surface.layers.coat_normal)));
+}
+
 // `eta`: index where wo is over that beyond, of a solid.
 Lobes lobes_of(Surface surface, vec3 wo, float eta)
 {
@@ -175,7 +187,7 @@ Lobes lobes_of(Surface surface, vec3 wo, float eta)
     if (HAS_IRIDESCENCE) {
         lobes.film = MattFilm(layers.iridescence, layers.film_ior, layers.film_thickness, schlick_share, f0, layers.metallic, base, 0);
     }
-    LayerAlbedos seen = albedos_at(layers.alpha, cover, cosine);
+    LayerAlbedos seen = albedos_at(layers.alpha, cover, cosine, max(dot(layers.coat_normal, wo), 1e-6));
     cover.coat_albedo = seen.coat;
     cover.sheen_albedo = seen.sheen;
     lobes.cover = cover;
@@ -185,7 +197,13 @@ Lobes lobes_of(Surface surface, vec3 wo, float eta)
         e0 += layers.iridescence * (layers.film_bound - e0);
         e90 += layers.iridescence * (1.0 - e90);
     }
-    float below_diffuse = below_base(e0, e90, seen.base) * (1.0 - seen.coat);
+    float below_diffuse = below_base(e0, e90, seen.base);
+    if (HAS_ANISOTROPY) {
+        if (layers.is_stretched) {
+            below_diffuse = max(below_diffuse - e90 * stretch_excess(cosine), 0.0);
+        }
+    }
+    below_diffuse *= 1.0 - seen.coat;
     vec2 mean = mean_albedo(layers.alpha);
     float left = 1.0 - (e0 * mean.x + e90 * mean.y);
     if (HAS_COATS) {
@@ -236,7 +254,7 @@ Lobes lobes_of(Surface surface, vec3 wo, float eta)
             vec3 exact = dielectric_reflectance(lobes, layers.is_solid, cosine);
             reflected += lobes.exact_share * exact;
             transmitted = lobes.transmitted * (1.0 - exact);
-            if (layers.is_solid && layers.alpha >= DELTA_ALPHA) {
+            if (layers.alpha >= DELTA_ALPHA) {
                 // Facets let light through where the surface as a whole would not.
                 transmitted = max(transmitted, 0.125 * lobes.transmitted);
             }
@@ -368,7 +386,7 @@ LobeLight weigh_light(Surface surface, Lobes lobes, vec3 wo, vec3 wi, float ligh
     LobeLight light = LobeLight(vec3(0.0), vec3(0.0));
     float cosine = dot(wi, surface.ns);
     bool is_beyond = dot(wi, surface.ng) <= 0.0;
-    LayerAlbedos lit = albedos_at(layers.alpha, lobes.cover, abs(cosine));
+    LayerAlbedos lit = albedos_towards(surface, lobes.cover, wi);
     if (!is_beyond && cosine > 0.0) {
         light.matt = matt_brdf(lobes.matt, lobes.cover, lobes.film, lit, surface.ns, wo, wi) * cosine;
         if (asks_matt) {

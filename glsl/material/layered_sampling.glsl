@@ -69,7 +69,7 @@ bool is_smooth_lobe(Layers layers, Lobes lobes, uint lobe)
 Scatter sample_broad_lobe(Surface surface, Lobes lobes, vec3 wo, vec2 u, ChosenLobe chosen)
 {
     vec3 wi = to_frame(sample_cosine_hemisphere(u.x, u.y), surface.ns);
-    LayerAlbedos lit = albedos_at(surface.layers.alpha, lobes.cover, max(dot(wi, surface.ns), 0.0));
+    LayerAlbedos lit = albedos_towards(surface, lobes.cover, wi);
     vec3 brdf = chosen.lobe == LOBE_SHEEN ? sheen_brdf(lobes.cover, lit, surface.ns, wo, wi) : diffuse_brdf(lobes.matt, lobes.cover, lit);
     bool is_alive = dot(wi, surface.ng) > 0.0;
     return Scatter(wi, brdf * divide(3.14159265358979324, chosen.chance), is_alive, false, false, 0.0);
@@ -80,7 +80,7 @@ Scatter sample_beyond(Surface surface, Lobes lobes, vec2 u, ChosenLobe chosen)
 {
     vec3 wi = to_frame(sample_cosine_hemisphere(u.x, u.y), -surface.ns);
     float cosine = max(-dot(wi, surface.ns), 0.0);
-    LayerAlbedos lit = albedos_at(surface.layers.alpha, lobes.cover, cosine);
+    LayerAlbedos lit = albedos_towards(surface, lobes.cover, wi);
     vec3 btdf = below_all(lobes.beyond, lobes.matt, lobes.cover, lit);
     float density = chosen.chance * (0.31830988618379067 * cosine);
     return Scatter(wi, btdf * divide(3.14159265358979324, chosen.chance), dot(wi, surface.ng) < 0.0 && density > 0.0, true, false, density);
@@ -137,7 +137,7 @@ Scatter sample_facet(Surface surface, Lobes lobes, vec3 wo, vec2 u, ChosenLobe c
     vec3 colour = vec3(coat_colour(layers.coat, along));
     bool is_sharp = !is_matt(facets.alpha);
     if (!is_coat) {
-        LayerAlbedos lit = albedos_at(layers.alpha, lobes.cover, abs(dot(wi, surface.ns)));
+        LayerAlbedos lit = albedos_towards(surface, lobes.cover, wi);
         colour = base_lobe_colour(lobes, layers.is_solid, along, is_beyond) * below_cover(lobes.cover, lit);
         is_sharp = is_beyond || !is_matt_reflection(lobes, layers);
     }

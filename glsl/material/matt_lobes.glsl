@@ -58,19 +58,20 @@ MattCover no_cover()
     return MattCover(0.0, 1.0, 0, 0, 0.0, 0.0, vec3(0.0), 1.0, no_film());
 }
 
-// What layers reflect of all light from a direction at a cosine to the normal.
+// What layers reflect of all light from a direction, by its cosines to the normals of base and coat.
 struct LayerAlbedos {
     vec2 base; // factors of F0 and F90
     float coat;
     float sheen; // of white sheen
 };
 
-LayerAlbedos albedos_at(float alpha, MattCover cover, float cosine)
+// The coat reflects by its own normal, and takes from what lies below it as much as it reflects: else light is gained.
+LayerAlbedos albedos_at(float alpha, MattCover cover, float cosine, float coat_cosine)
 {
     LayerAlbedos albedos = LayerAlbedos(ggx_albedo(alpha, cosine), 0.0, 0.0);
     if (HAS_COATS) {
         if (cover.coat > 0.0) {
-            vec2 of_coat = ggx_albedo(cover.coat_alpha, cosine);
+            vec2 of_coat = ggx_albedo(cover.coat_alpha, coat_cosine);
             albedos.coat = cover.coat * (0.04 * of_coat.x + of_coat.y);
         }
     }

@@ -1,13 +1,17 @@
-// What a path runs through: a stack of at most four media, eight bits each, the one entered last lowest; 0: none. Of nested solids the
-// one entered last counts. Where more than four enclose a path, the outermost is forgotten.
+// What a path runs through: a stack of media, the one entered last lowest; 0: none. Of nested solids the one entered last counts.
+// A scene in which more of them lie in one another than there is room for is refused (src/scene/geometry/mod.rs).
+
+// Of one medium: eight, or fewer where many solids lie in one another.
+layout(constant_id = 75) const uint MEDIUM_BITS = 8;
+const uint MEDIUM_MASK = (1u << MEDIUM_BITS) - 1u;
 
 uint medium_removed(uint media, uint medium)
 {
-    for (uint place = 0; place < 32; place += 8) {
-        if (((media >> place) & 255u) == medium) {
+    for (uint place = 0; place + MEDIUM_BITS <= 32; place += MEDIUM_BITS) {
+        if (((media >> place) & MEDIUM_MASK) == medium) {
             uint below = (1u << place) - 1;
             // Shifting by 32 bits has no meaning.
-            uint above = place == 24 ? 0 : media >> (place + 8) << place;
+            uint above = place + MEDIUM_BITS == 32 ? 0 : media >> (place + MEDIUM_BITS) << place;
             return (media & below) | above;
         }
     }
@@ -29,7 +33,7 @@ float index_for(float ior, float spread, uint channel)
 
 float index_in(uint media, uint channel)
 {
-    uint medium = media & 255u;
+    uint medium = media & MEDIUM_MASK;
     return medium == 0 ? 1.0 : index_for(layered_materials[medium - 1].medium_ior, layered_materials[medium - 1].medium_spread, channel);
 }
 
@@ -37,12 +41,12 @@ float index_in(uint media, uint channel)
 uint media_beyond(Surface surface, uint media)
 {
     uint medium = surface.layers.medium;
-    return surface.front ? (media << 8) | medium : medium_removed(media, medium);
+    return surface.front ? (media << MEDIUM_BITS) | medium : medium_removed(media, medium);
 }
 
 float spread_in(uint media)
 {
-    uint medium = media & 255u;
+    uint medium = media & MEDIUM_MASK;
     return medium == 0 ? 0.0 : layered_materials[medium - 1].medium_spread;
 }
 
@@ -101,7 +105,7 @@ float index_ratio(Surface surface, uint media, uint channel)
 vec3 transmittance(uint media, float way)
 {
     if (HAS_MEDIA) {
-        uint medium = media & 255u;
+        uint medium = media & MEDIUM_MASK;
         if (medium != 0) {
             vec3 depth = 1.44269504088896341 * way * layered_materials[medium - 1].medium_absorption;
             return vec3(exp2(-depth.x), exp2(-depth.y), exp2(-depth.z));
@@ -110,16 +114,18 @@ vec3 transmittance(uint media, float way)
     return vec3(1.0);
 }
 
-// What encloses a point: the solids that a ray from there leaves and has not entered.
-uint media_at(vec3 position)
+// What encloses a point: the solids that a ray from there leaves and has not entered. `way` leads off the surface that the point lies on:
+// a solid has no face where it touches one that is opaque.
+uint media_at(vec3 position, vec3 way)
 {
     uint media = 0;
     if (HAS_MEDIA) {
         // Along no axis and no diagonal.
-        const vec3 direction = vec3(0.48666426, 0.81110711, 0.32444284);
+        const vec3 upwards = vec3(0.48666426, 0.81110711, 0.32444284);
+        vec3 direction = dot(upwards, way) < 0.0 ? -upwards : upwards;
         uint entered = 0;
         uint count = 0;
-        for (uint step = 0; step < MAX_BOUNCES && count < 32; step++) {
+        for (uint step = 0; step < MAX_BOUNCES && count + MEDIUM_BITS <= 32; step++) {
             Hit hit = closest_hit(position, direction);
             if (hit.triangle == NONE) {
                 break;
@@ -131,13 +137,13 @@ uint media_at(vec3 position)
             if (medium != 0) {
                 uint without = medium_removed(entered, medium);
                 if (!leaves) {
-                    entered = (entered << 8) | medium;
+                    entered = (entered << MEDIUM_BITS) | medium;
                 } else if (without != entered) {
                     entered = without;
                 } else {
                     // The first that it leaves is the innermost.
                     media |= medium << count;
-                    count += 8;
+                    count += MEDIUM_BITS;
                 }
             }
             position = offset_origin(triangle_point(triangle, hit.u, hit.v), triangle_error(triangle), normal, direction);

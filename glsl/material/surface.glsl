@@ -339,6 +339,19 @@ Surface surface_at(Hit hit, vec3 wo)
 
 #include "material/media.glsl"
 
+// Whether photons are stored on a material, and so whether its area is what they are counted over: both ask here. Light leaves mirrors
+// and glass in single directions, so that no density can tell it.
+bool keeps_photons(uint material)
+{
+    uint kind = materials[material].surface;
+    if (HAS_LAYERS) {
+        if (kind == SURFACE_LAYERED) {
+            return layered_materials[material].is_matt != 0;
+        }
+    }
+    return kind != SURFACE_MIRROR && kind != SURFACE_DIELECTRIC;
+}
+
 bool is_specular(Surface surface)
 {
     return surface.kind == SURFACE_MIRROR || surface.kind == SURFACE_DIELECTRIC;

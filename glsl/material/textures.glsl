@@ -36,12 +36,13 @@ float linear_of_code(uint code)
 vec4 texel(TextureInfo info, int i, int j)
 {
     uint place = wrapped(j, info.height, (info.wrap >> 2) & 3u) * info.width + wrapped(i, info.width, info.wrap & 3u);
-    uint word = texel_word(info.first_texel + place);
-    if (info.encoding == TEXELS_SHARED_EXPONENT) {
-        // A power of two: 2^(exponent - 24).
-        float unit = uintBitsToFloat(((word >> 27) + (127 - 24)) << 23);
-        return vec4(vec3(word & 511, (word >> 9) & 511, (word >> 18) & 511) * unit, 1.0);
+    if (info.encoding == TEXELS_FLOAT) {
+        // 21 bits each: numbers of single precision without their signs and lowest bits.
+        uint low = texel_word(info.first_texel + 2 * place), high = texel_word(info.first_texel + 2 * place + 1);
+        uvec3 channels = uvec3(low, low >> 21 | high << 11, high >> 10) & 0x1fffffu;
+        return vec4(uintBitsToFloat(channels << 10), 1.0);
     }
+    uint word = texel_word(info.first_texel + place);
     vec4 shares = vec4(word & 255, (word >> 8) & 255, (word >> 16) & 255, word >> 24) * (1.0 / 255.0);
     if (info.encoding == TEXELS_LINEAR) {
         return shares;

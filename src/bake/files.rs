@@ -11,9 +11,11 @@ use super::names::{self, ENDINGS, ERROR, GEOMETRY, IRRADIANCE, LIGHTMAP, LIGHTMA
 use super::original::{self, Extended};
 use super::pages::Pages;
 use super::{Layout, Map, MeshLightmap, Object};
+use crate::engine::error_bound::ErrorSource;
 use crate::error::{Error, Result};
 use crate::output::colour;
 use crate::output::destination::{Folder, write_all};
+use crate::output::exr_file;
 use crate::scene::gltf::source::{Beside, File, binary_file};
 use crate::scene::material::TextureUse;
 use crate::scene::{Material, Scene};
@@ -39,7 +41,7 @@ pub fn write(folder: &Folder, scene: &Scene, layout: &Layout, maps: &[Map], expo
         // Encoded only when it is their turn: pictures of a large scene need not lie in memory together.
         let encode = move |ending: &str| match ending {
             IRRADIANCE => colour::exr(map.width, map.height, &map.irradiance),
-            ERROR => colour::exr(map.width, map.height, &map.error),
+            ERROR => error_exr((map.width, map.height), &map.error, &map.unseen, map.source),
             LIGHTMAP => {
                 let ceiling = ceiling(map);
                 colour::linear_png(map.width, map.height, map.irradiance.iter().map(|value| *value / ceiling))
@@ -155,20 +157,27 @@ impl<'a> IntoFile<'a> {
                 _ => format!("{} objects", objects.len()),
             };
             say(picture, format!("irradiance of {of}, W/m2, linear: for engines"));
-            say(error, "its standard error, W/m2".to_owned());
+            say(error, "its standard error, W/m2; in the layer unseen the most that light which was not met may add".to_owned());
         }
         let preview = preview_exposure.map(|exposure| {
             say(&self.preview_name, "shows the baked light in any viewer; not for engines".to_owned());
             (self.preview_name.clone(), preview(self.scene, self.layout, maps, exposure))
         });
         let of_pages = self.pages.pictures(maps);
+        let source = maps.first().map(|map| map.source).unwrap_or_default();
         let exrs = of_pages.iter().zip(self.pictures.iter().zip(&self.errors)).flat_map(|(page, (picture, error))| {
-            let exr = |name: &String, values: &[Vec3]| (name.clone(), colour::exr(page.width, page.height, values));
-            [exr(picture, &page.irradiance), exr(error, &page.error)]
+            let irradiance = colour::exr(page.width, page.height, &page.irradiance);
+            [(picture.clone(), irradiance), (error.clone(), error_exr((page.width, page.height), &page.error, &page.unseen, source))]
         });
         write_all(files.into_iter().chain(exrs).chain(preview).map(|(name, content)| (folder.file(&name), content)))?;
         Ok(written)
     }
+}
+
+/// Standard errors, and in a layer what may be unseen.
+fn error_exr(size: (u32, u32), errors: &[Vec3], unseen: &[Vec3], source: ErrorSource) -> Vec<u8> {
+    let layer = |name: &str, values: &[Vec3]| exr_file::channels(name, ["R", "G", "B"], values.iter().copied());
+    exr_file::encode_errors(size, [layer("", errors), layer("unseen", unseen)].into_iter().flatten().collect(), source)
 }
 
 /// A copy of a scene that shows the baked light in any viewer, as one `.glb` file.
@@ -243,7 +252,8 @@ mod tests {
     fn a_few_bright_texels_do_not_set_the_scale() {
         let mut irradiance = vec![Vec3::splat(2.0); 4000];
         irradiance[7] = Vec3::splat(500.0);
-        let map = Map { object: 0, width: 40, height: 100, error: Vec::new(), irradiance };
+        let map =
+            Map { object: 0, width: 40, height: 100, error: Vec::new(), unseen: Vec::new(), source: ErrorSource::default(), irradiance };
         assert_eq!(ceiling(&map), 2.0);
         assert_eq!(ceiling(&Map { irradiance: vec![Vec3::ZERO; 4], ..map.clone() }), 1.0);
         assert_eq!(ceiling(&Map { irradiance: vec![Vec3::new(0.5, 3.0, 0.0)], ..map }), 3.0);

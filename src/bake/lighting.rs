@@ -41,10 +41,13 @@ impl Layout {
 
 /// What a run found for every texel.
 pub fn estimates(lit: &RunResult) -> Vec<TexelEstimate> {
-    let errors = lit.film.stated_errors();
-    (0..lit.film.pixels())
-        .map(|texel| TexelEstimate { irradiance: lit.film.mean(texel).as_vec3(), standard_error: errors(texel).as_vec3() })
-        .collect()
+    let (errors, unseen) = (lit.film.stated_errors(), lit.film.unseen_bounds());
+    let estimate = |texel: usize| TexelEstimate {
+        irradiance: lit.film.mean(texel).as_vec3(),
+        standard_error: errors(texel).as_vec3(),
+        unseen: unseen(texel) as f32,
+    };
+    (0..lit.film.pixels()).map(estimate).collect()
 }
 
 /// Stops that make the mean of white surfaces middle grey.

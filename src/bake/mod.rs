@@ -13,8 +13,8 @@
 //! from the nearest texel that is covered, so that bilinear filtering finds nothing black at a seam.
 //!
 //! - Surfaces that only reflect sharply or let light through get no map: irradiance says nothing about what they send to the eye.
-//! - Of a two-sided surface the front is baked. Both sides show it, so a thin sheet looks lit from
-//!   behind as it is from the front.
+//! - Of a two-sided surface the front is baked, or the back where no light reaches the front or all cameras look at the back. Both
+//!   sides show it, so a thin sheet looks lit from behind as it is from the front.
 //!
 //! # Files of a scene from a file
 //!
@@ -28,7 +28,7 @@
 //! | file | holds |
 //! |---|---|
 //! | `NAME_irradiance.exr` | irradiance, W/m2, 32-bit floats, linear |
-//! | `NAME_error.exr` | its standard error, W/m2, 32-bit floats; infinite where unknown: before two blocks of rounds are whole, or where no light has reached a texel though some may |
+//! | `NAME_error.exr` | its standard error, W/m2, 32-bit floats; infinite where unknown: before eight blocks of rounds are whole, or where no light has reached a texel though some may; in the layer `unseen` the most that light which was not met may add; `degreesOfFreedom` is of the errors |
 //! | `NAME.png` | irradiance / pi times the exposure, sRGB: a white surface as it would look |
 //! | `NAME_radiance.png` | the radiance that leaves the mesh, times the exposure, sRGB |
 //! | `NAME_lightmap.png` | irradiance over the mesh's own brightest, linear: for engines |
@@ -52,6 +52,7 @@ mod bleeding;
 mod document;
 mod files;
 mod gutters;
+mod hidden_points;
 mod lighting;
 mod names;
 mod objects;
@@ -59,6 +60,7 @@ pub mod original;
 pub mod pages;
 pub mod part;
 mod raster;
+mod sides;
 mod texels;
 pub mod unwrap;
 
@@ -71,6 +73,7 @@ pub use files::{IntoFile, Written, names, preview, write};
 pub use lighting::{estimates, usual_density, usual_exposure};
 pub use texels::{CoveredTexel, SurfacePoint};
 
+use crate::engine::error_bound::ErrorSource;
 use crate::error::{Error, Result};
 use crate::scene::gltf::source::File;
 use crate::scene::light::{Light, LightKind};
@@ -82,7 +85,7 @@ pub const PHASE_COUNT: usize = 4;
 /// Longest side of a map, texels.
 pub const MAX_SIDE: u32 = 4096;
 /// Shortest side of a map, texels.
-pub const MIN_SIDE: u32 = 4;
+pub const MIN_SIDE: u32 = 1;
 /// Texels of all maps together; a covered one takes about 100 bytes here and as much again as a result.
 const MAX_TEXELS: u64 = 1 << 26;
 
@@ -131,6 +134,8 @@ pub struct MeshLightmap {
     pub height: u32,
     /// What triangles cover, row by row.
     pub texels: Vec<CoveredTexel>,
+    /// Triangles of which the back is baked; empty where none is.
+    pub turned: Vec<bool>,
 }
 
 /// A point of a surface whose irradiance is wanted.
@@ -138,9 +143,9 @@ pub struct MeshLightmap {
 pub struct TexelSample {
     /// Metres, world.
     pub position: DVec3,
-    /// Unit normal of the triangle's front.
+    /// Unit normal of the triangle's side that is baked.
     pub geometric_normal: DVec3,
-    /// Unit, interpolated; on the front's side.
+    /// Unit, interpolated; on that side.
     pub shading_normal: DVec3,
 }
 
@@ -149,6 +154,8 @@ pub struct TexelSample {
 pub struct TexelEstimate {
     pub irradiance: Vec3,
     pub standard_error: Vec3,
+    /// The most that light which was not met may add to any channel.
+    pub unseen: f32,
 }
 
 /// The lightmap of one object, row by row, gutters filled.
@@ -162,6 +169,10 @@ pub struct Map {
     pub irradiance: Vec<Vec3>,
     /// Standard error, W/m2.
     pub error: Vec<Vec3>,
+    /// The most that light which was not met may add to any channel, W/m2.
+    pub unseen: Vec<Vec3>,
+    /// Of the errors.
+    pub source: ErrorSource,
 }
 
 impl Layout {
@@ -183,7 +194,7 @@ impl Layout {
             let allowed = format!("needs {texel_count} texels in all, but at most {MAX_TEXELS} can be baked; choose a smaller value");
             return Err(Error::setting(OPTION, texels_per_metre, allowed));
         }
-        let warnings = warnings(scene, &unwrapped, max_side, file.is_none());
+        let mut warnings = warnings(scene, &unwrapped, max_side, file.is_none());
         let mut meshes: Vec<Option<MeshLightmap>> = vec![None; scene.meshes.len()];
         let mut layout_objects = Vec::new();
         let with_maps: Vec<(Object, Vec<MeshLightmap>)> = unwrapped.into_par_iter().map(|object| object.with_texels(scene)).collect();
@@ -191,6 +202,8 @@ impl Layout {
             object.meshes.iter().zip(lightmaps).for_each(|(mesh, lightmap)| meshes[*mesh] = Some(lightmap));
             layout_objects.push(object);
         }
+        warnings.extend(choose_sides(scene, &layout_objects, &mut meshes));
+        leave_out_hidden_points(scene, &mut layout_objects, &mut meshes);
         Ok(Layout { meshes, objects: layout_objects, warnings })
     }
 
@@ -207,9 +220,7 @@ impl Layout {
     /// One point of every covered texel: map after map, row by row. Phases are numbered from 0 to
     /// [`PHASE_COUNT`]; a texel with fewer points has some in several phases.
     pub fn phase(&self, phase: usize) -> Vec<TexelSample> {
-        self.lightmaps()
-            .flat_map(|(_, lightmap)| lightmap.texels.iter().map(move |texel| texel.points[phase].sample(&lightmap.mesh)))
-            .collect()
+        self.lightmaps().flat_map(|(_, lightmap)| lightmap.texels.iter().map(move |texel| lightmap.sample(&texel.points[phase]))).collect()
     }
 
     pub fn phases(&self) -> Vec<Vec<TexelSample>> {
@@ -217,8 +228,8 @@ impl Layout {
     }
 
     /// Maps with filled gutters from what was found for the covered texels, in the order of
-    /// [`Layout::phase`].
-    pub fn maps(&self, results: &[TexelEstimate]) -> Vec<Map> {
+    /// [`Layout::phase`]; `source` is that of the errors.
+    pub fn maps(&self, results: &[TexelEstimate], source: ErrorSource) -> Vec<Map> {
         assert_eq!(results.len(), self.texel_count(), "one result a covered texel");
         let mut first = vec![0; self.meshes.len()];
         let mut count = 0;
@@ -236,6 +247,8 @@ impl Layout {
                 height: object.height,
                 irradiance: spread(|texel| texel.irradiance),
                 error: spread(|texel| texel.standard_error),
+                unseen: spread(|texel| Vec3::splat(texel.unseen)),
+                source,
             }
         };
         self.objects.iter().enumerate().map(map).collect()
@@ -244,6 +257,66 @@ impl Layout {
     /// The lightmap of a mesh that an object has.
     fn part(&self, mesh: usize) -> &MeshLightmap {
         self.meshes[mesh].as_ref().expect("the meshes of an object have a lightmap")
+    }
+}
+
+impl MeshLightmap {
+    /// What is asked about at a point.
+    fn sample(&self, point: &SurfacePoint) -> TexelSample {
+        let TexelSample { position, geometric_normal, shading_normal } = point.sample(&self.mesh);
+        match self.turned.get(point.triangle as usize) {
+            Some(true) => TexelSample { position, geometric_normal: -geometric_normal, shading_normal: -shading_normal },
+            _ => TexelSample { position, geometric_normal, shading_normal },
+        }
+    }
+}
+
+/// Bakes the backs that are seen, and says what the user should know of that.
+fn choose_sides(scene: &Scene, objects: &[Object], meshes: &mut [Option<MeshLightmap>]) -> Vec<String> {
+    let all: Vec<usize> = objects.iter().flat_map(|object| object.meshes.iter().copied()).collect();
+    let mut sides = sides::of(scene, &all);
+    let (mut turned, mut dark) = (Vec::new(), Vec::new());
+    for object in objects {
+        let of_object: Vec<(usize, sides::Sides)> = object.meshes.iter().filter_map(|mesh| Some((*mesh, sides.remove(mesh)?))).collect();
+        let name = || format!("'{}'", object.name);
+        turned.extend(of_object.iter().any(|(_, sides)| !sides.turned.is_empty()).then(name));
+        dark.extend(of_object.iter().any(|(_, sides)| sides.is_inside_out).then(name));
+        for (mesh, sides) in of_object {
+            meshes[mesh].as_mut().expect("the meshes of an object have a lightmap").turned = sides.turned;
+        }
+    }
+    let mut warnings = Vec::new();
+    if !turned.is_empty() {
+        let names = some_of(turned.iter());
+        warnings
+            .push(format!("the back is baked of {names}: no light reaches the front, or no camera sees it; turn the faces for the front"));
+    }
+    if !dark.is_empty() {
+        let names = some_of(dark.iter());
+        warnings.push(format!(
+            "the lightmap is dark of {names}: its faces look inwards, where no light comes; turn them, or make its material double-sided"
+        ));
+    }
+    warnings
+}
+
+/// What is never seen counts for nothing; an object of which nothing else is there stays as it is.
+fn leave_out_hidden_points(scene: &Scene, objects: &mut [Object], meshes: &mut [Option<MeshLightmap>]) {
+    let faces = hidden_points::Faces::new(scene, meshes);
+    for object in objects {
+        let part = |mesh: &usize| meshes[*mesh].as_ref().expect("the meshes of an object have a lightmap");
+        let left: Vec<_> = object.meshes.iter().map(|mesh| faces.left(*mesh, part(mesh))).collect();
+        let is_changed = left.iter().any(Option::is_some);
+        let texels: Vec<Vec<CoveredTexel>> =
+            object.meshes.iter().zip(left).map(|(mesh, left)| left.unwrap_or_else(|| part(mesh).texels.clone())).collect();
+        if !is_changed || texels.iter().all(Vec::is_empty) {
+            continue;
+        }
+        let covered = texels.iter().flatten().map(|texel| (texel.x, texel.y));
+        object.nearest = gutters::nearest(object.width, object.height, covered);
+        for (mesh, texels) in object.meshes.iter().zip(texels) {
+            meshes[*mesh].as_mut().expect("the meshes of an object have a lightmap").texels = texels;
+        }
     }
 }
 

@@ -198,7 +198,15 @@ impl Unwrapped {
         let lightmap = |(part, mesh): (Part, &usize)| {
             let mesh = part.of(&scene.meshes[*mesh]);
             let texels = texels::covered(&mesh, &part.uvs, width, height);
-            MeshLightmap { mesh, uvs: part.uvs, is_second_set: set == Some(1) && scale == DVec2::ONE, width, height, texels }
+            MeshLightmap {
+                mesh,
+                uvs: part.uvs,
+                is_second_set: set == Some(1) && scale == DVec2::ONE,
+                width,
+                height,
+                texels,
+                turned: Vec::new(),
+            }
         };
         let lightmaps: Vec<MeshLightmap> = parts.into_iter().zip(&meshes).map(lightmap).collect();
         let covered = lightmaps.iter().flat_map(|lightmap| lightmap.texels.iter().map(|texel| (texel.x, texel.y)));

@@ -47,6 +47,7 @@ pub struct Picture {
     pub height: u32,
     pub irradiance: Vec<Vec3>,
     pub error: Vec<Vec3>,
+    pub unseen: Vec<Vec3>,
 }
 
 impl Atlas {
@@ -127,7 +128,7 @@ impl Pages {
     pub fn pictures(&self, maps: &[Map]) -> Vec<Picture> {
         let blank = |[width, height]: &[u32; 2]| {
             let black = vec![Vec3::ZERO; *width as usize * *height as usize];
-            Picture { width: *width, height: *height, irradiance: black.clone(), error: black }
+            Picture { width: *width, height: *height, irradiance: black.clone(), error: black.clone(), unseen: black }
         };
         let mut pictures: Vec<Picture> = self.sizes.iter().map(blank).collect();
         for map in maps {
@@ -139,7 +140,8 @@ impl Pages {
                     let of_map = |place: u32, side: u32| place.saturating_sub(margin).min(side - 1) as usize;
                     let from = of_map(row, map.height) * map.width as usize + of_map(column, map.width);
                     let to = (y - margin + row) as usize * picture.width as usize + (x - margin + column) as usize;
-                    (picture.irradiance[to], picture.error[to]) = (map.irradiance[from], map.error[from]);
+                    picture.irradiance[to] = map.irradiance[from];
+                    (picture.error[to], picture.unseen[to]) = (map.error[from], map.unseen[from]);
                 }
             }
         }

@@ -152,7 +152,8 @@ fn charts(meshes: &[&Mesh], texels_per_metre: f64, max_side: u32) -> Result<Unwr
     let area: f64 = meshes.iter().map(|mesh| (0..mesh.triangles.len()).map(|triangle| mesh.area(triangle)).sum::<f64>()).sum();
     let triangle_count: usize = meshes.iter().map(|mesh| mesh.triangles.len()).sum();
 
-    let wanted = (texels_per_metre * extent).max(MIN_SIDE.into());
+    // Above 0 as a 32-bit float, however small the mesh.
+    let wanted = (texels_per_metre * extent).max(1e-6);
     let is_large = triangle_count > MANY_TRIANGLES;
     let share = CHART_TRIANGLES as f64 / triangle_count as f64;
     let options = Options {

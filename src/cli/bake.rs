@@ -112,7 +112,7 @@ pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
     let estimates = bake::estimates(&lit);
     let stops = args.exposure.unwrap_or_else(|| bake::usual_exposure(&estimates));
     let text = scene_report::text(&scene.name, &lit, job.point, args.messages.explains());
-    let maps = layout.maps(&estimates);
+    let maps = layout.maps(&estimates, lit.film.error_source());
     let written = match into_file {
         Some(into_file) => into_file.write(&folder, &maps, args.preview.then(|| stops.exp2())),
         None => bake::write(&folder, &scene, &layout, &maps, stops.exp2()).map(|()| built_in_files(&layout)),

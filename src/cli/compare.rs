@@ -132,7 +132,8 @@ fn z_scores(args: &CompareArgs, pair: &Pair) -> Result<ZScores> {
         let picture = Picture::read(path).map_err(refuse)?;
         z_scores::check(&picture, pair).map_err(refuse)?;
         *errors = Some(picture);
-        refusal = Some(refuse("has no finite error above 0, so that there is no z-score; render two blocks of rounds or more".to_owned()));
+        refusal =
+            Some(refuse("has no finite error above 0, so that there is no z-score; render eight blocks of rounds or more".to_owned()));
     }
     ZScores::of(pair, errors.each_ref().map(Option::as_ref), args.error_blocks).ok_or_else(|| refusal.expect("an option names errors"))
 }

@@ -19,7 +19,7 @@ use crate::settings::tile_samples::TileSamples;
 /// A picture that was put together from parts of a run.
 pub(super) fn of_merge(typed: &Typed, run: &SavedRun, film: &SceneFilm, units: String, format: Format) -> Metadata {
     let confidence = film.plan.confidence;
-    let [error, error_bound] = errors(&film.error(confidence), confidence);
+    let [error, error_bound] = errors(&film.error(confidence).stated(), confidence);
     Metadata {
         photonmill: env!("CARGO_PKG_VERSION").to_owned(),
         devices: run.identity.device.iter().cloned().collect(),
@@ -27,6 +27,7 @@ pub(super) fn of_merge(typed: &Typed, run: &SavedRun, film: &SceneFilm, units: S
         scene_hash: None,
         seed: run.identity.settings.get("seed").and_then(Value::as_u64).unwrap_or_default(),
         rounds: film.rounds,
+        degrees_of_freedom: film.error_freedom(),
         error,
         error_bound,
         confidence,
@@ -53,6 +54,7 @@ pub(super) fn of_room(typed: &Typed, outcome: &RoomResult, error: &FilmError, fo
         scene_hash: None,
         seed: settings.seed,
         rounds: outcome.film.rounds,
+        degrees_of_freedom: outcome.film.error_freedom(),
         error,
         error_bound,
         confidence,
@@ -166,6 +168,7 @@ impl Made<'_> {
             scene_hash: Some(scene_hash.clone()),
             seed: settings.seed,
             rounds: lit.film.rounds,
+            degrees_of_freedom: lit.film.error_freedom(),
             error,
             error_bound,
             confidence,

@@ -165,7 +165,7 @@ impl Contents {
 
 /// Here and on the device.
 fn bytes(texture: &Texture) -> u64 {
-    4 * texture.texels.count() as u64
+    4 * texture.texels.word_count() as u64
 }
 
 fn mebibytes(bytes: u64) -> String {
@@ -186,7 +186,7 @@ impl TextureEntry {
             texels: match texture.texels {
                 Texels::Srgb(_) => "sRGB colours",
                 Texels::Linear(_) => "linear numbers",
-                Texels::SharedExponent(_) => "linear colours",
+                Texels::Float(_) => "linear colours",
             },
             filter: match texture.filter {
                 Filter::Bilinear => "bilinear",

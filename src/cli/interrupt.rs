@@ -4,10 +4,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
 
 use super::complain;
+use crate::error::Error;
 use crate::output::destination::remove_staged;
 
 /// Whether what is under way looks at the flag; a scene that is being read does not.
 static IS_INTERRUPTIBLE: AtomicBool = AtomicBool::new(false);
+/// Whether anything that looks at the flag has begun.
+static HAS_BEGUN: AtomicBool = AtomicBool::new(false);
 /// The signal that arrived first; 0 as long as there was none.
 static SIGNAL: AtomicI32 = AtomicI32::new(0);
 /// Ctrl-C.
@@ -15,6 +18,7 @@ const SIGINT: i32 = 2;
 
 /// Runs `body`, which ends early once the flag is set.
 pub(super) fn interruptible<T>(body: impl FnOnce() -> T) -> T {
+    HAS_BEGUN.store(true, Ordering::Relaxed);
     IS_INTERRUPTIBLE.store(true, Ordering::Relaxed);
     let result = body();
     IS_INTERRUPTIBLE.store(false, Ordering::Relaxed);
@@ -36,6 +40,10 @@ pub(super) fn cancel_on_signal() -> Arc<AtomicBool> {
         let is_first = SIGNAL.compare_exchange(0, signal, Ordering::Relaxed, Ordering::Relaxed).is_ok();
         if !is_first || !IS_INTERRUPTIBLE.load(Ordering::Relaxed) {
             remove_staged();
+            match HAS_BEGUN.load(Ordering::Relaxed) {
+                false => complain(&Error::Interrupted.to_string()),
+                true => complain("interrupted; what was not written yet is lost"),
+            }
             std::process::exit(i32::from(exit_code()));
         }
         flag.store(true, Ordering::Relaxed);

@@ -26,6 +26,7 @@ use crate::output::photon_map;
 use crate::plan::scene::ScenePlan;
 use crate::plan::sensor::Sensor;
 use crate::settings::scene::SceneSettings;
+use crate::settings::stop::LEAST_BLOCKS;
 use crate::text::counted;
 
 /// A file is made of a scene, or another command given.
@@ -133,10 +134,13 @@ pub(super) fn run(args: &MapArgs, cancelled: &AtomicBool) -> Result<End> {
     }
 }
 
+/// Each is a block, so that they tell the error of a picture well.
+const USUAL_ROUNDS: u32 = 2 * LEAST_BLOCKS;
+
 fn make(args: &MakeArgs, cancelled: &AtomicBool) -> Result<End> {
     let usual = settings(&args.light.request(&args.common), None, args.light.chosen.open()?.as_ref());
     // Of a block each: rounds know nothing of each other.
-    let settings = SceneSettings { rounds: args.rounds.unwrap_or(usual.rounds), block: Some(1), ..usual };
+    let settings = SceneSettings { rounds: args.rounds.unwrap_or(USUAL_ROUNDS), block: Some(1), ..usual };
     settings.validate()?;
     let output = Destination::open_file("-o", &args.output)?;
     check_not_read(std::slice::from_ref(&output), [args.scene.path()])?;

@@ -18,13 +18,13 @@ use crate::output::destination::{Destination, check_distinct, write_all};
 use crate::output::scene_report;
 use crate::plan::sensor::Sensor;
 use crate::plan::work_division::Free;
-use crate::render::{MAX_POINTS, lacking_at_points, point_of};
+use crate::render::{MAX_POINTS, point_of};
 use crate::text::{counted, echo, refusal};
 
 #[derive(Args)]
 pub(super) struct ProbeArgs {
-    /// CSV with one line per point: irradiance of red, green and blue in W/m2, and their standard errors, `inf`
-    /// where unknown: before two blocks of rounds are whole, or where no light has reached the point though some may; `-` is standard output
+    /// CSV with one line per point, W/m2: irradiance, standard errors (`inf` before eight blocks of rounds are whole, or where no
+    /// light has reached the point though some may), their degrees of freedom, intervals, and what may be unseen; `-` is standard output
     #[arg(short, long, alias = "out", value_name = "FILE", help_heading = "Output")]
     output: PathBuf,
     #[command(flatten)]
@@ -57,8 +57,9 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
 
     let reporter = ProgressReporter::new(&args.messages.progress);
     let scene = args.scene.open(&reporter)?;
-    lacking_at_points(&scene, &settings).iter().for_each(|line| complain(&format!("warning: {line}")));
     let geometry = geometry(&scene, &settings, &reporter)?;
+    let far = geometry.place_warning("points", points.iter().map(|(position, _)| *position));
+    far.iter().for_each(|line| complain(&format!("warning: {line}")));
     let phases = Target::Points(&points).phases(&geometry);
     let sensor = Sensor::Receivers { count: points.len() as u32 };
     let job = Job {
@@ -91,16 +92,36 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
     Ok(End::of(&lit))
 }
 
-/// Irradiance and standard errors, W/m2; an error that is not known is `inf`.
+/// Irradiance, standard errors, their degrees of freedom, the intervals that follow with the run's confidence, and the most that light
+/// which was not met may add to any channel; W/m2. An error that is not known is `inf`.
 fn table(lit: &RunResult) -> Vec<u8> {
+    const COLUMNS: [&str; 15] = [
+        "red",
+        "green",
+        "blue",
+        "red_error",
+        "green_error",
+        "blue_error",
+        "degrees_of_freedom",
+        "confidence",
+        "red_low",
+        "green_low",
+        "blue_low",
+        "red_high",
+        "green_high",
+        "blue_high",
+        "unseen",
+    ];
     let mut table = csv::Writer::from_writer(Vec::new());
-    table.write_record(["red", "green", "blue", "red_error", "green_error", "blue_error"]).expect("memory takes what is written");
-    let errors = lit.film.stated_errors();
-    for point in 0..lit.film.pixels() {
-        let (mean, error) = (lit.film.mean(point), errors(point));
-        table
-            .write_record([mean.x, mean.y, mean.z, error.x, error.y, error.z].map(|value| value.to_string()))
-            .expect("memory takes what is written");
+    table.write_record(COLUMNS).expect("memory takes what is written");
+    let film = &lit.film;
+    let (errors, intervals, unseen) = (film.stated_errors(), film.intervals(), film.unseen_bounds());
+    let of_all = [f64::from(film.error_freedom()), film.plan.confidence];
+    for point in 0..film.pixels() {
+        let [low, high] = intervals(point).map(|end| end.to_array());
+        let [mean, error] = [film.mean(point), errors(point)].map(|value| value.to_array());
+        let row = [&mean[..], &error, &of_all, &low, &high, &[unseen(point)]].concat();
+        table.write_record(row.iter().map(f64::to_string)).expect("memory takes what is written");
     }
     table.into_inner().expect("memory takes what is written")
 }

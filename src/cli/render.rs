@@ -50,7 +50,7 @@ pub(super) struct RenderArgs {
     display: DisplayArgs,
     #[command(flatten)]
     report: ReportArgs,
-    /// Write the standard error of each pixel as an .exr, W/m2/sr; infinite where unknown: before two blocks of rounds are
+    /// Write the standard error of each pixel as an .exr, W/m2/sr; infinite where unknown: before eight blocks of rounds are
     /// whole, or where no light has reached the pixel though some may
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     error_image: Option<PathBuf>,
@@ -60,7 +60,7 @@ pub(super) struct RenderArgs {
     /// Tone curve of a PNG [default: neutral]
     #[arg(long, value_enum, value_name = "CURVE", help_heading = "Output")]
     tone: Option<ToneArg>,
-    /// Layers of an EXR beside the light: all, none, or some of direct, specular, caustic, indirect, standard_error, albedo, normal and
+    /// Layers of an EXR beside the light: all, none, or some of direct, specular, caustic, indirect, standard_error, unseen, albedo, normal and
     /// depth [default: all]
     #[arg(long, value_name = "all|none|LAYER,...", value_parser = parse_layers, allow_hyphen_values = true, help_heading = "Output")]
     layers: Option<Layers>,

@@ -21,6 +21,7 @@ use super::{End, complain, device_failed, say, say_beside};
 use crate::engine;
 use crate::engine::Control;
 use crate::engine::choose_builder::{Choice, choose_builder};
+use crate::engine::error_bound::ErrorSource;
 use crate::engine::replay::PhotonName;
 use crate::engine::retry::{run_on, until_done};
 use crate::engine::room::film::{RoomFilm, estimate_walls};
@@ -406,8 +407,10 @@ impl Outputs {
         let (destination, format) = self.picture;
         let picture = destination.path().display().to_string();
         let mut files = vec![(destination, overview(scene, &walls).encode(format, Some(&of_room(typed, &outcome, &error, format))))];
+        let confidence = outcome.plan.settings.stop.confidence;
+        let source = ErrorSource { degrees_of_freedom: outcome.film.error_freedom(), confidence };
         for (folder, quantity) in [(&self.irradiance, Quantity::Irradiance), (&self.radiosity, Quantity::Radiosity)] {
-            files.extend(folder.iter().flat_map(|folder| lightmap::files(folder, quantity, scene, &walls)));
+            files.extend(folder.iter().flat_map(|folder| lightmap::files(folder, quantity, scene, &walls, source)));
         }
         let run = outcome.timings.spans().iter().map(|span| span.start + span.duration).max().unwrap_or_default();
         outcome.timings.count("output");

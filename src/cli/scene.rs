@@ -113,7 +113,7 @@ pub(super) struct TransportArgs {
     #[arg(long, value_name = "FILE", help_heading = "Photons", conflicts_with_all = ["photons", "caustic_photons", "bounces", "aim", "illumination"])]
     map: Option<PathBuf>,
     /// Number of independent rounds, of which the result is the mean [default: as many as the goals take, up to 65536;
-    /// 16 of points, texels and shards without a goal]
+    /// 32 of points, texels and shards without a goal]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
     rounds: Option<u32>,
     /// Rounds of a block, a power of two. Samples are even over a block, and errors come from the spread of blocks; --rounds is
@@ -363,6 +363,7 @@ impl PictureArgs {
         let scene = self.scene.open(reporter)?;
         let (camera, [width, height]) = self.camera.resolve(&scene, reporter)?;
         let geometry = geometry(&scene, settings, reporter)?;
+        geometry.place_warning("the camera", [camera.eye]).iter().for_each(|line| complain(&format!("warning: {line}")));
         Ok(Subject { scene, camera, width, height, geometry })
     }
 }

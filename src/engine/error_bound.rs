@@ -1,12 +1,13 @@
 //! The error of a result: what a film tells of it, and the bound that it has not more of, with a confidence.
 
 use serde::Serialize;
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor, StudentsT};
 
 use super::bias::Bias;
 use super::degrees_of_freedom::DegreesOfFreedom;
 use super::unknown::Unknown;
 use crate::constants::PART_COUNT;
+use crate::settings::stop::LEAST_BLOCKS;
 
 /// What a film of so many rounds tells of its error, relative to its light.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,6 +48,14 @@ impl ErrorPlaces {
 }
 
 impl FilmError {
+    /// As users are told of it: of few blocks the noise is unknown, and so is where it sits. Black all over is as it was.
+    pub fn stated(self) -> FilmError {
+        match self.blocks < LEAST_BLOCKS && self.noise > 0.0 {
+            true => FilmError { noise: f64::INFINITY, places: None, ..self },
+            false => self,
+        }
+    }
+
     /// The relative error that the film has not more of, with this confidence: of its noise (see [`error_bound`]), and of what
     /// nothing has reached. Infinite where that is all there is.
     pub fn bound(&self, confidence: f64) -> f64 {
@@ -81,6 +90,43 @@ pub fn error_bound(relative_error: f64, freedom: DegreesOfFreedom, confidence: f
     distribution.inverse_cdf(confidence).sqrt() * relative_error * (1.0 + (0.5 / freedom.estimate).sqrt())
 }
 
+/// From what standard errors are, and with which confidence a run states intervals.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct ErrorSource {
+    pub degrees_of_freedom: u32,
+    pub confidence: f64,
+}
+
+impl ErrorSource {
+    /// Standard errors to either side of a mean between which lies what it estimates: a quantile of Student's distribution (1908).
+    /// `None` where so few blocks leave the error unknown.
+    pub fn reach(self) -> Option<f64> {
+        let student = StudentsT::new(0.0, 1.0, f64::from(self.degrees_of_freedom)).ok()?;
+        (self.degrees_of_freedom + 1 >= LEAST_BLOCKS).then(|| student.inverse_cdf(0.5 + 0.5 * self.confidence))
+    }
+
+    /// For people: what follows from a standard error.
+    pub fn in_words(self) -> String {
+        let ErrorSource { degrees_of_freedom, confidence } = self;
+        let Some(reach) = self.reach() else {
+            return format!("Standard errors: unknown, as fewer than {LEAST_BLOCKS} blocks of rounds are whole");
+        };
+        let sure = 100.0 * confidence;
+        format!(
+            "Standard errors: of {degrees_of_freedom} degrees of freedom; a {sure} % interval reaches {reach:.3} of them to either side"
+        )
+    }
+
+    /// The interval that follows from a mean and its standard error. No light is below 0, and an unknown error leaves it open.
+    pub fn interval(self, mean: f64, error: f64) -> [f64; 2] {
+        let half = match self.reach() {
+            Some(reach) => reach * error,
+            None => f64::INFINITY,
+        };
+        [(mean - half).max(0.0), mean + half]
+    }
+}
+
 /// The bound of noise and bias together, each as it was found and its own bound. Squares add up, and so do the squares of how far
 /// these may lie above what was found, as the one may be found too small where the other is not.
 pub fn bound_of_both([noise, most_noise]: [f64; 2], [bias, most_bias]: [f64; 2]) -> f64 {
@@ -104,6 +150,20 @@ mod tests {
         assert!(both > 3.0 && both < 3f64.hypot(2.0), "{both}");
         assert_eq!(bound_of_both([f64::INFINITY; 2], [0.0; 2]), f64::INFINITY);
         assert_eq!(bound_of_both([1.0, 2.0], [0.0, f64::INFINITY]), f64::INFINITY);
+    }
+
+    /// Tables of Student's distribution.
+    #[test]
+    fn intervals_widen_where_few_blocks_tell_the_error() {
+        let source = |degrees_of_freedom| ErrorSource { degrees_of_freedom, confidence: 0.95 };
+        for (freedom, expected) in [(7, 2.365), (15, 2.131), (31, 2.040)] {
+            assert!((source(freedom).reach().unwrap() - expected).abs() < 1e-3, "{freedom}");
+        }
+        assert!([0, 1, 6].into_iter().all(|freedom| source(freedom).reach().is_none()));
+        let [low, high] = source(7).interval(3.0, 1.0);
+        assert!((low - 0.635).abs() < 1e-3 && (high - 5.365).abs() < 1e-3, "{low} to {high}");
+        assert_eq!((source(7).interval(2.0, 1.0)[0], source(7).interval(2.0, 0.0)), (0.0, [2.0, 2.0]));
+        assert_eq!((source(7).interval(2.0, f64::INFINITY), source(6).interval(2.0, 0.0)), ([0.0, f64::INFINITY], [0.0, f64::INFINITY]));
     }
 
     #[test]

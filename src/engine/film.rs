@@ -70,6 +70,11 @@ impl BlockSums {
         })
     }
 
+    /// Independent numbers that tell a standard error: the blocks less one.
+    pub fn error_freedom(&self) -> u32 {
+        self.blocks.saturating_sub(1)
+    }
+
     /// Variance of a place's sum; infinite of fewer than two blocks.
     pub fn variance(&self, place: usize) -> f64 {
         if self.blocks < 2 || self.squares.is_empty() {

@@ -128,7 +128,7 @@ impl SavedRun {
 /// The first bytes of a file.
 const MAGIC: &[u8; 16] = b"photonmill run\r\n";
 /// Of what follows them. A change that older programs cannot read makes it another one.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 /// Of the photons of a run, by any count: a year of the fastest device is a millionth of it.
 const MOST_COUNTED: u64 = 1 << 60;
 /// Name of an array that not every film has.

@@ -31,9 +31,47 @@ pub struct Unknown {
     /// Lights that neither the trial nor any ray of the run has seen from some points. Mostly walls hide them altogether, as lamps of
     /// another room; where they are seen through a gap, all rays may have missed it.
     pub hidden: Uncounted,
+    /// Points that some light has reached, and a kind of light that arrived at others (by shadow rays, caustics, indirect light) has not.
+    pub unseen: Uncounted,
     /// Points that only photons of a small part of the brightest's flux have met. Mostly no others get there; where they do so too
     /// rarely for this run, their light is missing.
     pub dim: Uncounted,
+    /// Points that lie on no surface, where light that only photons bring is missing.
+    pub off_surfaces: OffSurfaces,
+}
+
+/// Points whose error is unknown, as they lie on no surface.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct OffSurfaces {
+    pub points: u64,
+    /// All points there are.
+    pub of: u64,
+    /// The numbers of the first of them, from 1.
+    pub first: Vec<u64>,
+    /// What they lack.
+    pub lost: &'static str,
+}
+
+impl OffSurfaces {
+    /// So many of them are named.
+    pub(crate) const NAMED: usize = 8;
+
+    /// Whether no error is known of any point.
+    pub fn is_all(&self) -> bool {
+        self.points > 0 && self.points == self.of
+    }
+
+    fn text(&self, point: &str) -> String {
+        let numbers: Vec<String> = self.first.iter().map(u64::to_string).collect();
+        let others = if self.points > self.first.len() as u64 { " and others" } else { "" };
+        format!(
+            "unknown: {} of {} ({}{others}) lie on no surface, where {} cannot be found, so their error is unknown and no bound includes them; put them on a surface\n",
+            self.points,
+            counted(self.of, point),
+            numbers.join(", "),
+            self.lost
+        )
+    }
 }
 
 /// Light that may be missing at some points, or not exist. No error counts it.
@@ -61,7 +99,7 @@ impl Unknown {
 
     /// A line each for points and kinds of light; `unit` is the result's.
     pub fn text(&self, point: &str, unit: &str, confidence: f64, rounds: u32) -> String {
-        let Unknown { asked, unreached, upper_bound, relative, absent, hidden, dim } = self;
+        let Unknown { asked, unreached, upper_bound, relative, absent, hidden, unseen, dim, off_surfaces } = self;
         let sure = 100.0 * confidence;
         let mut text = String::new();
         if *unreached > 0 {
@@ -84,12 +122,22 @@ impl Unknown {
                 counted(points, point)
             ));
         }
+        if unseen.of_mean > WORTH_A_LINE {
+            let Uncounted { points, upper_bound, .. } = unseen;
+            text.push_str(&format!(
+                "unseen: some kind of light that arrived elsewhere has not been met at {points} of {}. If there is such light, it adds at most {upper_bound:.3e} {unit} to one of them ({sure} % confidence). The noise bound does not include this.\n",
+                counted(asked, point)
+            ));
+        }
         if dim.of_mean > WORTH_A_LINE {
             let Uncounted { points, upper_bound, .. } = dim;
             text.push_str(&format!(
                 "dim: rare bright light may be missing at {points} of {}, which only photons of less than 1/{DIM_PHOTONS} of the brightest's flux have met. If there is such light, it adds at most {upper_bound:.3e} {unit} to one of them ({sure} % confidence). The noise bound does not include this.\n",
                 counted(asked, point)
             ));
+        }
+        if off_surfaces.points > 0 {
+            text.push_str(&off_surfaces.text(point));
         }
         for kind in absent {
             let part = match *kind {

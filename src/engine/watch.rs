@@ -186,6 +186,8 @@ struct Look {
     /// The share of the noise's square in light from maps.
     of_maps: f64,
     unknown: f64,
+    /// Whether no point lies on a surface, where some light is missing.
+    is_off_surfaces: bool,
     /// What is too rare to have been seen.
     unseen: f64,
     /// As far as the film tells it.
@@ -227,7 +229,8 @@ impl Watch {
         let FilmError { rounds, blocks, noise, freedom, ref unknown, unseen, .. } = *error;
         let noise = [noise, error_bound(noise, freedom, self.stop.confidence)];
         let of_maps = error.places.map_or(1.0, |places| places.of_maps());
-        self.seen = Some(Look { rounds, noise, of_maps, unknown: unknown.relative, unseen, bias: error.bias, lost });
+        let is_off_surfaces = unknown.off_surfaces.is_all();
+        self.seen = Some(Look { rounds, noise, of_maps, unknown: unknown.relative, is_off_surfaces, unseen, bias: error.bias, lost });
         self.next_look = next_look(blocks);
         self.looked = Instant::now();
     }
@@ -248,6 +251,9 @@ impl Watch {
         }
         let (Some(wanted), Some(look)) = (self.stop.error, self.seen) else { return Ok(()) };
         let refused = |allowed: String| Err(Error::setting("--error", format!("{}%", 100.0 * wanted), allowed));
+        if look.is_off_surfaces {
+            return refused("cannot be reached, because no point lies on a surface, and some light of this scene is only found there; move the points onto surfaces".to_owned());
+        }
         if look.lost > wanted {
             return refused(format!(
                 "cannot be reached, because photons are cut off after {bounces} bounces, and what they carry may add up to {:.2} % of the result; allow more --bounces",

@@ -12,7 +12,7 @@ use std::sync::{Mutex, PoisonError};
 use tempfile::NamedTempFile;
 
 use crate::error::{Error, Result};
-use crate::text::refusal;
+use crate::text;
 
 /// A file that will be written.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -228,6 +228,14 @@ impl Staged {
     }
 }
 
+/// Why the system makes no file: where none is there, none can be made.
+fn refusal(error: &std::io::Error) -> String {
+    match error.kind() {
+        std::io::ErrorKind::NotFound => "no file can be made there; name another folder".to_owned(),
+        _ => text::refusal(error),
+    }
+}
+
 /// Names on the disk; Windows opens no folders, and writes them with the file.
 fn sync_folder(folder: &Path) -> std::io::Result<()> {
     if cfg!(windows) { Ok(()) } else { File::open(folder)?.sync_all() }
@@ -440,6 +448,13 @@ mod tests {
         assert!(check_distinct(&[at("--json", "a"), at("--trace", "b")]).is_ok());
         let error = check_distinct(&[at("--json", "a"), at("--trace", "./a")]).unwrap_err().to_string();
         assert!(error.contains("--json") && error.contains("--trace"), "{error}");
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_folder_that_takes_no_files_is_called_so() {
+        let error = Destination::open("-o", Path::new("/proc/a.png")).unwrap_err().to_string();
+        assert!(error.contains("no file can be made there") && !error.contains("no such file"), "{error}");
     }
 
     #[cfg(unix)]

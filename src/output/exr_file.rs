@@ -5,6 +5,7 @@ use std::io::Cursor;
 use exr::prelude::*;
 
 use super::metadata::Metadata;
+use crate::engine::error_bound::ErrorSource;
 use crate::scene::linear_picture::check_layers;
 
 /// Of a file that is read: as many as a picture may have.
@@ -26,11 +27,26 @@ pub fn channels(layer: &str, names: [&str; 3], values: impl Iterator<Item = glam
     channels.into()
 }
 
+/// Attribute of a file of standard errors.
+pub const FREEDOM: &str = "degreesOfFreedom";
+
 /// The file.
-pub fn encode((width, height): (u32, u32), channels: Vec<Channel>, metadata: Option<&Metadata>) -> Vec<u8> {
+pub fn encode(size: (u32, u32), channels: Vec<Channel>, metadata: Option<&Metadata>) -> Vec<u8> {
+    encode_with(size, channels, |attributes| metadata.into_iter().for_each(|metadata| metadata.set(attributes)))
+}
+
+/// A file of standard errors, which says from how many degrees of freedom they are, and what intervals follow.
+pub fn encode_errors(size: (u32, u32), channels: Vec<Channel>, source: ErrorSource) -> Vec<u8> {
+    encode_with(size, channels, |attributes| {
+        attributes.comments = Some(Text::from_slice_unchecked(source.in_words().as_bytes()));
+        attributes.other.insert(FREEDOM.into(), AttributeValue::I32(source.degrees_of_freedom as i32));
+    })
+}
+
+fn encode_with((width, height): (u32, u32), channels: Vec<Channel>, set: impl FnOnce(&mut LayerAttributes)) -> Vec<u8> {
     let channel = |Channel { name, values }: Channel| AnyChannel::new(name.as_str(), FlatSamples::F32(values));
     let mut attributes = LayerAttributes::default();
-    metadata.into_iter().for_each(|metadata| metadata.set(&mut attributes));
+    set(&mut attributes);
     let size = (width as usize, height as usize);
     let encoding = Encoding { compression: Compression::ZIP16, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
     let layer = Layer::new(size, attributes, encoding, AnyChannels::sort(channels.into_iter().map(channel).collect()));

@@ -1,10 +1,13 @@
 //! Irradiance or radiosity of every wall as float images, with a file that says where texels lie.
 
+use glam::Vec3;
 use serde::Serialize;
 
 use super::colour::Format;
 use super::destination::{Destination, Folder};
+use super::exr_file::{channels, encode_errors};
 use super::image::Picture;
+use crate::engine::error_bound::ErrorSource;
 use crate::engine::room::film::WallEstimate;
 use crate::scene::room::RoomScene;
 
@@ -20,6 +23,8 @@ pub enum Quantity {
 struct Layout<'a> {
     quantity: Quantity,
     unit: &'static str,
+    /// Of the standard errors: rounds less one.
+    degrees_of_freedom: u32,
     walls: Vec<WallLayout<'a>>,
 }
 
@@ -43,14 +48,26 @@ pub fn destinations(folder: &Folder, scene: &RoomScene) -> Vec<Destination> {
 
 const LAYOUT: &str = "layout.json";
 
+/// Grey as three equal channels, as the values are.
+fn error_picture(side: u32, errors: &[f64], source: ErrorSource) -> Vec<u8> {
+    let values = channels("", ["R", "G", "B"], errors.iter().map(|error| Vec3::splat(*error as f32)));
+    encode_errors((side, side), values, source)
+}
+
 /// Files of a wall: its values, and their standard errors.
 fn names(wall: &str) -> [String; 2] {
     [format!("{wall}.exr"), format!("{wall}-error.exr")]
 }
 
 /// `<wall>.exr` and `<wall>-error.exr` for every wall, and `layout.json`.
-pub fn files(folder: &Folder, quantity: Quantity, scene: &RoomScene, walls: &[WallEstimate]) -> Vec<(Destination, Vec<u8>)> {
-    let mut layout = Layout { quantity, unit: "W/m2", walls: Vec::new() };
+pub fn files(
+    folder: &Folder,
+    quantity: Quantity,
+    scene: &RoomScene,
+    walls: &[WallEstimate],
+    source: ErrorSource,
+) -> Vec<(Destination, Vec<u8>)> {
+    let mut layout = Layout { quantity, unit: "W/m2", degrees_of_freedom: source.degrees_of_freedom, walls: Vec::new() };
     let mut files = Vec::new();
     for wall in walls {
         let (values, errors) = match quantity {
@@ -61,7 +78,7 @@ pub fn files(folder: &Folder, quantity: Quantity, scene: &RoomScene, walls: &[Wa
         let picture = |values: Vec<f64>| Picture { width: mesh, height: mesh, values }.encode(Format::Exr, None);
         let [file, error_file] = names(wall.name);
         files.push((folder.file(&file), picture(values.clone())));
-        files.push((folder.file(&error_file), picture(errors.clone())));
+        files.push((folder.file(&error_file), error_picture(mesh as u32, errors, source)));
         let rectangle = scene.rectangle(wall.face);
         layout.walls.push(WallLayout {
             name: wall.name,

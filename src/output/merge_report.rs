@@ -5,7 +5,7 @@ use std::fmt::Write;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use super::report::{Tail, errors, ledger};
+use super::report::{Intervals, Tail, errors, ledger};
 use crate::engine::bias::Bias;
 use crate::engine::error_bound::{ErrorPlaces, FilmError};
 use crate::engine::saved::SavedRun;
@@ -31,6 +31,7 @@ struct Report<'a> {
     /// As for a run; null where not known.
     relative_error: f64,
     error_bound: Option<f64>,
+    intervals: Intervals,
     total_bound: Option<f64>,
     unknown: &'a Unknown,
     tail: Tail,
@@ -40,7 +41,7 @@ struct Report<'a> {
 
 pub fn json(run: &SavedRun, film: &SceneFilm, missing: &[String]) -> Vec<u8> {
     let confidence = film.plan.confidence;
-    let error = film.error(confidence);
+    let error = film.error(confidence).stated();
     let report = Report {
         photonmill: env!("CARGO_PKG_VERSION"),
         scene: &run.identity.scene,
@@ -52,6 +53,7 @@ pub fn json(run: &SavedRun, film: &SceneFilm, missing: &[String]) -> Vec<u8> {
         ledgers: run.fates.iter().map(Fates::ledger).collect(),
         relative_error: error.noise,
         error_bound: Some(error.bound(confidence)).filter(|bound| bound.is_finite()),
+        intervals: Intervals::of(error.blocks, confidence),
         total_bound: Some(error.bound_of_all(confidence, 0.0)).filter(|bound| bound.is_finite()),
         unknown: &error.unknown,
         tail: Tail::of(&error, confidence),
@@ -80,7 +82,7 @@ pub fn text(run: &SavedRun, files: usize, film: Option<&SceneFilm>) -> String {
     if let Some(film) = film {
         let FilmError { rounds, ref unknown, .. } = film.error(film.plan.confidence);
         let confidence = film.plan.confidence;
-        text.push_str(&errors(&film.error(confidence), 0.0, (film.plan.measure, confidence), "pixel"));
+        text.push_str(&errors(&film.error(confidence).stated(), 0.0, (film.plan.measure, confidence), "pixel"));
         text.push_str(&unknown.text("pixel", "W/m2/sr", confidence, rounds));
     }
     text

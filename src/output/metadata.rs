@@ -9,7 +9,7 @@ use exr::meta::header::LayerAttributes;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use crate::engine::error_bound::FilmError;
+use crate::engine::error_bound::{ErrorSource, FilmError};
 use crate::gpu::DeviceFacts;
 use crate::plan::work_division::Division;
 use crate::settings::tile_samples::TileSamples;
@@ -33,6 +33,8 @@ pub struct Metadata {
     pub seed: u64,
     /// Rounds that the picture holds.
     pub rounds: u32,
+    /// Independent numbers that tell each standard error: the blocks of rounds less one.
+    pub degrees_of_freedom: u32,
     /// Relative error of the noise, and what it is at most with this confidence; `None` where it is not known.
     pub error: Option<f64>,
     pub error_bound: Option<f64>,
@@ -106,6 +108,8 @@ impl Metadata {
         writeln!(text, "Device: {}", self.devices.join("; ")).unwrap();
         writeln!(text, "Seed: {}\nRounds: {}", self.seed, self.rounds).unwrap();
         let (error, bound) = (percent(self.error), percent(self.error_bound));
+        let source = ErrorSource { degrees_of_freedom: self.degrees_of_freedom, confidence: self.confidence };
+        writeln!(text, "{}", source.in_words()).unwrap();
         writeln!(text, "Relative error: {error}, at most {bound} ({} % confidence)", 100.0 * self.confidence).unwrap();
         if let Some(denoiser) = &self.denoiser {
             writeln!(text, "Denoised: direct light, by {denoiser}; the errors are those before it").unwrap();

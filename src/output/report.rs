@@ -8,14 +8,14 @@ use serde::Serialize;
 use crate::constants::MAX_BOUNCES;
 use crate::constants::PART_COUNT;
 use crate::engine::bias::{Bias, BiasFrom};
-use crate::engine::error_bound::{ErrorPlaces, FilmError};
+use crate::engine::error_bound::{ErrorPlaces, ErrorSource, FilmError};
 use crate::engine::nonfinite_values::NonfiniteValues;
 use crate::engine::run::RunResult;
 use crate::engine::unknown::Unknown;
 use crate::engine::watch::End;
 use crate::gpu::DeviceFacts;
 use crate::ledger::{Ledger, Losses};
-use crate::settings::stop::{Measure, Stop};
+use crate::settings::stop::{LEAST_BLOCKS, Measure, Stop};
 use crate::text::counted;
 use crate::timings::{Row, Timings};
 
@@ -37,10 +37,12 @@ pub(super) struct Common<'a, Settings> {
     photons_left_out: u64,
     /// Light that limits kept from the result.
     losses: Losses,
-    /// Of the noise, as the settings' `measure` says; null where fewer than two blocks leave it unknown.
+    /// Of the noise, as the settings' `measure` says; null where fewer than eight blocks leave it unknown.
     relative_error: f64,
     /// What it is not above, with the confidence of the settings; null also while all is black and need not be.
     error_bound: Option<f64>,
+    /// Of the standard errors of pixels, texels or points.
+    intervals: Intervals,
     /// What noise, bias and light that limits kept from the result are together not above; null where that is not known.
     total_bound: Option<f64>,
     /// What nothing has reached.
@@ -63,6 +65,22 @@ pub(super) struct Common<'a, Settings> {
 pub(super) struct Tail {
     known: bool,
     unseen: f64,
+}
+
+/// What follows from a standard error: light lies within so many of them to either side, with this confidence; null where fewer than
+/// eight blocks leave errors unknown.
+#[derive(Serialize)]
+pub(super) struct Intervals {
+    #[serde(flatten)]
+    source: ErrorSource,
+    standard_errors: Option<f64>,
+}
+
+impl Intervals {
+    pub(super) fn of(blocks: u32, confidence: f64) -> Intervals {
+        let source = ErrorSource { degrees_of_freedom: blocks.saturating_sub(1), confidence };
+        Intervals { source, standard_errors: source.reach() }
+    }
 }
 
 impl Tail {
@@ -92,6 +110,7 @@ pub(super) fn common<'a, Plan, Film, Settings>(
         losses: run.losses,
         relative_error: error.noise,
         error_bound: Some(error.bound(confidence)).filter(|bound| bound.is_finite()),
+        intervals: Intervals::of(error.blocks, confidence),
         total_bound: Some(error.bound_of_all(confidence, run.losses.relative)).filter(|bound| bound.is_finite()),
         unknown: &error.unknown,
         tail: Tail::of(error, confidence),
@@ -131,13 +150,26 @@ pub(super) fn errors(error: &FilmError, lost: f64, (measure, confidence): (Measu
             writeln!(text, "noise: {:.2} % ({measure}), at most {:.2} % ({sure} % confidence)", percent(noise), percent(bound)).unwrap();
         }
         None if error.rounds == 1 => text.push_str("noise: unknown after a single round\n"),
-        None if error.blocks < 2 => {
-            writeln!(text, "noise: unknown, as fewer than two blocks of rounds are whole; use more --rounds or a smaller --block").unwrap();
+        None if error.blocks < LEAST_BLOCKS => {
+            writeln!(
+                text,
+                "noise: unknown, as fewer than {LEAST_BLOCKS} blocks of rounds are whole; use more --rounds or a smaller --block"
+            )
+            .unwrap();
         }
         None => text.push_str("noise: unknown\n"),
     }
     if let Some(places) = &error.places {
         text.push_str(&sits(places, point));
+    }
+    if let Intervals { source: ErrorSource { degrees_of_freedom, .. }, standard_errors: Some(reach) } =
+        Intervals::of(error.blocks, confidence)
+    {
+        writeln!(
+            text,
+            "        each {point}'s standard error has {degrees_of_freedom} degrees of freedom; a {sure} % interval reaches {reach:.2} standard errors to either side"
+        )
+        .unwrap();
     }
     if !error.tail_is_known(confidence) {
         let most = if error.unseen.is_finite() { format!("{:.2} %", percent(error.unseen)) } else { "any share".to_owned() };

@@ -105,7 +105,7 @@ pub fn error(outcome: &RunResult, scene: &RoomScene) -> FilmError {
     let watts = plan.flux_unit / film.emitted.max(1) as f64;
     let error = film.error(&irradiance_weights(scene, plan), watts, &plan.settings.stop);
     let is_lit = (0..film.point_count()).any(|point| !film.is_unreached(point));
-    FilmError { noise: if is_lit { error.noise } else { f64::INFINITY }, bias: outcome.bias, ..error }
+    FilmError { noise: if is_lit { error.noise } else { f64::INFINITY }, bias: outcome.bias, ..error }.stated()
 }
 
 /// The run in words: device, settings, ledger, errors and timing table.

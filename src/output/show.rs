@@ -22,14 +22,25 @@ pub enum Layer {
     Caustic,
     Indirect,
     StandardError,
+    /// The most light that was not seen may add.
+    Unseen,
     Albedo,
     Normal,
     Depth,
 }
 
 impl Layer {
-    pub const ALL: [Layer; 8] =
-        [Layer::Direct, Layer::Specular, Layer::Caustic, Layer::Indirect, Layer::StandardError, Layer::Albedo, Layer::Normal, Layer::Depth];
+    pub const ALL: [Layer; 9] = [
+        Layer::Direct,
+        Layer::Specular,
+        Layer::Caustic,
+        Layer::Indirect,
+        Layer::StandardError,
+        Layer::Unseen,
+        Layer::Albedo,
+        Layer::Normal,
+        Layer::Depth,
+    ];
 
     pub fn name(self) -> &'static str {
         match self {
@@ -38,6 +49,7 @@ impl Layer {
             Layer::Caustic => "caustic",
             Layer::Indirect => "indirect",
             Layer::StandardError => "standard_error",
+            Layer::Unseen => "unseen",
             Layer::Albedo => "albedo",
             Layer::Normal => "normal",
             Layer::Depth => "depth",
@@ -131,6 +143,7 @@ impl Show {
         let pixels = || 0..film.pixels();
         match layer {
             Layer::StandardError => channels(name, RGB, pixels().map(film.stated_errors()).map(DVec3::as_vec3)),
+            Layer::Unseen => channels(name, RGB, pixels().map(film.unseen_bounds()).map(|most| Vec3::splat(most as f32))),
             Layer::Albedo | Layer::Normal | Layer::Depth if surfaces.is_empty() => Vec::new(),
             Layer::Albedo => channels(name, RGB, surfaces.iter().map(|surface| surface.albedo)),
             Layer::Normal => channels(name, ["X", "Y", "Z"], surfaces.iter().map(|surface| surface.normal)),
@@ -157,10 +170,11 @@ impl Show {
         self.exposure.unwrap_or_else(|| image.usual_exposure())
     }
 
-    /// Standard errors, infinite where they are not known.
+    /// Standard errors, infinite where they are not known, and what may be unseen in a layer of its own.
     pub fn errors(&self, film: &SceneFilm) -> Vec<u8> {
-        let errors = film.stated_errors();
-        self.of(film, |pixel| errors(pixel).as_vec3()).encode(Format::Exr, 0.0, Tone::Linear, None)
+        let errors = channels("", RGB, (0..film.pixels()).map(film.stated_errors()).map(DVec3::as_vec3));
+        let all = errors.into_iter().chain(self.layer(Layer::Unseen, film, &[])).collect();
+        exr_file::encode_errors(self.size, all, film.error_source())
     }
 
     fn of(&self, film: &SceneFilm, value: impl Fn(usize) -> Vec3) -> ColourPicture {

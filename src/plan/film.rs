@@ -17,6 +17,17 @@ pub enum BiasPlan {
     ExtraRuns,
 }
 
+/// Light that points which lie on no surface cannot get, as no photon is counted there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum LostOffSurfaces {
+    /// There is none.
+    Nothing,
+    /// What lamps send over mirrors and glass.
+    Caustics,
+    /// All light of lamps but that of emissive meshes, as photons alone bring light.
+    Lamps,
+}
+
 /// Of a scene's film, which holds it, so that a film can be read without the scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FilmPlan {
@@ -44,6 +55,7 @@ pub struct FilmPlan {
     pub confidence: f64,
     pub measure: Measure,
     pub bias: BiasPlan,
+    pub lost_off_surfaces: LostOffSurfaces,
 }
 
 impl FilmPlan {

@@ -7,7 +7,7 @@ use super::Limits;
 use super::buffers::{PlannedBuffer, bytes_of};
 use super::evidence::{EffectDecision, Facts};
 use super::extra_samples::ExtraSamples;
-use super::film::{BiasPlan, FilmPlan};
+use super::film::{BiasPlan, FilmPlan, LostOffSurfaces};
 use super::light_choice::LightChoice;
 use super::maps::Maps;
 use super::radius::Trial;
@@ -154,6 +154,7 @@ impl ScenePlan {
             confidence: settings.stop.confidence,
             measure: settings.stop.measure,
             bias: BiasPlan::NoMap,
+            lost_off_surfaces: LostOffSurfaces::Nothing,
         };
         let mut plan = ScenePlan {
             settings,
@@ -178,6 +179,7 @@ impl ScenePlan {
             planned_in: Duration::ZERO,
         };
         plan.set_film(geometry, &facts);
+        plan.film.lost_off_surfaces = plan.lost_off_surfaces(scene, &facts);
         plan.constants.push(("HAS_PARTS", u32::from(plan.keeps_parts())));
         plan.constants.push(("HAS_DIFFERENCES", u32::from(plan.film.bias == BiasPlan::Blocks)));
         plan.check_sizes(geometry, limits)?;
@@ -210,6 +212,17 @@ impl ScenePlan {
             Measure::Rmse => BiasPlan::Blocks,
             Measure::RelMse => BiasPlan::ExtraRuns,
         };
+    }
+
+    /// What points off all surfaces cannot get of this scene's lights.
+    fn lost_off_surfaces(&self, scene: &Scene, facts: &Facts) -> LostOffSurfaces {
+        let has_lamps = scene.lights.iter().any(|light| !light.kind.is_environment());
+        match self.settings.illumination {
+            _ if self.film.sees_light => LostOffSurfaces::Nothing,
+            Illumination::Photons if !scene.lights.is_empty() => LostOffSurfaces::Lamps,
+            _ if has_lamps && self.caustic.is_some() && facts.has_kind(LobeKinds::is_sharp) => LostOffSurfaces::Caustics,
+            _ => LostOffSurfaces::Nothing,
+        }
     }
 
     fn check_sizes(&mut self, geometry: &Geometry, limits: &Limits) -> Result<()> {
@@ -318,6 +331,7 @@ fn constants(
         ("HAS_LAYER_TEXTURES", u32::from(keeps(Effect::Layers) && keeps(Effect::Textures) && facts.has_layer_textures())),
         ("HAS_PANES", u32::from(keeps(Effect::Transmission) && facts.has_kind(|kinds| kinds.pane))),
         ("HAS_MEDIA", flag(Effect::Media)),
+        ("MEDIUM_BITS", geometry.medium_bits),
         ("HAS_DIFFUSE_TRANSMISSION", flag(Effect::DiffuseTransmission)),
         ("HAS_IRIDESCENCE", flag(Effect::Iridescence)),
         ("HAS_ANISOTROPY", flag(Effect::Anisotropy)),

@@ -5,6 +5,7 @@ use glam::Vec3;
 use super::{Looking, PreparedScene, Run};
 use crate::bake::pages::{Atlas, Pages};
 use crate::bake::{self, IntoFile, Layout, Map, Written};
+use crate::engine::error_bound::ErrorSource;
 use crate::engine::scene::View;
 use crate::engine::watch::Control;
 use crate::error::{Error, Result};
@@ -38,6 +39,10 @@ pub struct Lightmap {
     pub irradiance: Vec<Vec3>,
     /// Infinite where unknown.
     pub standard_error: Vec<Vec3>,
+    /// The most that light which was not met may add to any channel.
+    pub unseen: Vec<f32>,
+    /// Of the errors: an interval follows.
+    pub source: ErrorSource,
 }
 
 pub struct Lightmaps {
@@ -77,7 +82,8 @@ impl PreparedScene {
         let run = self.light(gpus, &looking, settings, Free { samples: false, ..Free::of(request) }, warnings, control)?;
 
         let estimates = bake::estimates(&run);
-        let maps = layout.maps(&estimates);
+        let source = run.film.error_source();
+        let maps = layout.maps(&estimates, source);
         let exposure = bake.exposure.unwrap_or_else(|| bake::usual_exposure(&estimates)).exp2();
         let files = match (&bake.folder, into_file) {
             (Some(folder), Some(into)) => {
@@ -90,8 +96,9 @@ impl PreparedScene {
             (None, _) => Vec::new(),
         };
         let lightmap = |map: Map| {
-            let Map { object, width, height, irradiance, error } = map;
-            Lightmap { name: layout.objects[object].name.clone(), width, height, irradiance, standard_error: error }
+            let Map { object, width, height, irradiance, error, unseen, source } = map;
+            let unseen = unseen.into_iter().map(|most| most.x).collect();
+            Lightmap { name: layout.objects[object].name.clone(), width, height, irradiance, standard_error: error, unseen, source }
         };
         Ok(Lightmaps { run, maps: maps.into_iter().map(lightmap).collect(), files })
     }

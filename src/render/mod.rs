@@ -68,7 +68,7 @@ use crate::scene::picture_size::PictureSize;
 use crate::scene::surroundings::Surroundings;
 use crate::scene::{Camera, Reading, Scene, built_in};
 use crate::settings::request::{GOOD_ERROR, MOST_ROUNDS, longest_seconds};
-use crate::settings::scene::{Illumination, SceneSettings};
+use crate::settings::scene::SceneSettings;
 
 pub use crate::settings::request::Request;
 pub use lightmaps::{BakeRequest, Lightmap, Lightmaps};
@@ -117,21 +117,6 @@ pub fn point_of(position: [f64; 3], normal: [f64; 3]) -> std::result::Result<(DV
         return Err("has a normal of length 0".to_owned());
     }
     Ok((DVec3::from(position), (normal / normal.abs().max_element()).normalize()))
-}
-
-/// Light of a scene that does not reach points which lie on no surface.
-pub fn lacking_at_points(scene: &Scene, settings: &SceneSettings) -> Vec<&'static str> {
-    let kinds = scene.lobe_kinds();
-    let has_caustics = scene.meshes.iter().any(|mesh| kinds[mesh.material].is_sharp());
-    let has_lamps = scene.lights.iter().any(|light| !light.kind.is_environment());
-    let of_photons = settings.illumination == Illumination::Photons && !scene.lights.is_empty();
-    [
-        (has_lamps && has_caustics, "points that lie on no surface receive no caustics of point, spot, directional and disc lights"),
-        (of_photons, "with --illumination photons, points that lie on no surface receive direct light of emissive meshes only"),
-    ]
-    .into_iter()
-    .filter_map(|(lacks, line)| lacks.then_some(line))
-    .collect()
 }
 
 /// What looks at a scene.
@@ -193,8 +178,9 @@ impl PreparedScene {
             settings.stop.seconds = Some(longest_seconds(gpus[0].facts().kind));
             settings.rounds = MOST_ROUNDS;
         }
-        let (own, warnings) = self.geometry_of(&settings)?;
+        let (own, mut warnings) = self.geometry_of(&settings)?;
         let geometry = own.as_ref().unwrap_or(&self.geometry);
+        warnings.extend(geometry.place_warning("the camera", [seen.eye]));
         let view = View { geometry, camera: Some(&seen), phases: &[] };
         let looking = Looking { view, sensor: Sensor::Picture { width, height }, point: "pixel" };
         let run = self.light(gpus, &looking, settings, Free::of(request), warnings, control)?;
@@ -208,8 +194,8 @@ impl PreparedScene {
         require((1..=MAX_POINTS).contains(&points.len()), "--points", points.len(), allowed)?;
         let settings = request.settings(None);
         let (own, mut warnings) = self.geometry_of(&settings)?;
-        warnings.extend(lacking_at_points(&self.scene, &settings).into_iter().map(str::to_owned));
         let geometry = own.as_ref().unwrap_or(&self.geometry);
+        warnings.extend(geometry.place_warning("points", points.iter().map(|(position, _)| *position)));
         let target = Target::Points(points);
         let phases = target.phases(geometry);
         let looking = Looking { view: View { geometry, camera: None, phases: &phases }, sensor: target.sensor(), point: "point" };

@@ -80,6 +80,7 @@ impl Picture {
             scene_hash: Some(self.scene_hash.clone()),
             seed: settings.seed,
             rounds: self.run.film.rounds,
+            degrees_of_freedom: self.run.film.error_freedom(),
             error,
             error_bound,
             confidence,

@@ -15,7 +15,7 @@ const RADIANCE_MAGIC: &[u8] = b"#?";
 const EXR_MAGIC: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
 
 /// Of one picture: half of what all textures together may have.
-pub const MAX_TEXELS: u64 = 1 << 26;
+pub const MAX_TEXELS: u64 = 65_000_000;
 
 /// Row by row from the top.
 pub struct LinearPicture {

@@ -371,8 +371,8 @@ impl Material {
         self.two_sided || self.transmits()
     }
 
-    /// Of a layered one.
-    fn transmits(&self) -> bool {
+    /// Whether a layered one lets light through or scatters it to its other side.
+    pub fn transmits(&self) -> bool {
         let Layers { transmission, diffuse_transmission, is_unlit, .. } = self.layers;
         self.surface == Surface::Layered && (transmission > 0.0 || diffuse_transmission > 0.0) && !is_unlit
     }

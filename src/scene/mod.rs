@@ -6,11 +6,13 @@ pub mod built_in;
 pub mod bvh;
 pub mod camera;
 pub mod closed_forms;
+pub mod contact;
 pub mod daylight;
 pub mod file;
 pub mod film;
 pub mod geometry;
 pub mod gltf;
+pub mod hair;
 pub mod light;
 pub mod light_tree;
 pub mod linear_picture;
@@ -25,6 +27,7 @@ pub mod rectangle;
 pub mod room;
 pub mod showcase;
 pub mod sky;
+pub mod solids;
 pub mod surroundings;
 pub mod targets;
 pub mod texture;
@@ -92,7 +95,11 @@ impl Scene {
         }
         let path = Path::new(name);
         match path.extension().and_then(|extension| extension.to_str()).map(str::to_lowercase).as_deref() {
-            Some("gltf" | "glb") => gltf::load(path, reading, progress),
+            Some("gltf" | "glb") => {
+                let mut scene = gltf::load(path, reading, progress)?;
+                hair::settle(&mut scene);
+                Ok(scene)
+            }
             _ if path.is_file() => {
                 let remedy = "must be a .gltf or .glb file; export it as glTF 2.0, in Blender by File > Export";
                 Err(Error::setting("SCENE", name, remedy))
@@ -217,6 +224,37 @@ impl Scene {
 
     pub fn triangle_count(&self) -> usize {
         self.meshes.iter().map(|mesh| mesh.triangles.len()).sum()
+    }
+
+    /// What tells the meshes apart in messages: their names, with node, primitive and instance where several have one name.
+    pub fn mesh_names(&self) -> Vec<String> {
+        type Place = (Option<usize>, usize);
+        let places = |mesh: &Mesh| -> Place { mesh.source.as_ref().map_or((None, 0), |source| (Some(source.node), source.primitive)) };
+        // Of the first mesh of a name, and whether others of the name differ from it in node and primitive.
+        let mut alike: HashMap<&str, (Place, [bool; 2])> = HashMap::new();
+        for mesh in &self.meshes {
+            let (first, differs) = alike.entry(&mesh.name).or_insert((places(mesh), [false; 2]));
+            *differs = [differs[0] || first.0 != places(mesh).0, differs[1] || first.1 != places(mesh).1];
+        }
+        let mut seen: HashMap<(&str, Place), usize> = HashMap::new();
+        let mut names = Vec::with_capacity(self.meshes.len());
+        for mesh in &self.meshes {
+            let (node, primitive) = places(mesh);
+            let mut name = mesh.name.clone();
+            if let (Some(node), [true, _]) = (node, alike[mesh.name.as_str()].1) {
+                name += &format!(", node {node}");
+            }
+            if alike[mesh.name.as_str()].1[1] {
+                name += &format!(", primitive {primitive}");
+            }
+            let instance = seen.entry((&mesh.name, (node, primitive))).or_default();
+            if *instance > 0 {
+                name += &format!(", instance {instance}");
+            }
+            *instance += 1;
+            names.push(name);
+        }
+        names
     }
 
     /// Smallest box around all triangles: (lower corner, upper corner).

@@ -1,5 +1,5 @@
-//! Surfaces that lie in one plane and overlap, as a rug on its floor or a lamp that was exported twice. Where they
-//! overlap one of them counts, and of the others only what is visible beside it: [`find`] says what that is.
+//! Surfaces that lie in one plane and overlap, as a rug on its floor or a lamp that was exported twice. Where only one of them
+//! counts ([`super::contact`] has the rule), of the others only what is visible beside it does: [`find`] says what that is.
 
 use std::cell::LazyCell;
 use std::collections::HashMap;
@@ -11,8 +11,9 @@ use i_overlay::float::single::SingleFloatOverlay as _;
 use i_triangle::float::triangulatable::Triangulatable as _;
 use rayon::prelude::*;
 
+use super::contact::{Contact, Kind, Touching};
 use super::planes::{IN_PLANE, NUMBER, NUMBER_BITS};
-use super::{Material, Scene, work};
+use super::{Scene, work};
 
 /// Overlaps and triangles that are no wider are rounding of edges that only touch.
 const WIDTH: f64 = 1.0 / 1_048_576.0;
@@ -48,15 +49,14 @@ const BATCH: usize = 1 << 16;
 const PAIRS_SHARE: f64 = 0.5;
 
 /// Which of two overlapping surfaces counts, by mesh: the smaller number. What shines wins over what does not, so that a
-/// lamp in a ceiling's plane is seen; what is opaque over glass and gaps of alpha, as nothing would be lit through it; a small mesh over a
+/// lamp in a ceiling's plane is seen; what is opaque over what lets light through, as nothing would be lit through it; a small mesh over a
 /// large one, as rugs lie on floors; and at last the first. What is hidden is so from both sides: from behind, a rug with
 /// one side on a floor with two is the rug's back.
-pub fn ranks(scene: &Scene) -> Vec<u32> {
+pub fn ranks(scene: &Scene, kinds: &[Kind]) -> Vec<u32> {
     const PIECE: usize = 1 << 14;
-    let class = |material: &Material| match material.surface {
-        _ if material.is_emissive() => 0,
-        _ if material.lets_light_through() => 2,
-        _ => 1,
+    let class = |mesh: usize| {
+        let lets_through = i32::from(kinds[mesh] != Kind::Opaque);
+        2 * lets_through + i32::from(!scene.materials[scene.meshes[mesh].material].is_emissive())
     };
     let key = |mesh: usize| {
         let of = &scene.meshes[mesh];
@@ -64,7 +64,7 @@ pub fn ranks(scene: &Scene) -> Vec<u32> {
         let area_of =
             |piece: usize| -> f64 { (piece * PIECE..of.triangles.len().min((piece + 1) * PIECE)).map(|triangle| of.area(triangle)).sum() };
         let areas: Vec<f64> = (0..of.triangles.len().div_ceil(PIECE)).into_par_iter().map(area_of).collect();
-        (class(&scene.materials[of.material]), areas.iter().sum())
+        (class(mesh), areas.iter().sum())
     };
     let keys: Vec<(i32, f64)> = (0..scene.meshes.len()).into_par_iter().map(key).collect();
     let mut order: Vec<usize> = (0..scene.meshes.len()).collect();
@@ -75,30 +75,36 @@ pub fn ranks(scene: &Scene) -> Vec<u32> {
 }
 
 /// A triangle with what is known of its plane.
-struct Sheet<'a> {
-    corners: [DVec3; 3],
-    normal: DVec3,
+pub(super) struct Sheet<'a> {
+    pub(super) corners: [DVec3; 3],
+    pub(super) normal: DVec3,
     /// The height over its longest side: how well the corners tell the normal.
     altitude: f64,
-    material: &'a Material,
+    pub(super) of: Touching<'a>,
 }
 
-impl Sheet<'_> {
+impl<'a> Sheet<'a> {
+    pub(super) fn new(scene: &'a Scene, kinds: &[Kind], mesh: u32, corners: [Vec3; 3]) -> Sheet<'a> {
+        let corners = corners.map(Vec3::as_dvec3);
+        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
+        let of = Touching { kind: kinds[mesh as usize], material: &scene.materials[scene.meshes[mesh as usize].material] };
+        Sheet { corners, normal, altitude: altitude(&corners), of }
+    }
+
     fn height(&self, point: DVec3) -> f64 {
         self.normal.dot(point - self.corners[0])
     }
 
-    /// Whether both lie in one plane and some side shows both.
-    fn competes(&self, other: &Sheet) -> bool {
+    /// What becomes of both where they lie in one plane.
+    fn contact(&self, other: &Sheet) -> Contact {
         let cosine = self.normal.dot(other.normal);
         if cosine.abs() < 0.9 {
-            return false;
+            return Contact::None;
         }
-        // A block of glass that stands on a table and the table's top are a boundary with two sides.
-        let is_clear = |sheet: &Sheet| sheet.material.is_entered();
-        let shows_both = cosine > 0.0 || (!is_clear(self) && !is_clear(other) && (self.material.two_sided || other.material.two_sided));
+        let contact = self.of.contact(&other.of, cosine);
         let (wide, narrow) = if self.altitude > other.altitude { (self, other) } else { (other, self) };
-        shows_both && narrow.corners.iter().all(|corner| wide.height(*corner).abs() <= IN_PLANE)
+        let in_plane = contact != Contact::None && narrow.corners.iter().all(|corner| wide.height(*corner).abs() <= IN_PLANE);
+        if in_plane { contact } else { Contact::None }
     }
 
     /// Weights of the second and third corner at a point of its plane.
@@ -183,25 +189,21 @@ fn axis_of(class: u64) -> usize {
     (class >> 27) as usize
 }
 
-/// Finds the triangles of a scene, normalised, that others of their plane hide in part or whole. `sources` are the
-/// triangles' meshes and numbers there, `ranks` gives those of [`ranks`] where they matter, and `report` is called with the
-/// share that is done.
+/// Pairs of triangles of a scene, normalised, that touch so. Of their planes, one of the triangles must be a candidate. `report` is called
+/// with the share that is done.
 ///
 /// Triangles are sorted by classes of planes, then by place, so that the time goes with their number.
-pub fn find<'a>(
+pub(super) fn pairs(
     scene: &Scene,
-    ranks: impl FnOnce() -> &'a [u32],
+    kinds: &[Kind],
     sources: &[(u32, u32)],
     corners: &[[Vec3; 3]],
+    contact: Contact,
+    is_candidate: impl Fn(u32) -> bool + Sync,
     mut report: impl FnMut(f64),
-) -> Vec<Covered> {
+) -> Vec<(u32, u32)> {
     let wide = |triangle: u32| corners[triangle as usize].map(Vec3::as_dvec3);
-    let sheet = |triangle: u32| {
-        let corners = wide(triangle);
-        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
-        let material = &scene.materials[scene.meshes[sources[triangle as usize].0 as usize].material];
-        Sheet { corners, normal, altitude: altitude(&corners), material }
-    };
+    let sheet = |triangle: u32| Sheet::new(scene, kinds, sources[triangle as usize].0, corners[triangle as usize]);
     let with_classes = |mut members: Vec<u64>, triangle: u32| {
         for_classes(wide(triangle), |class| members.push(class << NUMBER_BITS | u64::from(triangle)));
         members
@@ -212,14 +214,15 @@ pub fn find<'a>(
     // Most that are near each other are neighbours in a mesh, which touch: that is quickly told.
     let overlap = |a: u32, b: u32| {
         let (one, other) = (wide(a), wide(b));
-        !separates(&one, &other) && !separates(&other, &one) && sheet(a).competes(&sheet(b))
+        !separates(&one, &other) && !separates(&other, &one) && sheet(a).contact(&sheet(b)) == contact
     };
     let is_one_class = |a: &u64, b: &u64| a >> NUMBER_BITS == b >> NUMBER_BITS;
+    let has_candidate = |class: &[u64]| class.len() > 1 && class.iter().any(|member| is_candidate((member & NUMBER) as u32));
     let mut pairs: Vec<(u32, u32)> = Vec::new();
     // Small classes together, a large one by itself.
     let mut rest = &members[..];
     while !rest.is_empty() {
-        let share = |left: usize| PAIRS_SHARE * (members.len() - left) as f64 / members.len() as f64;
+        let share = |left: usize| (members.len() - left) as f64 / members.len() as f64;
         let class_end = |from: usize| from + rest[from..].partition_point(|member| is_one_class(member, &rest[from])).max(1);
         let (batch, others) = rest.split_at(match class_end(0) {
             own if own > BATCH || own == rest.len() => own,
@@ -228,13 +231,31 @@ pub fn find<'a>(
         report(share(rest.len()));
         if is_one_class(&batch[0], &batch[batch.len() - 1]) {
             let span = share(others.len()) - share(rest.len());
-            pairs.extend(near(batch, sources, corners, overlap, |done| report(share(rest.len()) + span * done)));
+            if has_candidate(batch) {
+                pairs.extend(near(batch, sources, corners, overlap, |done| report(share(rest.len()) + span * done)));
+            }
         } else {
-            let pairs_of = |class: &[u64]| if class.len() > 1 { near(class, sources, corners, overlap, |_| ()) } else { Vec::new() };
+            let pairs_of = |class: &[u64]| if has_candidate(class) { near(class, sources, corners, overlap, |_| ()) } else { Vec::new() };
             pairs.par_extend(batch.par_chunk_by(is_one_class).flat_map_iter(pairs_of));
         }
         rest = others;
     }
+    pairs
+}
+
+/// Finds the triangles of a scene, normalised, that others of their plane hide in part or whole. `sources` are the
+/// triangles' meshes and numbers there, `ranks` gives those of [`ranks`] where they matter, and `report` is called with the
+/// share that is done.
+pub fn find<'a>(
+    scene: &Scene,
+    kinds: &[Kind],
+    ranks: impl FnOnce() -> &'a [u32],
+    sources: &[(u32, u32)],
+    corners: &[[Vec3; 3]],
+    mut report: impl FnMut(f64),
+) -> Vec<Covered> {
+    let sheet = |triangle: u32| Sheet::new(scene, kinds, sources[triangle as usize].0, corners[triangle as usize]);
+    let mut pairs = pairs(scene, kinds, sources, corners, Contact::Once, |_| true, |done| report(PAIRS_SHARE * done));
     if pairs.is_empty() {
         return Vec::new();
     }
@@ -274,8 +295,9 @@ pub fn find<'a>(
     covered
 }
 
-/// What is visible of each triangle of a scene, by mesh and number, that others of its plane hide in part or whole.
-pub fn of_scene(scene: &Scene) -> HashMap<(u32, u32), Vec<[DVec3; 3]>> {
+/// What is visible of each triangle of a scene, by mesh and number, that others of its plane hide in part or whole. `corners_of` gives
+/// the corners of a mesh's triangle.
+pub fn of_scene(scene: &Scene, kinds: &[Kind], corners_of: impl Fn(u32, u32) -> [DVec3; 3]) -> HashMap<(u32, u32), Vec<[DVec3; 3]>> {
     let (min, max) = scene.bounds();
     let (centre, extent) = (0.5 * (min + max), (max - min).max_element());
     if !extent.is_normal() {
@@ -284,10 +306,9 @@ pub fn of_scene(scene: &Scene) -> HashMap<(u32, u32), Vec<[DVec3; 3]>> {
     let numbers = |mesh: usize| (0..scene.meshes[mesh].triangles.len() as u32).map(move |triangle| (mesh as u32, triangle));
     let sources: Vec<(u32, u32)> = (0..scene.meshes.len()).flat_map(numbers).collect();
     let local = |position: DVec3| ((position - centre) / extent).as_vec3();
-    let corners: Vec<[Vec3; 3]> =
-        sources.iter().map(|(mesh, triangle)| scene.meshes[*mesh as usize].corners(*triangle as usize).map(local)).collect();
-    let ranks = LazyCell::new(|| ranks(scene));
-    let covered = find(scene, || &ranks, &sources, &corners, |_| ());
+    let corners: Vec<[Vec3; 3]> = sources.iter().map(|(mesh, triangle)| corners_of(*mesh, *triangle).map(local)).collect();
+    let ranks = LazyCell::new(|| ranks(scene, kinds));
+    let covered = find(scene, kinds, || &ranks, &sources, &corners, |_| ());
     covered.into_iter().map(|covered| (sources[covered.triangle], covered.pieces)).collect()
 }
 
@@ -393,8 +414,8 @@ fn near(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Mesh;
     use crate::scene::geometry::Geometry;
+    use crate::scene::{Material, Mesh};
 
     /// A disc whose triangles meet in its middle, and a rug on it.
     fn disc(segments: u32) -> Scene {
@@ -446,7 +467,8 @@ mod tests {
         let sheets: Vec<Sheet> = (0..24)
             .map(|triangle| {
                 let corners = scene.meshes[0].corners(triangle);
-                Sheet { corners, normal: DVec3::Y, altitude: altitude(&corners), material: &scene.materials[0] }
+                let of = Touching { kind: Kind::Opaque, material: &scene.materials[0] };
+                Sheet { corners, normal: DVec3::Y, altitude: altitude(&corners), of }
             })
             .collect();
         let left = |at_once: usize| -> f64 {
@@ -465,7 +487,8 @@ mod tests {
     #[test]
     fn long_triangles_take_no_more_room_than_others() {
         let scene = disc(30_000);
-        let (parts, done) = work::of(|| of_scene(&scene));
+        let corners_of = |mesh: u32, triangle: u32| scene.meshes[mesh as usize].corners(triangle as usize);
+        let (parts, done) = work::of(|| of_scene(&scene, &[Kind::Opaque; 2], corners_of));
         // Entries of cells and pairs that are compared.
         assert!(done < 40 * 30_000, "{done}");
         // From the middle the rug is seen under 16.26 degrees.

@@ -1,4 +1,4 @@
-//! Colour textures: four bytes a texel, as in most files, and linear values where they are sampled.
+//! Colour textures: four bytes a texel, as in most files, or eight where they have no bound, and linear values where they are sampled.
 
 use std::sync::LazyLock;
 
@@ -40,9 +40,9 @@ pub enum Texels {
     Srgb(Vec<[u8; 4]>),
     /// Red, green, blue and alpha, linear: 255 is 1.
     Linear(Vec<[u8; 4]>),
-    /// Linear: nine bits of red, of green and of blue from the lowest, then an exponent of five bits for all three
-    /// (OpenGL's RGB9_E5, EXT_texture_shared_exponent).
-    SharedExponent(Vec<u32>),
+    /// Linear, of any size: red, green and blue from the lowest bit, each the eight bits of exponent and the upper 13 of the fraction of a
+    /// number of single precision. Each channel has an exponent of its own, so that a weak one beside a strong one keeps its digits.
+    Float(Vec<u64>),
 }
 
 /// Linear value of each 8-bit code.
@@ -52,7 +52,7 @@ impl Texels {
     pub fn count(&self) -> usize {
         match self {
             Texels::Srgb(codes) | Texels::Linear(codes) => codes.len(),
-            Texels::SharedExponent(words) => words.len(),
+            Texels::Float(codes) => codes.len(),
         }
     }
 
@@ -65,17 +65,29 @@ impl Texels {
                 Vec4::new(red, green, blue, share_of_code(alpha))
             }
             Texels::Linear(codes) => Vec4::from(codes[place].map(share_of_code)),
-            Texels::SharedExponent(words) => of_shared_exponent(words[place]).extend(1.0),
+            Texels::Float(codes) => of_float_code(codes[place]).extend(1.0),
         }
+    }
+
+    /// Of each texel, as the kernels have it.
+    fn words_of_each(&self) -> usize {
+        match self {
+            Texels::Srgb(_) | Texels::Linear(_) => 1,
+            Texels::Float(_) => 2,
+        }
+    }
+
+    pub fn word_count(&self) -> usize {
+        self.count() * self.words_of_each()
     }
 
     /// All of them, as the kernels have them.
     pub fn words(&self) -> impl IndexedParallelIterator<Item = u32> + '_ {
         let word = |place: usize| match self {
             Texels::Srgb(codes) | Texels::Linear(codes) => u32::from_le_bytes(codes[place]),
-            Texels::SharedExponent(words) => words[place],
+            Texels::Float(codes) => (codes[place / 2] >> (32 * (place & 1))) as u32,
         };
-        (0..self.count()).into_par_iter().map(word)
+        (0..self.word_count()).into_par_iter().map(word)
     }
 }
 
@@ -83,45 +95,37 @@ fn share_of_code(code: u8) -> f32 {
     f32::from(code) * (1.0 / 255.0)
 }
 
-/// Linear colours, each channel from 0 to 65408, to a 512th of the largest channel of each.
+/// Linear colours, each channel within 2^-14 of its value (0.006 %). What is negative or no number is 0.
 impl From<Vec<Vec3>> for Texels {
     fn from(colours: Vec<Vec3>) -> Texels {
-        Texels::SharedExponent(colours.into_par_iter().map(shared_exponent).collect())
+        Texels::Float(colours.into_par_iter().map(float_code).collect())
     }
 }
 
 impl Texels {
     /// Colours times a factor.
     pub(super) fn scaled(colours: &[Vec3], factor: f64) -> Texels {
-        let texel = |colour: &Vec3| shared_exponent((colour.as_dvec3() * factor).as_vec3());
-        Texels::SharedExponent(colours.par_iter().map(texel).collect())
+        let texel = |colour: &Vec3| float_code((colour.as_dvec3() * factor).as_vec3());
+        Texels::Float(colours.par_iter().map(texel).collect())
     }
 }
 
-/// Of the exponents, and bits of each channel.
-const EXPONENT_BIAS: i32 = 15;
-const MANTISSA_BITS: i32 = 9;
+/// Of a channel: all of a number of single precision but its sign and the lowest bits of its fraction.
+const CHANNEL_BITS: u32 = 21;
+const DROPPED_BITS: u32 = 31 - CHANNEL_BITS;
+/// The largest number that they hold.
+const MOST: f32 = f32::from_bits((f32::MAX.to_bits() >> DROPPED_BITS) << DROPPED_BITS);
 
-/// Exact; the exponent is that of a normal number.
-fn power_of_two(exponent: i32) -> f32 {
-    f32::from_bits(((exponent + 127) as u32) << 23)
+fn float_code(colour: Vec3) -> u64 {
+    // Kernels may take numbers below the least normal one for 0.
+    let channel = |value: f32| if value >= f32::MIN_POSITIVE { value.min(MOST) } else { 0.0 };
+    let rounded = |value: f32| u64::from((channel(value).to_bits() + (1 << (DROPPED_BITS - 1))) >> DROPPED_BITS);
+    rounded(colour.x) | rounded(colour.y) << CHANNEL_BITS | rounded(colour.z) << (2 * CHANNEL_BITS)
 }
 
-fn shared_exponent(colour: Vec3) -> u32 {
-    let most = (511.0 / 512.0) * 65_536.0;
-    let colour = colour.clamp(Vec3::ZERO, Vec3::splat(most));
-    let units = |exponent: i32| power_of_two(EXPONENT_BIAS + MANTISSA_BITS - exponent);
-    let largest = colour.max_element();
-    // The largest channel is below that power of two, and may round up to it.
-    let power = ((largest.to_bits() >> 23) as i32 - 126 + EXPONENT_BIAS).max(0);
-    let exponent = power + i32::from((largest * units(power)).round() >= 512.0);
-    let [red, green, blue] = (colour * units(exponent)).round().to_array().map(|mantissa| mantissa as u32);
-    red | green << 9 | blue << 18 | (exponent as u32) << 27
-}
-
-fn of_shared_exponent(word: u32) -> Vec3 {
-    let mantissa = |shift: u32| (word >> shift & 511) as f32;
-    Vec3::new(mantissa(0), mantissa(9), mantissa(18)) * power_of_two((word >> 27) as i32 - EXPONENT_BIAS - MANTISSA_BITS)
+fn of_float_code(code: u64) -> Vec3 {
+    let channel = |number: u32| f32::from_bits(((code >> (number * CHANNEL_BITS)) as u32 & ((1 << CHANNEL_BITS) - 1)) << DROPPED_BITS);
+    Vec3::new(channel(0), channel(1), channel(2))
 }
 
 impl Wrap {
@@ -223,20 +227,26 @@ mod tests {
     }
 
     #[test]
-    fn shared_exponents_keep_nine_bits() {
+    fn each_channel_keeps_its_digits_beside_the_others() {
         let texel = |colour: Vec3| Texels::from(vec![colour]).at(0).truncate();
-        for exact in [Vec3::ZERO, Vec3::ONE, Vec3::new(0.5, 0.25, 2f32.powi(-9)), Vec3::splat(65_408.0), Vec3::new(3.0, 0.75, 1.5)] {
-            assert_eq!(texel(exact), exact);
+        for exact in [Vec3::ZERO, Vec3::ONE, Vec3::new(0.5, 0.25, 2f32.powi(-100)), Vec3::splat(MOST), Vec3::new(3.0, 0.75, 1.5e30)] {
+            assert!((texel(exact) - exact).abs().cmple(exact * 2f32.powi(-14)).all(), "{exact}");
         }
-        assert_eq!(texel(Vec3::new(1e9, -1.0, f32::NAN)), Vec3::new(65_408.0, 0.0, 0.0));
+        assert_eq!(texel(Vec3::new(f32::INFINITY, -1.0, f32::NAN)), Vec3::new(MOST, 0.0, 0.0));
         for k in 1..4000 {
-            let colour = 1.013f32.powi(k % 1500 - 700) * Vec3::new(1.0, 0.001 * k as f32, 0.3).clamp(Vec3::ZERO, Vec3::ONE);
-            let largest = colour.max_element();
-            if largest < 65_000.0 {
-                let off = (texel(colour) - colour).abs().max_element();
-                assert!(off <= largest / 510.0 || off <= 2f32.powi(-25), "{colour} {}", texel(colour));
-            }
+            let colour = 1.013f32.powi(k % 1500 - 700) * Vec3::new(1.0, 1e-9 * k as f32, 3e-5);
+            let off = (texel(colour) - colour).abs() / colour;
+            assert!(off.max_element() < 2f32.powi(-14), "{colour} {}", texel(colour));
         }
+    }
+
+    #[test]
+    fn words_are_the_texels_from_the_lowest_bit() {
+        let texels = Texels::from(vec![Vec3::new(1.0, 2.0, 3.0), Vec3::splat(0.3)]);
+        let words: Vec<u32> = texels.words().collect();
+        let Texels::Float(codes) = &texels else { panic!("{texels:?}") };
+        let joined: Vec<u64> = words.chunks(2).map(|pair| u64::from(pair[0]) | u64::from(pair[1]) << 32).collect();
+        assert_eq!((&joined, texels.word_count()), (codes, 4));
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::stop::LEAST_BLOCKS;
 pub use super::stop::Stop;
 use super::tile_samples::{MAX_SAMPLES, TileSamples};
 use super::{Builder, MAX_PHOTONS, Math, check_common};
@@ -170,7 +171,7 @@ impl Default for SceneSettings {
         SceneSettings {
             photons: 1 << 17,
             caustic_photons: 1 << 17,
-            rounds: 16,
+            rounds: LEAST_BLOCKS * SAMPLES_PER_BLOCK,
             block: None,
             bounces: MAX_BOUNCES,
             seed: 1,

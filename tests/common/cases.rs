@@ -15,7 +15,7 @@ pub struct Case {
 
 /// Cases of each group.
 pub const COUNTS: [(char, usize); 12] =
-    [('G', 15), ('S', 19), ('R', 9), ('A', 11), ('E', 22), ('B', 7), ('I', 8), ('D', 7), ('C', 3), ('L', 8), ('M', 3), ('F', 10)];
+    [('G', 18), ('S', 19), ('R', 9), ('A', 11), ('E', 26), ('B', 7), ('I', 8), ('D', 7), ('C', 3), ('L', 8), ('M', 3), ('F', 12)];
 
 /// Cases that cannot occur, as the program has nothing to which they could happen. Once a source has one of these words, that may
 /// no longer be so, and the case needs a test.

@@ -8,7 +8,7 @@ use photonmill::verify::selfcheck::Estimate;
 
 /// The default settings with blocks of one round: few rounds tell the error well.
 pub fn by_rounds() -> SceneSettings {
-    SceneSettings { block: Some(1), ..SceneSettings::default() }
+    SceneSettings { rounds: 16, block: Some(1), ..SceneSettings::default() }
 }
 
 /// Builders of a scene that trace in ways of their own.

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::gltf_file::{data_uri, encoded, floats, set_buffer, square, square_buffer};
 
 /// Adds an accessor over bytes of its own, in a buffer view of its own, and returns its number.
-fn add(value: &mut Value, buffer: &mut Vec<u8>, bytes: &[u8], component: u32, count: usize, kind: &str) -> usize {
+pub fn add(value: &mut Value, buffer: &mut Vec<u8>, bytes: &[u8], component: u32, count: usize, kind: &str) -> usize {
     buffer.resize(buffer.len().next_multiple_of(4), 0);
     let view = json!({"buffer": 0, "byteOffset": buffer.len(), "byteLength": bytes.len()});
     buffer.extend(bytes);

@@ -189,7 +189,7 @@ fn open(path: &Path) -> Scene {
 
 /// Results that name their texel.
 fn maps(layout: &Layout) -> Vec<Map> {
-    layout.maps(&numbered(layout))
+    layout.maps(&numbered(layout), Default::default())
 }
 
 /// Whether every covered texel of every object is found as an engine would look it up: by the node's extras and the set of the

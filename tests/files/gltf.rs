@@ -337,9 +337,11 @@ fn what_cannot_be_used_is_refused_with_file_and_object() {
             },
             &["material 'glow'", "texture 0", "but by EXT_texture_avif", "PNG, JPEG, WebP or KTX 2"],
         ),
-        (|v| v["buffers"][0]["uri"] = json!("%zz"), &["buffer 0", "%zz"]),
+        (|v| v["buffers"][0]["uri"] = json!("%ff"), &["buffer 0", "cannot be decoded", "%ff"]),
+        (|v| v["buffers"][0]["uri"] = json!("%zz"), &["buffer 0", "%zz", "no such file"]),
         (|v| v["buffers"][0]["uri"] = json!("https://example.com/a.bin"), &["buffer 0", "only files beside this one"]),
         (|v| v["buffers"][0]["uri"] = json!("data:x;base64,@@@"), &["buffer 0", "not base64"]),
+        (|v| v["buffers"][0]["uri"] = json!("data:x"), &["buffer 0", "without the comma"]),
         (|v| v["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = json!([2, 0, 0, 1]), &["material 'glow'", "from 0 to 1"]),
         (|v| v["materials"][0]["pbrMetallicRoughness"]["roughnessFactor"] = json!(1.0001), &["material 'glow'", "1.0001", "from 0 to 1"]),
         (|v| v["materials"][0]["emissiveFactor"] = json!([-1, 0, 0]), &["material 'glow'", "emits"]),
@@ -401,7 +403,7 @@ fn pictures_are_whole_and_of_the_kinds_that_gltf_has() {
     assert_eq!(read(&jpeg).unwrap().textures[0].width, 64);
     // Some writers pad their files.
     assert!(read(&[&jpeg[..], &[0; 3]].concat()).is_ok());
-    for left in [jpeg.len() - 1, jpeg.len() - 2, jpeg.len() / 2] {
+    for left in [jpeg.len() - 6, jpeg.len() - 40, jpeg.len() / 2] {
         assert_refusal(read(&jpeg[..left]), &["texture image 0", "is cut off"]);
     }
     let png = picture(ImageFormat::Png);
@@ -1192,7 +1194,7 @@ fn factors_out_of_range_are_refused() {
         (pbr("baseColorFactor", json!([1, 1, 1, 1.25])), &["alpha 1.25", "from 0 to 1"]),
         (pbr("baseColorFactor", json!([1, 1e40, 1, 1])), &["base colour 1 inf 1", "from 0 to 1"]),
         (json!({"name": "odd", "alphaMode": "MASK", "alphaCutoff": -1}), &["alpha cutoff -1", "0 or more"]),
-        (with("ior", "ior", json!(0.5)), &["index of refraction 0.5", "must be 0, or from 1 to 100"]),
+        (with("ior", "ior", json!(0.5)), &["index of refraction 0.5", "must be 0, or from 1"]),
         (with("ior", "ior", json!(-1)), &["index of refraction -1"]),
         (with("transmission", "transmissionFactor", json!(2)), &["transmission factor 2", "from 0 to 1"]),
         (with("volume", "thicknessFactor", json!(-1)), &["thickness -1", "0 or more"]),
@@ -1214,7 +1216,7 @@ fn factors_out_of_range_are_refused() {
         (with("anisotropy", "anisotropyStrength", json!(-0.5)), &["anisotropy strength -0.5", "from 0 to 1"]),
         (with("anisotropy", "anisotropyRotation", json!(1e9)), &["anisotropy rotation 1e9", "within 1e6"]),
         (with("iridescence", "iridescenceFactor", json!(2)), &["iridescence factor 2", "from 0 to 1"]),
-        (with("iridescence", "iridescenceIor", json!(0.5)), &["film of the index of refraction 0.5", "from 1 to 100"]),
+        (with("iridescence", "iridescenceIor", json!(0.5)), &["film of the index of refraction 0.5", "must be from 1"]),
         (with("iridescence", "iridescenceThicknessMaximum", json!(-1)), &["thickness of its film -1", "0 or more and finite"]),
         (with("dispersion", "dispersion", json!(-1)), &["dispersion -1", "0 or more and finite"]),
         (with("sheen", "sheenRoughnessFactor", json!(-1)), &["sheen roughness -1", "from 0 to 1"]),

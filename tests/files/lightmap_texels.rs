@@ -1,9 +1,12 @@
 //! Lightmaps without their light: coordinates that do not overlap, texels that lie on their triangles,
 //! filled gutters, files that hold what they were given and open again.
 
+use crate::common::known::kept;
+use crate::common::lit::light;
 use crate::common::prelude::*;
 use crate::common::program::entries;
 use photonmill::bake::{self, Layout, MAX_SIDE, Map, MeshLightmap, PHASE_COUNT, TexelEstimate};
+use photonmill::engine::scene::View;
 use photonmill::output::destination::Folder;
 use photonmill::scene::material::{Coverage, Layers, Medium, NormalMap};
 use photonmill::scene::texture::Filter;
@@ -171,8 +174,11 @@ fn wrong_points(lightmap: &MeshLightmap) -> Vec<String> {
 #[test]
 fn texels_lie_on_their_triangles_and_every_triangle_has_some() {
     let mut scene = open(BLENDER);
-    scene.meshes.push(torus(60, 24));
-    scene.meshes.push(Mesh::sphere("ball", DVec3::Y, 0.4, 32, 0));
+    // Apart: what lies in another solid has no texels.
+    let mut torus = torus(60, 24);
+    torus.positions.iter_mut().for_each(|position| *position += 100.0 * DVec3::X);
+    scene.meshes.push(torus);
+    scene.meshes.push(Mesh::sphere("ball", 200.0 * DVec3::X, 0.4, 32, 0));
     let layout = Layout::new(&scene, 32.0).unwrap();
     assert!(layout.lightmaps().count() > 3);
     for (_, lightmap) in layout.lightmaps() {
@@ -373,6 +379,7 @@ pub fn numbered(layout: &Layout) -> Vec<TexelEstimate> {
     let estimate = |index: usize| TexelEstimate {
         irradiance: Vec3::new(index as f32 + 1.0, 0.5, 0.25),
         standard_error: Vec3::new(0.125, index as f32 + 1.0, 0.0),
+        unseen: index as f32 + 2.0,
     };
     (0..layout.texel_count()).map(estimate).collect()
 }
@@ -381,7 +388,7 @@ pub fn numbered(layout: &Layout) -> Vec<TexelEstimate> {
 fn gutters_are_filled_from_the_nearest_texel() {
     let scene = scene_of(torus(24, 10));
     let layout = Layout::new(&scene, 12.0).unwrap();
-    let [map] = &layout.maps(&numbered(&layout))[..] else { panic!("one map") };
+    let [map] = &layout.maps(&numbered(&layout), Default::default())[..] else { panic!("one map") };
     let lightmap = layout.meshes[0].as_ref().unwrap();
     assert_eq!(map.irradiance.len(), (map.width * map.height) as usize);
     assert!(lightmap.texels.len() < map.irradiance.len(), "there is a gutter");
@@ -424,7 +431,7 @@ fn the_same_scene_gives_the_same_layout() {
 
 fn write(scene: &Scene, layout: &Layout, results: &[TexelEstimate], exposure: f32) -> (tempfile::TempDir, Vec<Map>) {
     let folder = tempfile::tempdir().unwrap();
-    let maps = layout.maps(results);
+    let maps = layout.maps(results, Default::default());
     bake::write(&Folder::open("-o", folder.path()).unwrap(), scene, layout, &maps, exposure).unwrap();
     (folder, maps)
 }
@@ -525,7 +532,7 @@ fn assert_same_materials(written: &Scene, scene: &Scene) {
             assert_eq!((new.width, new.height, new.wrap, new.filter), (old.width, old.height, old.wrap, old.filter));
             match &old.texels {
                 // Written as colours of eight bits each.
-                Texels::SharedExponent(_) => assert!((0..old.texels.count()).all(|k| new.texels.at(k) == old.texels.at(k)), "{slot}"),
+                Texels::Float(_) => assert!((0..old.texels.count()).all(|k| new.texels.at(k) == old.texels.at(k)), "{slot}"),
                 texels => assert_eq!(new.texels, *texels, "{}: {slot}", mesh.name),
             }
         }
@@ -831,7 +838,8 @@ fn pictures_hold_what_they_were_given() {
     scene.materials[0].emission = Vec3::new(0.0, 0.0, 0.125);
     let layout = Layout::new(&scene, 16.0).unwrap();
     let pi = std::f32::consts::PI;
-    let mut results = vec![TexelEstimate { irradiance: Vec3::splat(pi), standard_error: Vec3::new(1e-7, 2e6, 0.1) }; layout.texel_count()];
+    let mut results =
+        vec![TexelEstimate { irradiance: Vec3::splat(pi), standard_error: Vec3::new(1e-7, 2e6, 0.1), unseen: 0.5 }; layout.texel_count()];
     results[5].irradiance = Vec3::new(-0.0, 1e-30, 7e7);
     let (folder, maps) = write(&scene, &layout, &results, 0.5);
     let open = |name: &str| image::open(folder.path().join(name)).unwrap();
@@ -910,11 +918,192 @@ fn nothing_is_written_where_something_cannot_be() {
     let layout = Layout::new(&scene, 8.0).unwrap();
     let folder = tempfile::tempdir().unwrap();
     std::fs::create_dir(folder.path().join("scene.bin")).unwrap();
-    let maps = layout.maps(&numbered(&layout));
+    let maps = layout.maps(&numbered(&layout), Default::default());
     let result = bake::write(&Folder::open("-o", folder.path()).unwrap(), &scene, &layout, &maps, 1.0);
     let Err(Error::Saved { folder: saved, .. }) = result else { panic!("{result:?}") };
     let written = entries(&saved.join("output"));
     assert!(written.contains(&"scene.gltf".to_owned()), "{written:?}");
     std::fs::remove_dir_all(saved).unwrap();
     assert_eq!(entries(folder.path()), ["scene.bin"]);
+}
+
+/// Texels per metre that a map has of a triangle, the mean of both directions.
+fn density_of(lightmap: &MeshLightmap, triangle: usize) -> f64 {
+    (texel_area(lightmap, triangle) / lightmap.mesh.area(triangle)).sqrt()
+}
+
+/// Meshes that are smaller than a few texels have no finer map than others, with new charts and with their own but for a whole texel.
+#[test]
+fn small_meshes_have_no_finer_maps() {
+    for size in [1.0, 0.1, 0.01] {
+        let mut cube = cube_with(|_, _| DVec2::ZERO);
+        cube.positions.iter_mut().for_each(|position| *position *= size);
+        let (lightmap, _) = lightmap_of(cube, 8.0);
+        let densities: Vec<f64> = (0..12).map(|triangle| density_of(&lightmap, triangle)).collect();
+        assert!(densities.iter().all(|density| (7.0..9.0).contains(density)), "{size} m: {densities:?} texels per metre");
+        assert!(doubly_claimed(&lightmap) == 0 && wrong_points(&lightmap).is_empty() && lightmap.texels.len() >= 6);
+    }
+    let mut wall = wall_with([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]);
+    wall.positions.iter_mut().for_each(|position| *position *= 0.1);
+    let area = wall.area(0) + wall.area(1);
+    let (lightmap, _) = lightmap_of(wall, 8.0);
+    assert!(lightmap.is_second_set && f64::from(lightmap.width * lightmap.height) <= (64.0 * area).ceil(), "{lightmap:?}");
+}
+
+/// Whether every point of a scene's first mesh is looked at from this side of its triangles: in front of (1) or behind (-1) them; and
+/// what is warned of.
+fn side_of(scene: &Scene) -> (f64, Vec<String>) {
+    let layout = layout_of(scene);
+    let lightmap = layout.meshes[0].as_ref().unwrap();
+    let triangles = lightmap.texels.iter().map(|texel| lightmap.mesh.normal(texel.points[0].triangle as usize));
+    let sides: Vec<f64> =
+        layout.phase(0).iter().zip(triangles).map(|(sample, front)| sample.geometric_normal.dot(front).signum()).collect();
+    assert!(sides.iter().all(|side| *side == sides[0]), "{sides:?}");
+    let of_sides = |line: &String| line.contains("is baked of") || line.contains("is dark of");
+    (sides[0], layout.warnings.into_iter().filter(of_sides).collect())
+}
+
+/// Light reaches the outside of a closed shell whose faces look inwards; of a sheet the side is baked that cameras see, or that is lit.
+#[test]
+fn the_side_that_is_seen_is_baked() {
+    let sky = lamp(LightKind::Environment { radiance: Vec3::ONE });
+    let point = |at: DVec3| lamp(LightKind::Point { position: at, intensity: Vec3::ONE });
+    let cube = cube_with(|_, _| DVec2::ZERO);
+    let mut turned = cube.clone();
+    turned.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
+    let sheet = level(0.0, [1.0, 1.0], false, 0);
+    let with = |mesh: &Mesh, two_sided: bool, light: &Light| {
+        let mut scene = scene_of(mesh.clone());
+        scene.materials[0].two_sided = two_sided;
+        scene.lights.push(light.clone());
+        scene
+    };
+    let above = point(DVec3::Y * 3.0);
+    assert_eq!(side_of(&with(&cube, true, &sky)), (1.0, vec![]));
+    let (side, warnings) = side_of(&with(&turned, true, &sky));
+    assert!(side == -1.0 && warnings.len() == 1 && warnings[0].contains("the back is baked of 'cube'"), "{side}, {warnings:?}");
+    // A room, whose lamp is inside.
+    assert_eq!(side_of(&with(&turned, true, &point(DVec3::ZERO))), (1.0, vec![]));
+    // Nothing else can be baked of one side, which is dark.
+    let (side, warnings) = side_of(&with(&turned, false, &sky));
+    assert!(
+        side == 1.0 && warnings.len() == 1 && warnings[0].contains("dark of 'cube'") && warnings[0].contains("turn them"),
+        "{warnings:?}"
+    );
+    assert_eq!(side_of(&with(&turned, false, &point(DVec3::ZERO))), (1.0, vec![]));
+    assert_eq!(side_of(&with(&sheet, true, &above)).0, -1.0);
+    // Both sides are lit, and the cameras are above the back.
+    let mut seen = with(&sheet, true, &sky);
+    assert_eq!(side_of(&seen).0, 1.0);
+    seen.cameras.push(Camera::looking_at("above", DVec3::new(1.0, 2.0, 0.0), DVec3::ZERO, DVec3::Y, 1.0));
+    assert_eq!(side_of(&seen).0, -1.0);
+    seen.cameras.push(Camera::looking_at("below", DVec3::new(1.0, -2.0, 0.0), DVec3::ZERO, DVec3::Y, 1.0));
+    assert_eq!(side_of(&seen).0, 1.0);
+}
+
+/// A block of .4 m that stands on a floor, goes through it, or hangs .2 mm above it, of one side and of two: no point below it or in it
+/// counts, and a texel of which none is left is as its neighbour. A ledge high above the floor hides nothing.
+#[test]
+fn points_that_nobody_sees_count_for_nothing() {
+    let block = |lowest: f64, height: f64| {
+        let mut cube = cube_with(|_, _| DVec2::ZERO);
+        let size = DVec3::new(0.403, height, 0.403);
+        cube.positions.iter_mut().for_each(|position| *position = (*position + 0.5 * DVec3::Y) * size + lowest * DVec3::Y);
+        cube
+    };
+    let floor = |blocks: Vec<Mesh>, two_sided: bool| {
+        let mut scene = scene_of(level(0.0, [2.0, 2.0], true, 0));
+        scene.meshes.extend(blocks);
+        scene.materials[0].two_sided = two_sided;
+        Layout::new(&scene, 16.0).unwrap()
+    };
+    let all = floor(vec![], false).meshes[0].as_ref().unwrap().texels.len();
+    for two_sided in [false, true] {
+        for lowest in [0.0, -0.25, 2e-4] {
+            let layout = floor(vec![block(lowest, 0.5)], two_sided);
+            let texels = &layout.meshes[0].as_ref().unwrap().texels;
+            let is_below = |at: DVec3| at.x.abs().max(at.z.abs()) < 0.2015;
+            let samples: Vec<Vec<DVec3>> =
+                layout.phases().iter().map(|phase| phase.iter().map(|sample| sample.position).collect()).collect();
+            let beside: Vec<DVec3> = samples.iter().flat_map(|phase| phase[..texels.len()].to_vec()).filter(|at| is_below(*at)).collect();
+            // Further inside than a texel nothing of a block that goes through the floor is near.
+            let is_at_foot = |at: &DVec3| at.x.abs().max(at.z.abs()) > 0.2015 - 1.0 / 16.0;
+            let wrong = beside.iter().filter(|at| lowest >= 0.0 || is_at_foot(at)).count();
+            assert!(
+                wrong == 0 && texels.len() <= all - 16,
+                "{two_sided}, {lowest}: {wrong} points below, {} texels of {all}",
+                texels.len()
+            );
+        }
+        let ledge = floor(vec![block(0.2, 0.1)], two_sided);
+        assert_eq!(ledge.meshes[0].as_ref().unwrap().texels.len(), all);
+    }
+    // A sheet that crosses the floor: each texel has points of one side.
+    let wall = Mesh::parallelogram("wall", DVec3::new(0.004, -0.5, -1.0), DVec3::Y, 2.0 * DVec3::Z, 0);
+    let layout = floor(vec![wall], false);
+    let count = layout.meshes[0].as_ref().unwrap().texels.len();
+    let phases = layout.phases();
+    let is_left = |texel: usize| phases.iter().map(|phase| phase[texel].position.x < 0.004).collect::<BTreeSet<bool>>().len();
+    assert!(count == all && (0..count).all(|texel| is_left(texel) == 1));
+}
+
+/// Irradiance that an engine finds in a map at a point of a mesh: between four texels.
+fn looked_up(layout: &Layout, maps: &[Map], mesh: usize, at: DVec3) -> f64 {
+    let lightmap = layout.meshes[mesh].as_ref().unwrap();
+    let map = maps.iter().find(|map| layout.objects[map.object].meshes.contains(&mesh)).unwrap();
+    let weights = |triangle: usize| {
+        let [a, b, c] = lightmap.mesh.corners(triangle);
+        let normal = (b - a).cross(c - a);
+        let of = |p: DVec3, q: DVec3| (q - p).cross(at - p).dot(normal) / normal.length_squared();
+        (normal.normalize().dot(at - a).abs() < 1e-6).then(|| [of(b, c), of(c, a), of(a, b)])
+    };
+    let found = (0..lightmap.mesh.triangles.len()).find_map(|triangle| {
+        let weights = weights(triangle).filter(|weights| weights.iter().all(|weight| *weight >= -1e-9))?;
+        Some(
+            pairs(lightmap.mesh.triangles[triangle], weights).map(|(vertex, weight)| lightmap.uvs[vertex as usize] * weight).sum::<DVec2>(),
+        )
+    });
+    let place = found.expect("the point lies on the mesh") * DVec2::new(map.width.into(), map.height.into()) - 0.5;
+    let (low, share) = (place.floor(), place - place.floor());
+    let texel = |x: f64, y: f64| {
+        let [column, row] = [(x, map.width), (y, map.height)].map(|(at, side)| at.clamp(0.0, f64::from(side - 1)) as usize);
+        f64::from(map.irradiance[row * map.width as usize + column].x)
+    };
+    let of_row = |y: f64| texel(low.x, y) * (1.0 - share.x) + texel(low.x + 1.0, y) * share.x;
+    of_row(low.y) * (1.0 - share.y) + of_row(low.y + 1.0) * share.y
+}
+
+/// Sun from straight above: the floor is as bright beside a block as elsewhere, whether the block stands on it or goes through it, and a
+/// block whose faces look inwards is bright on top.
+#[test]
+fn lightmaps_are_not_dark_at_the_foot_of_things() {
+    let Some(gpu) = device() else { return };
+    let down = lamp(LightKind::Directional { direction: DVec3::NEG_Y, irradiance: Vec3::ONE });
+    for (lowest, is_turned) in [(0.0, false), (-0.25, true)] {
+        let mut block = cube_with(|_, _| DVec2::ZERO);
+        let size = DVec3::new(0.403, 0.5, 0.403);
+        block.positions.iter_mut().for_each(|position| *position = (*position + 0.5 * DVec3::Y) * size + lowest * DVec3::Y);
+        if is_turned {
+            block.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
+        }
+        let mut scene = scene_of(level(0.0, [1.0, 1.0], true, 0));
+        scene.meshes.push(block);
+        scene.materials[0] = Material { two_sided: is_turned, ..matt(0.0) };
+        scene.lights.push(down.clone());
+        let layout = Layout::new(&scene, 16.0).unwrap();
+        let settings = kept(SceneSettings { photons: 500, rounds: 8, part: Part::Direct, ..by_rounds() });
+        let sensor = Sensor::Receivers { count: layout.texel_count() as u32 };
+        let (geometry, plan) = scene_plan(&gpu, &scene, &settings, sensor).unwrap();
+        let phases = layout.receivers(settings.rounds, &geometry);
+        let lit = light(&gpu, &View { geometry: &geometry, camera: None, phases: &phases }, plan);
+        let maps = layout.maps(&bake::estimates(&lit), lit.film.error_source());
+        let beside = [0.001, 0.005, 0.02, 0.05].into_iter().flat_map(|far| {
+            [(0.2015 + far, 0.07), (-0.2015 - far, 0.011), (0.033, 0.2015 + far), (0.2015 + far, -0.2015 - far)]
+                .map(|(x, z)| looked_up(&layout, &maps, 0, DVec3::new(x, 0.0, z)))
+        });
+        let darkest = beside.fold(f64::INFINITY, f64::min);
+        let on_top = looked_up(&layout, &maps, 1, DVec3::new(0.05, lowest + 0.5, 0.02));
+        println!("{lowest}, {is_turned}: at least {darkest:.3} on the floor, {on_top:.3} on top");
+        assert!(darkest > 0.95 && (on_top - 1.0).abs() < 0.05, "{lowest}, {is_turned}: {darkest} on the floor, {on_top} on top");
+    }
 }

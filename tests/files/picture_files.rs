@@ -37,15 +37,15 @@ impl Place {
 fn layers_are_the_parts_the_error_and_what_is_seen() {
     let Some(_) = device() else { return };
     let place = Place::new();
-    place.succeed(&format!("render cornell-spheres --rounds 8 -o a.exr --error-image e.exr {SMALL}"));
+    place.succeed(&format!("render cornell-spheres --rounds 8 --block 1 -o a.exr --error-image e.exr {SMALL}"));
     let all = place.channels("a.exr");
-    let rgb = ["direct", "specular", "caustic", "indirect", "standard_error", "albedo"];
+    let rgb = ["direct", "specular", "caustic", "indirect", "standard_error", "unseen", "albedo"];
     let mut expected: BTreeSet<String> = rgb.iter().flat_map(|layer| ["R", "G", "B"].map(|channel| format!("{layer}.{channel}"))).collect();
     expected.extend(["R", "G", "B", "normal.X", "normal.Y", "normal.Z", "depth.Z"].map(str::to_owned));
     assert_eq!(all.keys().cloned().collect::<BTreeSet<_>>(), expected);
     // As if a part were asked for alone, as the next test has it of indirect light; and the sum of all but for the rounding of floats.
     for part in ["specular", "caustic"] {
-        place.succeed(&format!("render cornell-spheres --rounds 8 --part {part} --layers none -o {part}.exr {SMALL}"));
+        place.succeed(&format!("render cornell-spheres --rounds 8 --block 1 --part {part} --layers none -o {part}.exr {SMALL}"));
         let alone = place.channels(&format!("{part}.exr"));
         assert_eq!(alone.len(), 3);
         for (channel, values) in &alone {
@@ -55,13 +55,14 @@ fn layers_are_the_parts_the_error_and_what_is_seen() {
     for channel in ["R", "G", "B"] {
         let errors = &all[&format!("standard_error.{channel}")];
         assert!(*errors == place.channels("e.exr")[channel] && errors.iter().any(|error| *error > 0.0));
+        assert!(all[&format!("unseen.{channel}")] == place.channels("e.exr")[&format!("unseen.{channel}")]);
         for (pixel, whole) in all[channel].iter().enumerate() {
             let sum: f64 = rgb[..4].iter().map(|part| f64::from(all[&format!("{part}.{channel}")][pixel])).sum();
             assert!((sum - f64::from(*whole)).abs() <= 3e-7 * f64::from(*whole), "{channel} of pixel {pixel}: {sum}, {whole}");
         }
     }
     // Neither layers nor their lack change the light, which is what `--part all` asks for.
-    place.succeed(&format!("render cornell-spheres --rounds 8 --part all -o b.exr --layers albedo,depth {SMALL}"));
+    place.succeed(&format!("render cornell-spheres --rounds 8 --block 1 --part all -o b.exr --layers albedo,depth {SMALL}"));
     assert!(place.light("a.exr") == place.light("b.exr"));
     let some: Vec<String> = place.channels("b.exr").into_keys().collect();
     assert_eq!(some, ["B", "G", "R", "albedo.B", "albedo.G", "albedo.R", "depth.Z"]);
@@ -69,6 +70,31 @@ fn layers_are_the_parts_the_error_and_what_is_seen() {
         ("render cornell -o c.exr --layers light", ["--layers light", "must be all, none, or some of direct, specular"]),
         ("render cornell -o c.png --layers none", ["--layers none", "is for EXR only"]),
     ]);
+}
+
+/// The layer and the report state the same error: their root mean squares agree, however little some pixels have seen of some kind of
+/// light. What that may add is in a layer of its own, and is no error.
+#[test]
+fn the_error_layer_is_as_large_as_the_report_says() {
+    let Some(_) = device() else { return };
+    let place = Place::new();
+    place.succeed(
+        "render caustic-sphere --rounds 8 --block 1 -o a.exr --json a.json --size 8x8 --photons 500 --caustic-photons 100 --aim off -q",
+    );
+    let all = place.channels("a.exr");
+    let report: serde_json::Value = serde_json::from_str(&place.text("a.json")).unwrap();
+    let mean_square = |layer: &str| {
+        let values = ["R", "G", "B"].map(|channel| &all[&format!("{layer}{channel}")]);
+        let finite = || values.into_iter().flatten().map(|value| f64::from(*value)).filter(|value| value.is_finite());
+        finite().map(|value| value * value).sum::<f64>() / finite().count() as f64
+    };
+    let mean = ["R", "G", "B"].map(|channel| all[channel].iter().map(|value| f64::from(*value)).sum::<f64>()).iter().sum::<f64>() / 192.0;
+    let [layer, unseen] = ["standard_error.", "unseen."].map(|layer| mean_square(layer).sqrt() / mean);
+    let stated = report["relative_error"].as_f64().unwrap();
+    println!("the layer says {layer:.3}, the report {stated:.3}; unseen {unseen:.3}");
+    assert!((0.7 * stated..2.0 * stated).contains(&layer), "the layer says {layer}, the report {stated}");
+    assert!(unseen > 2.0 * stated, "nothing is unseen: the test needs fewer photons");
+    assert_eq!(report["intervals"]["degrees_of_freedom"], 7);
 }
 
 /// What was seen before a checkpoint counts in its layers, and so does each shard; less than a block is a picture too.

@@ -23,7 +23,7 @@ fn a_million_triangles_load_and_render() {
     let folder = tempfile::tempdir().unwrap();
     let scene = million();
     let layout = Layout::new(&scene, 8.0).unwrap();
-    let maps = layout.maps(&vec![bake::TexelEstimate::default(); layout.texel_count()]);
+    let maps = layout.maps(&vec![bake::TexelEstimate::default(); layout.texel_count()], Default::default());
     bake::write(&Folder::open("-o", folder.path()).unwrap(), &scene, &layout, &maps, 1.0).unwrap();
 
     let began = Instant::now();

@@ -173,3 +173,54 @@ fn an_open_scene_has_no_openings_and_the_same_bits() {
     let plan = scene_plan(&gpu, &scene, &indirect(true), Sensor::Receivers { count: 1 }).unwrap().1;
     assert!(plan.trial.as_ref().is_none_or(|trial| trial.openings.is_empty()));
 }
+
+/// A skylight of 0.2 x 0.2 m that shows the sun, beside a window of 2 x 1.4 m in a black room. Lines from the points cross each other where
+/// these stand close together, so that what the trial takes for an opening may lie there; from one point in the patch of sun nothing that it
+/// found shows the sun. Rays look for it all the same.
+fn sun_through_a_small_window(gpu: &Gpu) -> Check {
+    let sheet = |origin: DVec3, u: DVec3, v: DVec3| Mesh::parallelogram("sheet", origin, u, v, 0);
+    let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
+    let hole = dvec3(-0.5, 3.0, -0.3);
+    let meshes = vec![
+        sheet(dvec3(-2.0, 0.0, -2.0), 4.0 * x, 4.0 * z),
+        sheet(dvec3(-2.0, 0.0, -2.0), 4.0 * x, 3.0 * y),
+        sheet(dvec3(-2.0, 0.0, 2.0), 4.0 * x, 3.0 * y),
+        sheet(dvec3(-2.0, 0.0, -2.0), 4.0 * z, 3.0 * y),
+        // About the window.
+        sheet(dvec3(2.0, 0.0, -2.0), 4.0 * z, 0.8 * y),
+        sheet(dvec3(2.0, 2.2, -2.0), 4.0 * z, 0.8 * y),
+        sheet(dvec3(2.0, 0.8, -2.0), 1.0 * z, 1.4 * y),
+        sheet(dvec3(2.0, 0.8, 1.0), 1.0 * z, 1.4 * y),
+        // About the skylight.
+        sheet(dvec3(-2.0, 3.0, -2.0), (hole.x - 0.1 + 2.0) * x, 4.0 * z),
+        sheet(dvec3(hole.x + 0.1, 3.0, -2.0), (2.0 - hole.x - 0.1) * x, 4.0 * z),
+        sheet(dvec3(hole.x - 0.1, 3.0, -2.0), 0.2 * x, (hole.z - 0.1 + 2.0) * z),
+        sheet(dvec3(hole.x - 0.1, 3.0, hole.z + 0.1), 0.2 * x, (2.0 - hole.z - 0.1) * z),
+    ];
+    // 20 degrees from the vertical, away from the window.
+    let picture = sky(2048, 1024, |i, j| Vec3::splat(if (i, j) == (0, 114) { 1.3e6 } else { 1.0 }));
+    let (angle, turn) = (PI * 114.5 / 1024.0, TAU * (0.5 / 2048.0 - 0.5));
+    let patch = hole - 3.0 * dvec3(angle.tan() * turn.cos(), 1.0, angle.tan() * turn.sin());
+    let near = |a: i32| (-1..=1).map(move |b| patch + 0.02 * dvec3(f64::from(a), 0.0, f64::from(b)));
+    let others = [patch + dvec3(0.085, 0.0, 0.085), dvec3(1.0, 0.0, 1.0), dvec3(-1.0, 0.0, 1.0), dvec3(1.5, 0.0, -1.0)];
+    let points: Vec<_> = (-1..=1).flat_map(near).chain(others).map(|place| (place, DVec3::Y)).collect();
+    let black = Material { two_sided: true, ..matt(0.0) };
+    let scene = scene_of(meshes, vec![black], vec![LightKind::Sky(Arc::new(picture))]);
+    let [aimed, other] = [true, false].map(|aim| {
+        let settings = SceneSettings { rounds: 64, shadow_rays: 4, ..direct(aim) };
+        render(gpu, &scene, &settings, Target::Points(&points)).unwrap()
+    });
+    assert!(aimed.plan.trial.as_ref().is_some_and(|trial| !trial.openings.is_empty()));
+    for point in 0..points.len() {
+        let ((found, error), (expected, own)) = (red(&aimed, point), red(&other, point));
+        println!("point {point}: {found} +- {error}, {expected} +- {own} without aim");
+        z_check(&format!("point {point}"), found, expected, error.hypot(own))?;
+    }
+    Ok(())
+}
+
+#[test]
+fn a_sun_through_a_small_window_beside_a_large_one_is_found() {
+    let Some(gpu) = device() else { return };
+    assert_holds("small window", sun_through_a_small_window(&gpu));
+}

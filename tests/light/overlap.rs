@@ -1,9 +1,12 @@
 //! Surfaces that lie in one plane, or next to it: their light is that of one, and of each.
 
 use crate::common::known::kept;
+use crate::common::layered::{dull, without_maps};
 use crate::common::prelude::*;
 use photonmill::constants::HIDDEN;
 use photonmill::scene::material::{Coverage, Layers, Medium};
+use photonmill::scene::solids;
+use photonmill::scene::texture::Filter;
 
 /// A room of 4 x 3 x 4 m around the y axis with a lamp of a square metre below its ceiling.
 fn room() -> Scene {
@@ -290,4 +293,393 @@ fn a_block_of_glass_on_a_table_hides_no_top() {
         assert_eq!(top_beside(material, true), 2, "{name}");
     }
     assert!(top_beside(matt(0.5), true) > 2);
+}
+
+/// Clear glass of this index that bounds a solid.
+fn clear_solid(ior: f32) -> Material {
+    Material::layered(
+        "solid",
+        Vec3::ONE,
+        Layers { transmission: 1.0, medium: Some(Medium::CLEAR), metallic: 0.0, roughness: 0.0, ior, ..Layers::default() },
+    )
+}
+
+fn smooth_metal() -> Material {
+    Material::layered("metal", Vec3::ONE, Layers { roughness: 0.0, ..Layers::default() })
+}
+
+/// A box of one mesh, that faces outwards.
+fn cuboid(name: &str, low: DVec3, high: DVec3, material: usize) -> Mesh {
+    let corner = |k: u32| DVec3::from_array([0, 1, 2].map(|axis| if k >> axis & 1 == 1 { high[axis] } else { low[axis] }));
+    let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let halves = |[a, b, c, d]: [u32; 4]| [[a, b, c], [a, c, d]];
+    Mesh {
+        name: name.into(),
+        positions: (0..8).map(corner).collect(),
+        triangles: faces.into_iter().flat_map(halves).collect(),
+        material,
+        ..Mesh::default()
+    }
+}
+
+fn faces_inwards(mesh: Mesh) -> Mesh {
+    let triangles = mesh.triangles.iter().map(|[a, b, c]| [*a, *c, *b]).collect();
+    Mesh { triangles, ..mesh }
+}
+
+/// A closed room of a cube of 1 m whose walls, which scatter a half, have a radiance of 1 wherever one looks.
+fn furnace_with(meshes: Vec<Mesh>, materials: Vec<Material>) -> Scene {
+    let walls = faces_inwards(cuboid("walls", DVec3::ZERO, DVec3::ONE, 0));
+    let grey = Material { emission: Vec3::splat(0.5), ..matt(0.5) };
+    scene_of([vec![walls], meshes].concat(), [vec![grey], materials].concat(), vec![])
+}
+
+fn brief() -> SceneSettings {
+    kept(SceneSettings { photons: 8000, caustic_photons: 8000, rounds: 8, shadow_rays: 4, ..by_rounds() })
+}
+
+/// What keeps no photons is no area that they are counted over: a floor is lit to its edge, whatever lies beside it.
+#[test]
+fn a_floor_beside_what_keeps_no_photons_is_lit_to_its_edge() {
+    let Some(gpu) = device() else { return };
+    let half = |x: f64, material: usize| Mesh::parallelogram("half", DVec3::new(x, 0.0, 0.0), DVec3::Z, DVec3::X * 0.5, material);
+    let points = [(DVec3::new(0.499, 0.0, 0.5), DVec3::Y), (DVec3::new(0.25, 0.0, 0.5), DVec3::Y)];
+    for (what, other) in [("metal", smooth_metal()), ("mirror", mirror(1.0)), ("glass", clear_solid(1.5))] {
+        let scene =
+            scene_of(vec![half(0.0, 0), half(0.5, 1)], vec![matt(0.5), other], vec![LightKind::Environment { radiance: Vec3::ONE }]);
+        let lit = received(&gpu, &scene, &kept(mapped(20_000, 16, 2, 0.1)), &points);
+        for place in 0..2 {
+            let (found, error) = red(&lit, place);
+            println!("beside {what}: {found} +- {error}");
+            assert!(error < 0.05 * PI, "{what}: {error}");
+            assert_holds(what, z_check(what, found, PI, error));
+        }
+    }
+}
+
+/// A floor below a block of glass that stands on it is lit as below one that is sunk into it by a millimetre. (What the floor emits
+/// within the glass is less than a furnace's.)
+#[test]
+fn a_floor_below_glass_that_stands_on_it_is_lit() {
+    let Some(gpu) = device() else { return };
+    let [(touching, error), (sunk, other)] = [0.0, 1e-3].map(|sunk| {
+        let block = cuboid("block", DVec3::new(0.3, -sunk, 0.3), DVec3::new(0.7, 0.3, 0.7), 1);
+        let scene = furnace_with(vec![block], vec![clear_solid(1.5)]);
+        red(&received(&gpu, &scene, &kept(mapped(20_000, 16, 64, 0.1)), &[(DVec3::new(0.5, 0.0, 0.45), DVec3::Y)]), 0)
+    });
+    println!("below glass: {touching} +- {error} touching, {sunk} +- {other} sunk");
+    assert!(error < 0.03 * touching, "{error}");
+    assert_holds("below glass", z_check("below glass", touching, sunk, error.hypot(other)));
+}
+
+/// Water that exactly fills its vessel, under a sky of 1: white walls give back what they get, so that all is 1.
+#[test]
+fn a_liquid_that_fills_its_vessel_neither_gains_nor_loses_light() {
+    let Some(gpu) = device() else { return };
+    let vessel = |two_sided: bool, thick: bool, sunk: f64| {
+        let [low, high] = [DVec3::new(-0.5, 0.0, -0.5), DVec3::new(0.5, 1.0, 0.5)];
+        let mut inside = faces_inwards(cuboid("vessel", low, high, 0));
+        let is_top = |triangle: &[u32; 3]| triangle.iter().all(|vertex| inside.positions[*vertex as usize].y == 1.0);
+        inside.triangles = inside.triangles.iter().copied().filter(|triangle| !is_top(triangle)).collect();
+        let grown = DVec3::new(sunk, 0.0, sunk);
+        let water = cuboid("water", low - grown - DVec3::Y * sunk, DVec3::new(high.x, 0.8, high.z) + grown, 1);
+        let mut meshes = vec![inside, water];
+        if thick {
+            let mut outside = cuboid("outside", low - 0.1, high + DVec3::new(0.1, 0.0, 0.1), 0);
+            let is_top = |triangle: &[u32; 3]| triangle.iter().all(|vertex| outside.positions[*vertex as usize].y == 1.0);
+            outside.triangles = outside.triangles.iter().copied().filter(|triangle| !is_top(triangle)).collect();
+            meshes.push(outside);
+        }
+        scene_of(meshes, vec![Material { two_sided, ..matt(1.0) }, clear_solid(1.33)], vec![LightKind::Environment { radiance: Vec3::ONE }])
+    };
+    let camera = Camera::looking_at("eye", DVec3::new(0.0, 2.5, 1.8), DVec3::new(0.0, 0.5, 0.0), DVec3::Y, 0.7);
+    let mean = |two_sided: bool, thick: bool, sunk: f64| {
+        let scene = vessel(two_sided, thick, sunk);
+        let lit = seen(&gpu, &scene, &SceneSettings { samples: 4, bounces: 64, ..brief() }, &camera, [8, 8]);
+        let error = standard_errors(&lit).iter().map(|error| error.x.powi(2)).sum::<f64>().sqrt() / 64.0;
+        (mean_red(&lit), error)
+    };
+    // Of thick walls only the sides are there, so that some light is lost between them.
+    for (two_sided, thick) in [(true, false), (false, true)] {
+        let [(touching, error), (sunk, other)] = [0.0, 1e-3].map(|sunk| mean(two_sided, thick, sunk));
+        let what = format!("two-sided {two_sided}, thick {thick}");
+        println!("{what}: {touching} +- {error} touching, {sunk} +- {other} sunk");
+        assert!(thick || (touching - 1.0).abs() < 0.04, "{what}: {touching}");
+        assert!((touching - sunk).abs() < 0.03, "{what}: {touching} touching, {sunk} sunk");
+    }
+}
+
+/// A decal with gaps of alpha in a wall's plane is seen where it is, and the wall where it is not; light arrives at both.
+#[test]
+fn a_decal_in_the_plane_of_a_wall_is_seen_where_its_alpha_is() {
+    let Some(gpu) = device() else { return };
+    let wall = Material { two_sided: true, ..matt(0.5) };
+    let row = |alpha: u8| [255, 255, 255, alpha];
+    let halves = Texture {
+        name: "halves".into(),
+        width: 2,
+        height: 1,
+        texels: Texels::Linear(vec![row(0), row(255)]),
+        wrap: [Wrap::Clamp; 2],
+        filter: Filter::Nearest,
+    };
+    let black = Material { base_colour: Vec3::ZERO, base_colour_texture: Some(TextureUse::of(0, 0)), ..dull(0.0) };
+    let decal = Material { coverage: Coverage::Blend { alpha: 1.0 }, ..black };
+    for faces_up in [true, false] {
+        let decal = Material { two_sided: !faces_up, ..decal.clone() };
+        let mut mesh = Mesh { name: "decal".into(), ..level(0.0, [1.0; 2], faces_up, 1) };
+        mesh.uvs[0] = mesh.positions.iter().map(|at| DVec2::new(at.x + 0.5, 0.5)).collect();
+        let meshes = vec![level(0.0, [4.0; 2], true, 0), mesh];
+        let mut scene = scene_of(
+            meshes,
+            vec![Material { two_sided: false, ..wall.clone() }, decal],
+            vec![LightKind::Environment { radiance: Vec3::ONE }],
+        );
+        scene.textures = vec![halves.clone()];
+        let camera = Camera::looking_at("above", DVec3::Y * 10.0, DVec3::ZERO, DVec3::NEG_Z, 0.08);
+        let lit = seen(&gpu, &scene, &brief(), &camera, [4, 4]);
+        let means: Vec<f64> = means(&lit).iter().map(|mean| mean.x).collect();
+        // The left half has gaps, the right half none.
+        for (place, mean) in means.iter().enumerate() {
+            let expected = if place % 4 < 2 { 0.5 } else { 0.0 };
+            assert!((mean - expected).abs() < 0.03, "facing up {faces_up}: {means:?}");
+        }
+    }
+}
+
+/// Glass whose faces look inwards is turned, but not what is hollow in it; where five solids and more lie in one another, each counts.
+#[test]
+fn solids_face_outwards() {
+    let solid = |mesh: Mesh, material: usize| Mesh { material, ..mesh };
+    let ball = |radius: f64| Mesh { normals: Vec::new(), ..Mesh::sphere("ball", DVec3::ZERO, radius, 16, 0) };
+    let volume = |mesh: &Mesh| (0..mesh.triangles.len()).map(|k| mesh.corners(k)).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum::<f64>();
+    let glass = || clear_solid(1.5);
+    let other = || clear_solid(1.33);
+    let cases = [
+        ("outwards", vec![ball(1.0)], vec![1.0]),
+        ("inwards", vec![faces_inwards(ball(1.0))], vec![1.0]),
+        ("hollow", vec![ball(1.0), faces_inwards(ball(0.5))], vec![1.0, -1.0]),
+        ("hollow and inside out", vec![faces_inwards(ball(1.0)), ball(0.5)], vec![1.0, -1.0]),
+        ("of another glass", vec![ball(1.0), solid(faces_inwards(ball(0.5)), 1)], vec![1.0, 1.0]),
+    ];
+    for (what, meshes, signs) in cases {
+        let was_turned = meshes.iter().zip(&signs).any(|(mesh, sign)| volume(mesh) * sign < 0.0);
+        let mut scene = scene_of(meshes, vec![glass(), other()], vec![]);
+        let names = solids::turn_outwards(&mut scene);
+        assert_eq!(!names.is_empty(), was_turned, "{what}");
+        assert!(scene.meshes.iter().zip(&signs).all(|(mesh, sign)| volume(mesh) * sign > 0.0), "{what}");
+    }
+    // An open one has no inside.
+    let mut open = faces_inwards(ball(1.0));
+    open.triangles.pop();
+    assert!(solids::turn_outwards(&mut scene_of(vec![open], vec![glass()], vec![])).is_empty());
+}
+
+/// Balls in one another, each of its own glass.
+fn nested_balls(count: usize) -> Scene {
+    let ball = |k: usize| Mesh::sphere(&format!("ball {k}"), DVec3::ZERO, 1.0 - 0.5 * k as f64 / count as f64, 32, k);
+    let materials = (0..count).map(|k| clear_solid(1.1 + 0.3 * (k % 3) as f32 + 0.01 * k as f32)).collect();
+    scene_of((0..count).map(ball).collect(), materials, vec![LightKind::Environment { radiance: Vec3::ONE }])
+}
+
+#[test]
+fn many_solids_in_one_another_each_count_or_are_refused() {
+    let bits = |scene: &Scene| Geometry::new(scene).map(|geometry| geometry.medium_bits);
+    assert_eq!(bits(&nested_balls(4)).unwrap(), 8);
+    assert_eq!(bits(&nested_balls(7)).unwrap(), 3);
+    let refused = bits(&nested_balls(9)).unwrap_err().to_string();
+    assert!(refused.contains("is one of 9 solids that lie in one another") && refused.contains("at most 8 may"), "{refused}");
+    // Of one glass there is more room.
+    let mut alike = nested_balls(9);
+    alike.meshes.iter_mut().for_each(|mesh| mesh.material = 0);
+    alike.materials.truncate(1);
+    assert_eq!(bits(&alike).unwrap(), 1);
+    let Some(gpu) = device() else { return };
+    let camera = Camera::looking_at("eye", DVec3::Z * 6.0, DVec3::ZERO, DVec3::Y, 0.3);
+    let lit = seen(&gpu, &nested_balls(6), &without_maps(SceneSettings { samples: 4, rounds: 4, ..by_rounds() }), &camera, [8, 8]);
+    let means: Vec<f64> = means(&lit).iter().map(|mean| mean.x).collect();
+    // Few paths at rims end before they are out.
+    assert!(means.iter().all(|mean| (mean - 1.0).abs() < 0.1), "{means:?}");
+}
+
+/// What a surface of the table is made of.
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum Made {
+    Matt,
+    Mirror,
+    Metal,
+    SolidGlass,
+    ThinGlass,
+    HalfAlpha,
+    Mask,
+    Unlit,
+    Lamp,
+}
+
+const MADE: [Made; 9] =
+    [Made::Matt, Made::Mirror, Made::Metal, Made::SolidGlass, Made::ThinGlass, Made::HalfAlpha, Made::Mask, Made::Unlit, Made::Lamp];
+
+impl Made {
+    /// `colour` multiplies what it gives back.
+    fn material(self, colour: f32) -> Material {
+        let grey = Vec3::splat(colour);
+        let thin = Layers { transmission: 1.0, metallic: 0.0, roughness: 0.0, ..Layers::default() };
+        let of = match self {
+            Made::Matt => matt(colour),
+            Made::Mirror => mirror(colour),
+            Made::Metal => Material::layered("metal", grey, Layers { roughness: 0.0, ..Layers::default() }),
+            Made::SolidGlass => clear_solid(1.5),
+            Made::ThinGlass => Material::layered("thin", Vec3::ONE, thin),
+            Made::HalfAlpha => Material { coverage: Coverage::Blend { alpha: 0.5 }, ..dull(colour) },
+            Made::Mask => Material { coverage: Coverage::Mask { alpha: 0.2, cutoff: 0.5 }, ..dull(colour) },
+            Made::Unlit => Material::layered("unlit", grey, Layers { is_unlit: true, ..Layers::default() }),
+            Made::Lamp => Material { emission: Vec3::splat(0.5), ..matt(0.5) },
+        };
+        Material { two_sided: true, ..of }
+    }
+
+    fn is_sheet(self) -> bool {
+        matches!(self, Made::ThinGlass | Made::HalfAlpha | Made::Mask)
+    }
+
+    /// Where the small one goes, of this, that lies on a large one, to show the same without contact: 1 up, -1 down. `faces_up`
+    /// is as the large one faces.
+    fn apart_from(self, large: Made, faces_up: bool) -> f64 {
+        let solid = |made: Made| made == Made::SolidGlass;
+        match (self, large) {
+            // A solid goes on into what it touches, or lies inside of it.
+            (small, _) if solid(small) => -1.0,
+            // What is small lies on what is large, but a sheet on all else, and a lamp is seen.
+            (small, large) if large.is_sheet() && !small.is_sheet() => -1.0,
+            (small, Made::Lamp) if !small.is_sheet() && small != Made::Lamp => -1.0,
+            // A sheet goes to its own front, where the other has two sides.
+            (small, _) if small.is_sheet() => {
+                if faces_up {
+                    1.0
+                } else {
+                    -1.0
+                }
+            }
+            _ => 1.0,
+        }
+    }
+}
+
+/// Pairs side by side: every kind of surface, large and facing up, in one plane with every other, small and facing up or down.
+fn table(lift: f64, colours: [f32; 2], lights: Vec<LightKind>) -> Scene {
+    let mut scene = scene_of(vec![], colours.into_iter().flat_map(|colour| MADE.map(|made| made.material(colour))).collect(), lights);
+    for (row, large) in MADE.into_iter().enumerate() {
+        for (column, (small, faces_up)) in MADE.into_iter().flat_map(|made| [(made, true), (made, false)]).enumerate() {
+            let middle = DVec3::new(column as f64 - 8.5, 0.0, row as f64 - 4.0);
+            let mut put = |made: Made, width: f64, height: f64, faces_up: bool, material: usize| {
+                let mut mesh = match made {
+                    Made::SolidGlass => {
+                        let (low, high) = if faces_up { (height - 0.3 * width, height) } else { (height, height + 0.3 * width) };
+                        cuboid("solid", DVec3::new(-0.5 * width, low, -0.5 * width), DVec3::new(0.5 * width, high, 0.5 * width), material)
+                    }
+                    _ => level(height, [width; 2], faces_up, material),
+                };
+                mesh.positions.iter_mut().for_each(|at| *at += middle);
+                scene.meshes.push(mesh);
+            };
+            put(large, 0.96, 0.0, true, row);
+            put(small, 0.9, lift * small.apart_from(large, faces_up), faces_up, MADE.len() + column / 2);
+        }
+    }
+    scene
+}
+
+/// What a pair of the table is, for messages.
+fn pair(place: usize) -> (Made, Made, &'static str) {
+    let (row, column) = (place / 18, place % 18);
+    (MADE[row], MADE[column / 2], if column % 2 == 0 { "the same way" } else { "opposite ways" })
+}
+
+/// A pixel of each pair, from above or below.
+fn seen_of_table(gpu: &Gpu, scene: &Scene, from: f64) -> Vec<(f64, f64)> {
+    let distance = 300.0;
+    let angle = 2.0 * (4.5_f64 / distance).atan();
+    let camera = Camera::looking_at("table", DVec3::Y * from * distance, DVec3::ZERO, DVec3::NEG_Z, angle);
+    let lit =
+        seen(gpu, scene, &SceneSettings { samples: 64, rounds: 8, photons: 20_000, caustic_photons: 20_000, ..brief() }, &camera, [18, 9]);
+    let place = |row: usize, column: usize| 18 * row + if from > 0.0 { column } else { 17 - column };
+    (0..9 * 18).map(|k| red(&lit, place(k / 18, k % 18))).collect()
+}
+
+/// Every kind of surface against every other in one plane: none gains or loses light, from whichever side.
+#[test]
+fn surfaces_in_one_plane_keep_the_light_of_a_furnace() {
+    let Some(gpu) = device() else { return };
+    let scene = table(0.0, [1.0; 2], vec![LightKind::Environment { radiance: Vec3::ONE }]);
+    let mut complaints = Vec::new();
+    for from in [1.0, -1.0] {
+        for (place, (mean, error)) in seen_of_table(&gpu, &scene, from).iter().enumerate() {
+            let (large, small, way) = pair(place);
+            // What emits into glass has its radiance there, and less of it outside.
+            let emits = |made: Made| matches!(made, Made::Lamp | Made::Unlit);
+            let emits_into_glass = [(large, small), (small, large)].iter().any(|(a, b)| emits(*a) && *b == Made::SolidGlass);
+            // Between two half sheets a tenth is lost at so few photons, where they face opposite ways.
+            let bound = if large == small && large == Made::HalfAlpha { 0.15 } else { f64::max(0.06, 6.0 * error) };
+            if !emits_into_glass && (mean - 1.0).abs() > bound {
+                complaints.push(format!("from {from}: {large:?} and {small:?}, facing {way}: {mean} +- {error}"));
+            }
+        }
+    }
+    assert!(complaints.is_empty(), "{}", complaints.join("\n"));
+}
+
+/// And each shows what it does where they are a millimetre apart.
+#[test]
+#[ignore = "long: two pictures of 162 pairs"]
+fn surfaces_in_one_plane_show_what_they_do_a_millimetre_apart() {
+    let Some(gpu) = device() else { return };
+    let lights = || vec![LightKind::Environment { radiance: Vec3::ONE }];
+    let [touching, apart] = [0.0, 1e-3].map(|lift| seen_of_table(&gpu, &table(lift, [0.3, 0.8], lights()), 1.0));
+    let mut complaints = Vec::new();
+    for (place, ((one, error), (other, other_error))) in touching.iter().zip(&apart).enumerate() {
+        if (one - other).abs() > f64::max(0.05, 5.0 * error.hypot(*other_error)) {
+            complaints.push(format!("{:?}: {one} +- {error} touching, {other} +- {other_error} apart", pair(place)));
+        }
+    }
+    assert!(complaints.is_empty(), "{}", complaints.join("\n"));
+}
+
+/// Light that gets through layers of these indices, outside air, straight down, however often it is reflected between them.
+fn through_layers(indices: &[f64]) -> f64 {
+    let around = |k: usize| if k == 0 || k > indices.len() { 1.0 } else { indices[k - 1] };
+    let reflectance = |k: usize| ((around(k) - around(k + 1)) / (around(k) + around(k + 1))).powi(2);
+    // Adding one boundary after the other: what passes, and what is reflected from beyond.
+    let add = |(passes, reflects): (f64, f64), k: usize| {
+        let own = reflectance(k);
+        let between = 1.0 - reflects * own;
+        (passes * (1.0 - own) / between, own + (1.0 - own).powi(2) * reflects / between)
+    };
+    (1..=indices.len()).fold((1.0 - reflectance(0), reflectance(0)), add).0
+}
+
+/// Solids that touch have no air between: water on glass, glass on glass of one material and of another, and one that lies flush in another.
+#[test]
+fn light_goes_from_solid_to_solid_without_air_between() {
+    let Some(gpu) = device() else { return };
+    let slab = |name: &str, bottom: f64, top: f64, width: f64, material: usize| {
+        let half = DVec3::new(0.5 * width, 0.0, 0.5 * width);
+        cuboid(name, DVec3::Y * bottom - half, DVec3::Y * top + half, material)
+    };
+    let cases = [
+        ("water on glass", vec![slab("glass", 0.0, 0.2, 4.0, 1), slab("water", 0.2, 0.5, 4.0, 2)], vec![1.5, 1.33]),
+        ("water on wider glass", vec![slab("glass", 0.0, 0.2, 5.0, 1), slab("water", 0.2, 0.5, 4.0, 2)], vec![1.5, 1.33]),
+        ("two of one glass", vec![slab("one", 0.0, 0.2, 4.0, 1), slab("two", 0.2, 0.5, 4.0, 1)], vec![1.5]),
+        ("flush", vec![slab("glass", 0.0, 0.5, 5.0, 1), slab("water", 0.2, 0.5, 4.0, 2)], vec![1.5, 1.33, 1.5]),
+    ];
+    for (what, meshes, indices) in cases {
+        let lamp = level(-1.0, [3.0; 2], true, 0);
+        let materials = vec![shining(0.0), clear_solid(1.5), clear_solid(1.33)];
+        let scene = scene_of([vec![lamp], meshes].concat(), materials, vec![]);
+        let settings = without_maps(SceneSettings { rounds: 8, samples: 4, ..by_rounds() });
+        let found = radiances(&gpu, &scene, &settings, DVec3::new(0.01, 3.0, 0.02), DVec3::new(0.01, 0.0, 0.02), 8);
+        let (mean, error) = mean_and_error(&found);
+        let expected = through_layers(&indices);
+        assert!(error < 0.01, "{what}: {error}");
+        assert_holds(what, z_check(what, mean, expected, error.max(1e-3)));
+    }
 }

@@ -3,10 +3,12 @@
 use std::sync::Arc;
 
 use crate::common::estimate_check;
+use crate::common::layered::without_maps;
 use crate::common::prelude::*;
 use crate::light::openings::{direct, room_under};
 use glam::dvec3;
 use photonmill::engine::scene::{Target, render};
+use photonmill::scene::material::Coverage;
 use photonmill::scene::sky::Sky;
 
 /// A picture of so many pixels by their colours.
@@ -188,5 +190,71 @@ fn black_skies_and_single_texels_leave_no_odd_number() {
             &[(DVec3::X, DVec3::Y)],
         );
         assert!(lit.film.mean(0).is_finite(), "{width} x {height}");
+    }
+}
+
+/// Each channel of an even sky lights a floor by what it is, whatever the ratio to the others.
+#[test]
+fn weak_channels_of_a_sky_keep_their_light() {
+    let Some(gpu) = device() else { return };
+    for colour in [Vec3::new(1000.0, 1.0, 0.3), Vec3::new(10.0, 2.0, 0.3), Vec3::new(1.0, 0.25, 0.002), Vec3::new(1.0, 1e-4, 1e-4)] {
+        let settings = SceneSettings { rounds: 1, part: Part::Direct, ..settings(Illumination::Split) };
+        let lit = received(&gpu, &floor_under(sky(4, 2, |_, _| colour)), &settings, &[(DVec3::ZERO, DVec3::Y)]);
+        let share = lit.film.mean(0) / (PI * colour.as_dvec3());
+        println!("{colour}: {share}");
+        assert!((share - 1.0).abs().max_element() < 1e-3, "{colour}: {share}");
+    }
+}
+
+/// A sun that takes up little of a pixel: of the picture's sky itself, behind a sheet of which half is a gap, and behind the back of a sheet
+/// of one side.
+#[test]
+fn a_sun_in_one_pixel_is_seen() {
+    let Some(gpu) = device() else { return };
+    const WIDTH: u32 = 512;
+    let (i_sun, j_sun) = (WIDTH / 2 + 7, WIDTH / 4 - 9);
+    let picture = sky(WIDTH, WIDTH / 2, |i, j| Vec3::splat(if (i, j) == (i_sun, j_sun) { 1e7 } else { 0.2 }));
+    let step = PI / f64::from(WIDTH / 2);
+    let direction = |x: f64, y: f64| {
+        let (angle, turn) = (step * y, step * x - PI);
+        dvec3(angle.sin() * turn.cos(), angle.cos(), angle.sin() * turn.sin())
+    };
+    let camera = Camera::looking_at("eye", DVec3::ZERO, DVec3::X, DVec3::Y, 1.0);
+    const SIZE: u32 = 9;
+    // Over the sun's tent, by its place in the picture: of the pixel's light each direction has its share of the pixel's solid angle.
+    let edge = 2.0 * camera.half_height() / f64::from(SIZE);
+    const PARTS: u32 = 64;
+    let part = 2.0 / f64::from(PARTS);
+    let (mut expected, mut pixels) = (0.0, HashSet::new());
+    for (a, b) in (0..PARTS).flat_map(|a| (0..PARTS).map(move |b| (a, b))) {
+        let [x, y] = [(a, i_sun), (b, j_sun)].map(|(part_number, texel)| f64::from(texel) - 0.5 + part * (f64::from(part_number) + 0.5));
+        let wi = direction(x, y);
+        let solid_angle = (step * part).powi(2) * (step * y).sin();
+        expected += picture.radiance(wi).x * solid_angle / (edge * edge * wi.x.powi(3));
+        let place = DVec2::new(wi.dot(camera.right), -wi.dot(camera.up)) / (wi.x * edge) + 0.5 * f64::from(SIZE);
+        pixels.insert(place.floor().as_uvec2().to_array());
+    }
+    let pixels: Vec<usize> = pixels.into_iter().map(|[x, y]| (y * SIZE + x) as usize).collect();
+    let sheet = |x: f64, faces_eye: bool, material: usize| {
+        let (u, v) = (8.0 * DVec3::Y, 8.0 * DVec3::Z);
+        let (u, v) = if faces_eye { (v, u) } else { (u, v) };
+        Mesh::parallelogram("sheet", x * DVec3::X - 0.5 * (u + v), u, v, material)
+    };
+    let layered = |coverage, two_sided| Material { surface: Surface::Layered, coverage, two_sided, ..matt(0.0) };
+    let materials = vec![layered(Coverage::Blend { alpha: 0.5 }, true), layered(Coverage::Whole, false)];
+    for (what, meshes, share) in [
+        ("bare", vec![sheet(-1.0, true, 0)], 1.0),
+        ("half a sheet", vec![sheet(1.0, true, 0)], 0.5),
+        ("a back", vec![sheet(1.0, false, 1), sheet(-1.0, true, 0)], 1.0),
+        ("a front", vec![sheet(1.0, true, 1), sheet(-1.0, true, 0)], 0.0),
+    ] {
+        let scene = scene_of(meshes, materials.clone(), vec![LightKind::Sky(Arc::new(picture.clone()))]);
+        let settings = without_maps(SceneSettings { samples: 16, rounds: 32, ..by_rounds() });
+        let lit = render(&gpu, &scene, &settings, Target::Picture(&camera, [SIZE; 2])).unwrap();
+        let found = pixels.iter().map(|pixel| lit.film.mean(*pixel).x).sum::<f64>();
+        let error = pixels.iter().map(|pixel| lit.film.standard_error(*pixel).x.powi(2)).sum::<f64>().sqrt();
+        println!("{what}: {found} +- {error}, {} expected in {} pixels", share * expected, pixels.len());
+        assert!((found - share * expected).abs() < 4.0 * error + 0.005 * share * expected + 1e-4, "{what}: {found} +- {error}");
+        assert!(error <= 0.06 * expected, "{what}: {found} +- {error}");
     }
 }

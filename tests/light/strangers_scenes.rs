@@ -11,7 +11,8 @@ use crate::common::prelude::*;
 use crate::common::rectangles::{self, Rectangle};
 use crate::common::sources::read;
 use glam::dvec3;
-use photonmill::engine::scene::{Target, render};
+use photonmill::engine::scene::{RunResult, Target, render};
+use photonmill::settings::stop::LEAST_BLOCKS;
 
 struct Case {
     family: &'static str,
@@ -445,22 +446,34 @@ fn triangle_irradiance(corners: [DVec3; 3]) -> f64 {
     (0..3).map(edge).sum::<f64>().abs() / 2.0
 }
 
-/// What a case comes to: what is right, found and stated.
-fn found(gpu: &Gpu, setup: &Setup) -> Vec<[f64; 3]> {
+/// What a case comes to: what is right, found and stated, and how much may be unseen.
+fn found(gpu: &Gpu, setup: &Setup) -> Vec<[f64; 4]> {
     match &setup.asked {
         Asked::Points(asked) => {
             let points: Vec<(DVec3, DVec3)> = asked.iter().map(|(at, normal, _)| (*at, *normal)).collect();
             let lit = render(gpu, &setup.scene, &setup.settings, Target::Points(&points)).unwrap();
-            let found = |k: usize| [0, 1, 2].map(|channel| [asked[k].2, lit.film.mean(k)[channel], lit.film.stated_error(k)[channel]]);
+            let found =
+                |k: usize| [0, 1, 2].map(|channel| [asked[k].2, lit.film.mean(k)[channel], error(&lit, k)[channel], unseen(&lit, k)]);
             (0..asked.len()).flat_map(found).collect()
         }
         Asked::Picture(camera, size, expected) => {
             let lit = render(gpu, &setup.scene, &setup.settings, Target::Picture(camera, *size)).unwrap();
             // Pixels share their photons: as if their errors were one.
-            let errors = (0..lit.film.pixels()).map(|pixel| lit.film.stated_error(pixel).x);
-            vec![[*expected, mean_red(&lit), errors.sum::<f64>() / lit.film.pixels() as f64]]
+            let errors = (0..lit.film.pixels()).map(|pixel| error(&lit, pixel).x);
+            let unseen = (0..lit.film.pixels()).map(|pixel| unseen(&lit, pixel)).fold(0.0, f64::max);
+            vec![[*expected, mean_red(&lit), errors.sum::<f64>() / lit.film.pixels() as f64, unseen]]
         }
     }
+}
+
+/// What is stated, or where too few rounds are asked for that, their spread.
+fn error(lit: &RunResult, place: usize) -> DVec3 {
+    if lit.film.blocks < LEAST_BLOCKS { lit.film.standard_error(place) } else { lit.film.stated_error(place) }
+}
+
+/// The bound of what nothing has met there, which is stated beside the error.
+fn unseen(lit: &RunResult, place: usize) -> f64 {
+    lit.film.unseen_bounds()(place)
 }
 
 /// Relative error of what is not random.
@@ -469,12 +482,12 @@ const ROUNDING: f64 = 2e-5;
 const MOST: f64 = 5.0;
 
 /// Complains of what is off by more than it says, of any light where there is none, and of what says nothing.
-fn judge(values: &[[f64; 3]], sure: f64, rounds: u32) -> Check {
-    for [expected, found, stated] in values {
+fn judge(values: &[[f64; 4]], sure: f64, rounds: u32) -> Check {
+    for [expected, found, stated, unseen] in values {
         let error = stated.max(ROUNDING * expected.abs());
         // What errors of one degree of freedom leave is judged as widely.
         let most = if rounds > 2 { MOST } else { 100.0 };
-        let is_off = (found - expected).abs() > most * error || (*expected == 0.0 && *found != 0.0);
+        let is_off = (found - expected).abs() > most * error.hypot(*unseen) || (*expected == 0.0 && *found != 0.0);
         if is_off || found.is_nan() || error > sure * expected.abs() && sure.is_finite() {
             return Err(format!("{found:e} +- {stated:e} where {expected:e} is right"));
         }
@@ -491,11 +504,11 @@ fn hold(family: &str) {
         let (began, setup) = (Instant::now(), (case.setup)());
         let values = found(&gpu, &setup);
         let verdict = judge(&values, setup.sure, setup.settings.rounds);
-        let off = |[expected, found, stated]: &[f64; 3]| match stated.is_infinite() {
+        let off = |[expected, found, stated, _]: &[f64; 4]| match stated.is_infinite() {
             true => f64::INFINITY,
             false => ((found - expected) / stated.max(f64::MIN_POSITIVE)).abs(),
         };
-        let [expected, found, stated] = values.iter().max_by(|a, b| off(a).total_cmp(&off(b))).unwrap();
+        let [expected, found, stated, _] = values.iter().max_by(|a, b| off(a).total_cmp(&off(b))).unwrap();
         println!(
             "{} {} | {} | {} |  {:.1} s",
             case.row(),
@@ -572,12 +585,12 @@ fn extreme_options_are_right_within_what_is_stated() {
 /// Another lamp, an error that is too small, and an answer that says nothing.
 #[test]
 fn the_judgement_of_a_case_complains() {
-    let right = [[1.0, 1.01, 0.01], [0.0, 0.0, f64::INFINITY]];
+    let right = [[1.0, 1.01, 0.01, 0.0], [0.0, 0.0, f64::INFINITY, 0.0]];
     assert_holds("right values", judge(&right, f64::INFINITY, 16));
-    assert_complains("a tenth more light", judge(&right.map(|[a, b, c]| [a, 1.1 * b, c]), f64::INFINITY, 16));
-    assert_complains("a tenth of the error", judge(&right.map(|[a, b, c]| [a, b, 0.1 * c]), f64::INFINITY, 16));
-    assert_complains("light in the dark", judge(&[[0.0, 1e-9, 1e-9]], f64::INFINITY, 16));
-    assert_complains("no number", judge(&[[1.0, f64::NAN, 1.0]], f64::INFINITY, 16));
+    assert_complains("a tenth more light", judge(&right.map(|[a, b, c, d]| [a, 1.1 * b, c, d]), f64::INFINITY, 16));
+    assert_complains("a tenth of the error", judge(&right.map(|[a, b, c, d]| [a, b, 0.1 * c, d]), f64::INFINITY, 16));
+    assert_complains("light in the dark", judge(&[[0.0, 1e-9, 1e-9, 0.0]], f64::INFINITY, 16));
+    assert_complains("no number", judge(&[[1.0, f64::NAN, 1.0, 0.0]], f64::INFINITY, 16));
     assert_complains("nothing said", judge(&right, 0.5, 16));
     let Some(gpu) = device() else { return };
     let case = CASES.iter().find(|case| case.name == "a lamp of 1 m x 0.1 mm").expect("there is such a case");

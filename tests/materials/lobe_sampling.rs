@@ -108,7 +108,7 @@ fn number(kind: Kind) -> u32 {
 }
 
 /// What the judge has for a case.
-fn judged(case: &LobeCase) -> Lobes {
+pub(super) fn judged(case: &LobeCase) -> Lobes {
     let wall = if case.is_solid == 0 { Wall::Thin } else { Wall::Solid { from: f64::from(case.eta), to: 1.0 } };
     let inputs = Inputs {
         base_colour: case.base_colour.as_dvec3(),
@@ -359,7 +359,7 @@ fn value_errors(case: &LobeCase, of: &Facets, sample: &LobeSample) -> Worst {
 }
 
 /// On a scene of nothing but the table of albedos; of all lobes and gaps, or of those of facets alone.
-fn ask(gpu: &Gpu, math: Math, all: bool, cases: &[LobeCase], samples: usize) -> Vec<LobeSample> {
+pub(super) fn ask(gpu: &Gpu, math: Math, all: bool, cases: &[LobeCase], samples: usize) -> Vec<LobeSample> {
     let constants = Constants::new(128)
         .set("STRICT_MATH", math as u32)
         .set("HAS_LAYERS", 1)

@@ -1,6 +1,7 @@
 //! Materials: their lobes, media and textures.
 
 pub mod dispersion;
+pub mod furnace;
 pub mod hard_materials;
 pub mod iridescence;
 pub mod layers;

@@ -638,3 +638,17 @@ fn the_paper_is_regenerated_on_a_device() {
     place.succeed(&validated("paper --out paper --large 5001 --repeats 1 --longest 9s"));
     check_paper(&place, &["still holds", "105640"]);
 }
+
+/// Before anything is computed, as while a scene is read or settings are looked for, Ctrl-C ends the program at once, and it says so.
+#[cfg(unix)]
+#[test]
+fn ctrl_c_before_the_first_result_is_answered() {
+    let place = Place::new();
+    assert!(std::process::Command::new("mkfifo").arg(place.at("points")).status().unwrap().success());
+    let run = place.start("probe cornell --points points -o a.csv");
+    // Opens once the program waits for points.
+    let _points = std::fs::OpenOptions::new().write(true).open(place.at("points")).unwrap();
+    run.signal("INT");
+    let (code, said, _) = run.end();
+    assert_eq!((code, said), (Some(130), vec!["photonmill: interrupted before the first result; nothing was written".to_owned()]));
+}

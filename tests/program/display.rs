@@ -142,7 +142,7 @@ fn a_viewer_shows_the_picture_its_parts_and_its_error() {
     let expected: BTreeSet<&String> =
         of_file.keys().filter(|name| !["albedo", "normal", "depth"].iter().any(|layer| name.starts_with(layer))).collect();
     assert_eq!(shown.channels.keys().collect::<BTreeSet<_>>(), expected);
-    assert_eq!(expected.len(), 18);
+    assert_eq!(expected.len(), 21);
     for (name, values) in &shown.channels {
         let bits = |values: &[f32]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
         assert!(bits(values) == bits(&of_file[name]), "{name}");

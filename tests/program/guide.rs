@@ -112,11 +112,16 @@ fn short(arguments: &[&str]) -> Vec<String> {
         (Some(&"probe" | &"map"), _) => &[],
         _ => &[("--mesh", "8")],
     };
-    // What is kept has two blocks of rounds, one for each of two shards, and it takes two to know an error.
+    // What is kept has two blocks of rounds, one for each of two shards, and it takes eight to know an error.
     let has_blocks = has(&["map", "--map", "--checkpoint", "--resume", "--shard", "--error-image", "--judge"]);
     // Photons of a file are as many as they are.
     let photons = [("--photons", "500")].into_iter().filter(|_| !has(&["--map"]));
-    let of_run: Vec<_> = photons.chain([("--rounds", if has_blocks { "8" } else { "2" })]).collect();
+    let rounds = match (has(&["--error-image"]) && !has(&["--map"]), has_blocks) {
+        (true, _) => "32",
+        (false, true) => "8",
+        (false, false) => "2",
+    };
+    let of_run: Vec<_> = photons.chain([("--rounds", rounds)]).collect();
     // There is one device at least.
     let only_if_there = [("--error", "60%"), ("--samples", "2"), ("--counters", "2"), ("--devices", "0,0")];
     let there: Vec<_> = only_if_there.into_iter().filter(|(option, _)| has(&[option])).collect();

@@ -158,13 +158,17 @@ fn bad_points_are_refused_with_their_line() {
     assert_refused(&place, [("probe cornell -o a.csv", ["--points"])]);
 }
 
+/// Of a probe's table.
+const PROBE_COLUMNS: &str = "red,green,blue,red_error,green_error,blue_error,degrees_of_freedom,confidence,\
+    red_low,green_low,blue_low,red_high,green_high,blue_high,unseen";
+
 /// A row a point in their order, from a file with comments and from standard input, the same to the bit.
 #[test]
 fn a_probe_writes_a_row_a_point() {
     let Some(place) = place_with_device() else { return };
     let points = "# floor, and above it\n0.5 0 0.5 0 1 0\n\n  0.2,0,0.2,0,7,0\n0.5\t0\t0.5\t0\t1\t0\n0.5 0 0.5 0 -1 0";
     place.write("points.txt", points);
-    let run = "probe cornell --photons 2000 --rounds 4";
+    let run = "probe cornell --photons 500 --rounds 8 --block 1";
     place.succeed(&format!("{run} --points points.txt -o a.csv"));
     // The same table from standard input to standard output, and the report elsewhere.
     let mut child = place.command(&on_device(&format!("{run} --points - -o -")));
@@ -174,16 +178,28 @@ fn a_probe_writes_a_row_a_point() {
     let table = |name: &str| place.text(name);
     assert!(output.status.success() && text(&output.stdout) == table("a.csv") && !place.at("-").exists(), "{}", text(&output.stdout));
     let lines: Vec<String> = table("a.csv").lines().map(str::to_owned).collect();
-    assert_eq!((lines.len(), lines[0].as_str()), (5, "red,green,blue,red_error,green_error,blue_error"));
+    assert_eq!((lines.len(), lines[0].as_str()), (5, PROBE_COLUMNS));
     let rows: Vec<Vec<f64>> = lines[1..].iter().map(|line| line.split(',').map(|field| field.parse().unwrap()).collect()).collect();
     // Two random streams at one place, both near 5 W/m2; nothing from below the floor.
-    assert!(rows[..3].iter().all(|row| row.len() == 6 && row.iter().all(|value| *value > 0.0)), "{rows:?}");
+    assert!(rows[..3].iter().all(|row| row.len() == 15 && row[..8].iter().all(|value| *value > 0.0)), "{rows:?}");
+    // Eight blocks: seven degrees of freedom, of which Student's quantile is 2.365.
+    for row in &rows[..3] {
+        assert_eq!(row[6..8], [7.0, 0.95], "{row:?}");
+        for channel in 0..3 {
+            let (mean, half) = (row[channel], 2.36462 * row[3 + channel]);
+            assert!((row[8 + channel] - (mean - half).max(0.0)).abs() + (row[11 + channel] - mean - half).abs() < 1e-4 * half, "{row:?}");
+        }
+    }
     assert!((rows[0][0] / rows[2][0] - 1.0).abs() < 1.0, "{rows:?}");
     assert_eq!(rows[3][..3], [0.0; 3], "{rows:?}");
 
-    // Of one round no error is known.
-    place.succeed("probe cornell --points points.txt --rounds 1 --photons 500 -o c.csv");
-    assert!(table("c.csv").lines().nth(1).unwrap().ends_with(",inf,inf,inf"), "{}", table("c.csv"));
+    // Of one round no error is known, nor of seven blocks.
+    for (rounds, freedom) in [(1, 0), (7, 6)] {
+        let (report, _) = place.succeed(&format!("probe cornell --points points.txt --rounds {rounds} --block 1 --photons 500 -o c.csv"));
+        let row: Vec<String> = table("c.csv").lines().nth(1).unwrap().split(',').map(str::to_owned).collect();
+        assert_eq!(row[3..14].join(","), format!("inf,inf,inf,{freedom},0.95,0,0,0,inf,inf,inf"), "{}", table("c.csv"));
+        assert!(report.contains("noise: unknown"), "{report}");
+    }
 }
 
 #[test]

@@ -451,7 +451,21 @@ class Film(Run):
 
     @property
     def standard_error(self) -> NDArray[np.float32]:
-        """Of the radiance, shape (height, width, 3), W/m2/sr; inf where unknown."""
+        """Of the radiance, shape (height, width, 3), W/m2/sr; inf where unknown: of fewer than eight blocks of rounds, and where no
+        light has reached a pixel though some may."""
+
+    @property
+    def unseen(self) -> NDArray[np.float32]:
+        """The most that light which was not met may add to any channel, shape (height, width), W/m2/sr. Often there is no such
+        light; the standard error does not include it."""
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Of each standard error: the blocks of rounds less one."""
+
+    def interval(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Lower and upper ends, shape (height, width, 3), between which the radiance lies with the run's confidence (95 % by
+        default), by Student's distribution; what is `unseen` is not in it."""
 
     @property
     def parts(self) -> dict[str, NDArray[np.float32]]:
@@ -483,7 +497,7 @@ class Film(Run):
         path: ends in .exr, which holds linear radiance and layers, or in .png, which is for the eye.
         exposure: of a PNG, stops; what makes the mean middle grey.
         tone: curve of a PNG.
-        layers: of an EXR, some of direct, specular, caustic, indirect, standard_error, albedo, normal and depth; all.
+        layers: of an EXR, some of direct, specular, caustic, indirect, standard_error, unseen, albedo, normal and depth; all.
         """
 
     def png(self, *, exposure: float | None = None, tone: Literal["neutral", "linear"] = "neutral") -> bytes:
@@ -499,7 +513,21 @@ class Irradiance(Run):
 
     @property
     def standard_error(self) -> NDArray[np.float32]:
-        """Shape (n, 3), W/m2; inf where unknown."""
+        """Shape (n, 3), W/m2; inf where unknown: of fewer than eight blocks of rounds, and where no light has reached a point
+        though some may."""
+
+    @property
+    def unseen(self) -> NDArray[np.float32]:
+        """The most that light which was not met may add to any channel, shape (n,), W/m2. Often there is no such light; the
+        standard error does not include it."""
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Of each standard error: the blocks of rounds less one."""
+
+    def interval(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Lower and upper ends, shape (n, 3), between which the irradiance lies with the run's confidence (95 % by default), by
+        Student's distribution; what is `unseen` is not in it."""
 
     def __len__(self) -> int:
         """Points."""
@@ -519,7 +547,16 @@ class Lightmap:
 
     @property
     def standard_error(self) -> NDArray[np.float32]:
-        """Shape (height, width, 3), W/m2; inf where unknown."""
+        """Shape (height, width, 3), W/m2; inf where unknown: of fewer than eight blocks of rounds, and where no light has reached
+        a texel though some may."""
+
+    @property
+    def unseen(self) -> NDArray[np.float32]:
+        """The most that light which was not met may add to any channel, shape (height, width), W/m2."""
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Of each standard error: the blocks of rounds less one."""
 
 @final
 class Lightmaps(Run):

@@ -17,4 +17,6 @@
 #include "film/kept_places.glsl"
 #include "film/kept_parts.glsl"
 #include "world/scene/points.glsl"
+#include "world/scene/filter.glsl"
+#include "world/scene/sky_window.glsl"
 #include "world/scene/camera_path.glsl"

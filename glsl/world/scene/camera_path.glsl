@@ -152,6 +152,8 @@ const uint ROULETTE_BLOCK = RECEIVER_BLOCK + 1;
 const uint CHANNEL_BLOCK = ROULETTE_BLOCK + MAX_BOUNCES;
 // A place on the camera's lens.
 const uint LENS_BLOCK = CHANNEL_BLOCK + 1;
+// A direction of the sky that a pixel looks at, two blocks.
+const uint WINDOW_BLOCK = LENS_BLOCK + 1;
 
 // What shines where the path leaves the scene.
 void see_sky(uint emitter_count)
@@ -161,7 +163,13 @@ void see_sky(uint emitter_count)
         if (HAS_LAYERS) {
             light_density = sky_light_density(emitter_count, chain.from, chain.from_normal, chain.direction);
         }
-        add_emission(environment_radiance(emitter_count, chain.direction), light_density);
+        vec3 radiance = environment_radiance(emitter_count, chain.direction);
+        if (HAS_SKY_PICTURE) {
+            if (window.is_there && is_straight()) {
+                radiance *= share_of_rays(emitters[emitter_count - 1], chain.direction);
+            }
+        }
+        add_emission(radiance, light_density);
     }
 }
 

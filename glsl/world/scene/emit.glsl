@@ -29,7 +29,7 @@ LightPath leave_light(uint photon, Draws draws, PhotonEmission emission)
     uint media = 0;
     if (HAS_MEDIA) {
         if (!emitted.is_far) {
-            media = media_at(emitted.position);
+            media = media_at(emitted.position, emitted.direction);
         }
     }
     return LightPath(emitted.position, photon, emitted.direction, ARRIVED_DIRECT, emitted.flux, media);

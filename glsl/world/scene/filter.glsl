@@ -18,3 +18,18 @@ vec2 filter_offsets(vec2 u)
     }
     return vec2(filter_offset(u.x), filter_offset(u.y));
 }
+
+// Density of these offsets, per square pixel.
+float filter_density(vec2 offset)
+{
+    if (FILTER == FILTER_GAUSSIAN) {
+        float squared = dot(offset, offset);
+        return squared < 4.0 ? 0.63661977236758134 * exp2(-2.8853900817779268 * squared) * (1.0 / (1.0 - 3.3546263e-4)) : 0.0;
+    }
+    vec2 off = abs(offset);
+    if (FILTER == FILTER_TENT) {
+        vec2 sides = max(1.0 - off, vec2(0.0));
+        return sides.x * sides.y;
+    }
+    return max(off.x, off.y) <= 0.5 ? 1.0 : 0.0;
+}

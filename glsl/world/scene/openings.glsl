@@ -7,6 +7,9 @@ layout(set = 0, binding = 13, scalar) readonly buffer Openings { CausticTarget o
 
 // Of photons, and of shadow rays that no table chooses. Twin of src/scene/openings.rs.
 const float OPENING_SHARE = 0.75;
+// Of the light samples that the table of a sky chooses without openings, those that it always has: an opening that a trial has missed
+// beside a larger one may show the sun.
+const float LEAST_BY_TABLE = 0.25;
 
 // Versine of half the angle that an opening takes up as seen from a place; 0 if the place lies in it.
 float opening_versine(uint opening, vec3 position)
@@ -60,10 +63,10 @@ float overlap_of_cones(float a, float b, float between)
     return a + b >= 2.0 || sines < 1e-12 ? 1.0 : clamp(divide(1.0 - (1.0 - a) * (1.0 - b) + sines - between, 2.0 * sines), 0.0, 1.0);
 }
 
-// Share of light samples that the table of a sky chooses: none where no opening shows the brightest part of the picture.
+// Share of light samples that the table of a sky chooses: few where no opening that is known shows the brightest part of the picture.
 float table_share(Emitter sky, vec3 position)
 {
-    float share = 0.0;
+    float share = LEAST_BY_TABLE * sky.outer_versine;
     if (HAS_SKY_PICTURE) {
         for (uint k = 0; k < MAX_OPENINGS && openings[k].radius > 0.0; k++) {
             float own = opening_versine(k, position);

@@ -49,14 +49,25 @@ float share_at(uint first, uint number)
     return share_word(first + number) - (number == 0 ? 0.0 : share_word(first + number - 1));
 }
 
+// Where the shares of a row's cells begin.
+uint first_cell_of(TextureInfo table, uint row)
+{
+    return table.first_texel + 2 * table.height + 1 + row * table.width;
+}
+
+// Column and row of a place in the picture.
+uvec2 cell_at_place(TextureInfo table, vec2 place)
+{
+    return min(uvec2(max(place * vec2(table.width, table.height), vec2(0.0))), uvec2(table.width, table.height) - 1);
+}
+
 // Density with which the table chooses a direction, 1/sr.
 float sky_table_density(Emitter sky, vec3 wi)
 {
     TextureInfo table = textures[sky.triangle + 1];
-    vec2 place = place_in_sky(sky, wi) * vec2(table.width, table.height);
-    uint column = min(uint(max(place.x, 0.0)), table.width - 1), row = min(uint(max(place.y, 0.0)), table.height - 1);
-    float share = share_at(table.first_texel, row) * share_at(table.first_texel + 2 * table.height + 1 + row * table.width, column);
-    return divide(share, solid_angle_of_cells(table, row));
+    uvec2 cell = cell_at_place(table, place_in_sky(sky, wi));
+    float share = share_at(table.first_texel, cell.y) * share_at(first_cell_of(table, cell.y), cell.x);
+    return divide(share, solid_angle_of_cells(table, cell.y));
 }
 
 // The first of `count` cumulative shares above u, which becomes uniform within that share.
@@ -76,21 +87,27 @@ uint pick_share(uint first, uint count, inout float u)
     return low;
 }
 
-// Its density is that of the cell that was chosen: next to one far brighter, rounding may place a direction in the other.
-SkySample sample_sky_table(Emitter sky, vec2 u)
+// A direction in a cell of the table, even over its solid angle.
+vec3 direction_in_cell(Emitter sky, TextureInfo table, uint column, uint row, vec2 u)
 {
-    TextureInfo table = textures[sky.triangle + 1];
-    uint row = pick_share(table.first_texel, table.height, u.y);
-    uint cells = table.first_texel + 2 * table.height + 1 + row * table.width;
-    uint column = pick_share(cells, table.width, u.x);
-    float share = share_at(table.first_texel, row) * share_at(cells, column);
     uint edges = table.first_texel + table.height;
     float first = share_word(edges + row);
     float versine = first + u.y * (share_word(edges + row + 1) - first);
     float height = row < table.height / 2 ? 1.0 - versine : versine - 1.0;
     float turns = divide(float(column) + u.x, float(table.width));
     vec3 local = direction_at(height, versine * (2.0 - versine), turns < 0.5 ? turns + 0.5 : turns - 0.5).xzy;
-    return SkySample(turned(local, sky.position, sky.size), divide(share, solid_angle_of_cells(table, row)));
+    return turned(local, sky.position, sky.size);
+}
+
+// Its density is that of the cell that was chosen: next to one far brighter, rounding may place a direction in the other.
+SkySample sample_sky_table(Emitter sky, vec2 u)
+{
+    TextureInfo table = textures[sky.triangle + 1];
+    uint row = pick_share(table.first_texel, table.height, u.y);
+    uint cells = first_cell_of(table, row);
+    uint column = pick_share(cells, table.width, u.x);
+    float share = share_at(table.first_texel, row) * share_at(cells, column);
+    return SkySample(direction_in_cell(sky, table, column, row, u), divide(share, solid_angle_of_cells(table, row)));
 }
 
 float cosine_density(vec3 ns, vec3 wi)

@@ -27,7 +27,7 @@ Step step_path(inout LightPath path, uint bounce)
             is_layered = surface.kind == SURFACE_LAYERED;
         }
         Lobes lobes;
-        bool has_matt = !is_specular(surface);
+        bool has_matt = keeps_photons(triangles[hit.triangle].material);
         vec3 entering = arriving;
         if (is_layered) {
             uint channel = 1;
@@ -42,7 +42,7 @@ Step step_path(inout LightPath path, uint bounce)
             float eta = index_ratio(surface, path.media, channel);
             surface.ns = normal_of_refraction(surface, wo, eta, bounce);
             lobes = lobes_of(surface, wo, eta);
-            has_matt = surface.scatters && layered_materials[triangles[hit.triangle].material].is_matt != 0;
+            has_matt = has_matt && surface.scatters;
         }
         // Also where alpha has a gap: the light there is that of the surface about it, whose area the density estimate counts.
         taken.stored = has_matt && (path.arrival & push.map.stored) != 0;

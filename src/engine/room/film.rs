@@ -12,7 +12,7 @@ use crate::plan::RoomPlan;
 use crate::plan::latest_blocks::{kept_count, kept_place};
 use crate::scene::room::RoomScene;
 use crate::settings::Sums;
-use crate::settings::stop::{Measure, Stop};
+use crate::settings::stop::{LEAST_BLOCKS, Measure, Stop};
 
 /// Sums of a run, point by point, and what they are worth.
 #[derive(Debug, Clone, PartialEq)]
@@ -149,9 +149,10 @@ impl RoomFilm {
         unknown.with_relative(f64::sqrt(bounds))
     }
 
-    /// [`RoomFilm::flux_error`], but infinite where nothing was found on a wall that reflects.
+    /// [`RoomFilm::flux_error`], but infinite where few rounds tell it, and where nothing was found on a wall that reflects.
     fn stated_error(&self, point: usize, albedo: f32) -> f64 {
-        if albedo > 0.0 && self.is_unreached(point) { f64::INFINITY } else { self.flux_error(point) }
+        let is_unknown = self.blocks < LEAST_BLOCKS || albedo > 0.0 && self.is_unreached(point);
+        if is_unknown { f64::INFINITY } else { self.flux_error(point) }
     }
 
     /// Whether no photon was found at a point.
@@ -197,7 +198,7 @@ pub struct WallEstimate {
     pub radiosity: Vec<f64>,
     /// Arriving flux an area, W/m2: radiosity over albedo.
     pub irradiance: Vec<f64>,
-    /// Their standard errors, W/m2; infinite where fewer than two rounds are whole, and where no photon was found.
+    /// Their standard errors, W/m2; infinite where fewer than eight rounds are whole, and where no photon was found.
     pub radiosity_error: Vec<f64>,
     pub irradiance_error: Vec<f64>,
 }

@@ -5,19 +5,21 @@ use std::ops::Deref;
 use glam::DVec3;
 
 use crate::constants::{
-    HIT_BRIGHT_PHOTON, HIT_CAUSTIC_PHOTON, HIT_GLOBAL_PHOTON, HIT_KINDS, HIT_SHADOW_RAY, HIT_UNSEEN_LIGHT, PART_COUNT, RADIUS_CLASSES,
+    HIT_BRIGHT_PHOTON, HIT_CAUSTIC_PHOTON, HIT_GLOBAL_PHOTON, HIT_KINDS, HIT_OFF_SURFACE, HIT_SHADOW_RAY, HIT_UNSEEN_LIGHT, PART_COUNT,
+    RADIUS_CLASSES,
 };
 use crate::engine::bias::Bias;
 use crate::engine::differences::Differences;
-use crate::engine::error_bound::{ErrorPlaces, FilmError};
+use crate::engine::error_bound::{ErrorPlaces, ErrorSource, FilmError};
 use crate::engine::film::{BlockSums, LatestBlocks, TooLarge, add_all};
 use crate::engine::measure_of_error::ErrorMeasure;
-use crate::engine::unknown::{Uncounted, Unknown, most_hits};
+use crate::engine::unknown::{OffSurfaces, Uncounted, Unknown, most_hits};
 use crate::plan::buffers::{ANOMALY_WORDS, PART_VALUES};
-use crate::plan::film::{BiasPlan, FilmPlan};
+use crate::plan::film::{BiasPlan, FilmPlan, LostOffSurfaces};
 use crate::plan::latest_blocks::kept_place;
 use crate::plan::radius::mean_squared_radius;
 use crate::plan::scene::MapPlan;
+use crate::settings::stop::LEAST_BLOCKS;
 
 /// Names of the kinds of `HIT_...`, but for those of light that no error counts.
 const KINDS: [&str; 3] = ["shadow ray", "photon of the caustic map", GLOBAL_PHOTON];
@@ -228,23 +230,74 @@ impl SceneFilm {
         self.sums[3 * pixel..][..3] == [0; 3] && kinds.iter().any(|kind| *kind != 0) && !kinds.contains(&REACHED)
     }
 
-    /// The errors to be shown, by pixel: infinite where nothing has reached the pixel, and where a value may have been clamped. The
-    /// spread over rounds says nothing of a kind of light that has arrived elsewhere, but not here: its upper bound is part of the
-    /// error. Nor does it say much of few hits: the next one may have in any channel what those had in the brightest, so that much
-    /// is part of the error too. The report names the kinds that have reached no pixel at all.
+    /// The errors to be shown, by pixel: infinite where too few blocks tell it, where nothing has reached the pixel, and where a
+    /// value may have been clamped. Few hits say little of the others: the next one may have in any channel what those had in the
+    /// brightest, so that much is part of the error. What no ray or photon has met is not: see [`SceneFilm::unseen_bounds`].
     pub fn stated_errors(&self) -> impl Fn(usize) -> DVec3 {
-        let mut scales = self.bound_scales(self.plan.confidence);
-        let is_nowhere = |kind: &usize| self.stored[*kind] == 0;
-        self.absent().into_iter().filter(is_nowhere).for_each(|kind| scales[kind] = 0.0);
+        let is_known = self.blocks >= LEAST_BLOCKS;
         move |pixel| {
-            if self.is_unreached(pixel) || self.may_be_clamped(pixel) {
+            if !is_known || self.is_unreached(pixel) || self.may_be_clamped(pixel) || self.lacks_photons(pixel) {
                 return DVec3::INFINITY;
             }
-            let unknown: f64 = (0..KINDS.len()).map(|kind| self.most_light(pixel, kind, &scales).powi(2)).sum();
             let (mean, error) = (self.mean(pixel), self.standard_error(pixel));
             // Of n hits the relative variance of the mean is about 1 / n.
             let one_hit = (error * error / mean).to_array().into_iter().filter(|hit| hit.is_finite()).fold(0.0, f64::max);
-            error.map(|error| (error * error + one_hit * one_hit + unknown).sqrt())
+            error.map(|error| error.hypot(one_hit))
+        }
+    }
+
+    /// Ends of the interval that holds a pixel's light as a run of infinitely many rounds would find it, with the film's confidence,
+    /// of what rays and photons have met.
+    pub fn intervals(&self) -> impl Fn(usize) -> [DVec3; 2] {
+        let (errors, source) = (self.stated_errors(), self.error_source());
+        move |pixel| {
+            let [mean, error] = [self.mean(pixel), errors(pixel)].map(|value| value.to_array());
+            let ends = [0, 1, 2].map(|channel| source.interval(mean[channel], error[channel]));
+            [0, 1].map(|end| DVec3::from_array(ends.map(|ends| ends[end])))
+        }
+    }
+
+    /// From what its standard errors are.
+    pub fn error_source(&self) -> ErrorSource {
+        ErrorSource { degrees_of_freedom: self.error_freedom(), confidence: self.plan.confidence }
+    }
+
+    /// Upper bounds of the light, in any channel, of which no hit is all that is known, by pixel, with the film's confidence: of kinds
+    /// of light that asked and did not arrive, of lamps towards which every ray was stopped, and of bright photons where only dim ones
+    /// came. Often there is no such light.
+    pub fn unseen_bounds(&self) -> impl Fn(usize) -> f64 {
+        let scales = self.bound_scales(self.plan.confidence);
+        let per_ray = scales[HIT_SHADOW_RAY as usize];
+        let of_kind = [(HIT_UNSEEN_LIGHT, per_ray), (HIT_BRIGHT_PHOTON, scales[HIT_GLOBAL_PHOTON as usize])];
+        // Hits of all kinds together are as few as those of one: if all that were expected missed, the brightest kind adds most.
+        move |pixel| {
+            let others = of_kind.map(|(kind, scale)| match self.one_hits[HIT_KINDS as usize * pixel + kind as usize] {
+                REACHED => 0.0,
+                bits => scale * f64::from(f32::from_bits(bits)),
+            });
+            (0..KINDS.len()).map(|kind| self.most_light(pixel, kind, &scales)).chain(others).fold(0.0, f64::max)
+        }
+    }
+
+    /// Whether it is a point on no surface, in a scene some of whose light only photons bring.
+    fn lacks_photons(&self, pixel: usize) -> bool {
+        self.plan.lost_off_surfaces != LostOffSurfaces::Nothing
+            && self.one_hits[HIT_KINDS as usize * pixel + HIT_OFF_SURFACE as usize] == REACHED
+    }
+
+    /// All of these.
+    fn off_surfaces(&self) -> OffSurfaces {
+        let numbers = || (0..self.pixels()).filter(|pixel| self.lacks_photons(*pixel)).map(|pixel| pixel as u64 + 1);
+        let lost = match self.plan.lost_off_surfaces {
+            LostOffSurfaces::Nothing => "",
+            LostOffSurfaces::Caustics => "light that point, spot, directional and disc lights send over mirrors and glass",
+            LostOffSurfaces::Lamps => "all light of lamps but the direct light of emissive meshes (--illumination photons)",
+        };
+        OffSurfaces {
+            points: numbers().count() as u64,
+            of: self.pixels() as u64,
+            first: numbers().take(OffSurfaces::NAMED).collect(),
+            lost,
         }
     }
 
@@ -316,6 +369,25 @@ impl SceneFilm {
         }
     }
 
+    /// Pixels that some light has reached, and a kind of light that arrived at others has not.
+    fn unseen_kinds(&self, scales: &[f64; KINDS.len()], absent: &[usize]) -> Uncounted {
+        let mut unseen = Uncounted::default();
+        let (mut of_photons, mut of_rays) = (0.0, 0.0f64);
+        for pixel in (0..self.pixels()).filter(|pixel| !self.is_unreached(*pixel)) {
+            let bounds = [HIT_SHADOW_RAY, HIT_CAUSTIC_PHOTON, HIT_GLOBAL_PHOTON].map(|kind| match absent.contains(&(kind as usize)) {
+                true => 0.0,
+                false => self.most_light(pixel, kind as usize, scales),
+            });
+            let most = bounds.into_iter().fold(0.0, f64::max);
+            unseen.points += u64::from(most > 0.0);
+            unseen.upper_bound = unseen.upper_bound.max(most);
+            of_photons += bounds[1].max(bounds[2]);
+            of_rays = of_rays.max(bounds[0]);
+        }
+        // Photons are shared, and shadow rays are each pixel's own, as in what is unknown.
+        Uncounted { of_mean: over(of_photons + of_rays, self.total()), ..unseen }
+    }
+
     /// Light of surfaces in all pixels, each in its brightest channel.
     fn total(&self) -> f64 {
         self.surface_means().map(DVec3::max_element).sum()
@@ -328,8 +400,9 @@ impl SceneFilm {
         let pixels = || 0..self.pixels();
         let absent = self.absent();
         let names = absent.iter().map(|kind| KINDS[*kind]).collect();
-        let (hidden, dim) = (self.hidden(confidence), self.dim(&scales));
-        let mut unknown = Unknown { absent: names, hidden, dim, ..Unknown::default() };
+        let (hidden, dim, unseen) = (self.hidden(confidence), self.dim(&scales), self.unseen_kinds(&scales, &absent));
+        let off_surfaces = self.off_surfaces();
+        let mut unknown = Unknown { absent: names, hidden, dim, unseen, off_surfaces, ..Unknown::default() };
         let measure = self.measure();
         let square = |most: f64, pixel: usize| {
             let values = self.surface_mean(pixel).to_array();
@@ -357,7 +430,8 @@ impl SceneFilm {
         // Each pixel has shadow rays of its own, and those of all have missed: the worst is that one pixel alone might have
         // been hit. Photons are shared, so that all pixels may be in the dark for the same reason.
         bounds += shadow_rays;
-        unknown.with_relative(bounds.sqrt())
+        let relative = if unknown.off_surfaces.is_all() { f64::INFINITY } else { bounds.sqrt() };
+        unknown.with_relative(relative)
     }
 
     /// The most that hits of the brightest lamp in mirrors and glass may add to one pixel, where no round had any, relative to the

@@ -59,10 +59,10 @@ use resources::SceneResources;
 pub type RunResult = run::RunResult<ScenePlan, SceneFilm>;
 
 impl RunResult {
-    /// What its film tells of its error, with the bias that extra runs found.
+    /// What its film tells of its error, unknown of few blocks, with the bias that extra runs found.
     pub fn error(&self) -> FilmError {
         let error = self.film.error(self.film.plan.confidence);
-        FilmError { bias: self.bias.or(error.bias), ..error }
+        FilmError { bias: self.bias.or(error.bias), ..error }.stated()
     }
 }
 

@@ -153,7 +153,7 @@ impl Geometry {
     fn add_sky(&mut self, scene: &Scene, sky: &Sky) -> Result<Found> {
         let table = sky.table();
         let first_texel = self.texels.len() as u32;
-        let words = sky.texture.texels.count() + table.words.len();
+        let words = sky.texture.texels.word_count() + table.words.len();
         if self.texels.len() + words > MAX_TEXELS {
             let reason = format!(
                 "has {words} texels and places for its samples, beside {first_texel} of textures; at most {MAX_TEXELS} can be kept"

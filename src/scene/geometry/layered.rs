@@ -2,11 +2,13 @@
 
 use glam::{DMat2, DVec2, DVec3, DVec4, Vec2, Vec3};
 
+use super::turns::{self, Turns};
 use super::{at_corners, pack_normal};
 use crate::constants::*;
 use crate::records::{LayeredMaterial, TextureInfo, TriangleLayers};
 use crate::scene::material::{Coverage, LobeKinds, Medium, NormalMap, TextureUse};
-use crate::scene::{Material, Mesh, Scene};
+use crate::scene::texture::Wrap;
+use crate::scene::{Material, Mesh, Scene, Texture};
 
 /// Most media: a path keeps their numbers in eight bits each.
 const MAX_MEDIA: usize = 255;
@@ -109,7 +111,7 @@ pub(super) fn add_lookups(scene: &Scene, records: &mut [LayeredMaterial], textur
         record.first_lookup = textures.len() as u32;
         for (layer, used) in lookups {
             if let Some(used) = used {
-                let lookup = lookup(textures[used.texture], layer, used);
+                let lookup = lookup(textures[used.texture], layer, used, scene.textures[used.texture].wrap);
                 textures.push(lookup);
             }
         }
@@ -117,7 +119,7 @@ pub(super) fn add_lookups(scene: &Scene, records: &mut [LayeredMaterial], textur
     }
 }
 
-fn lookup(texture: TextureInfo, layer: u32, used: TextureUse) -> TextureInfo {
+fn lookup(texture: TextureInfo, layer: u32, used: TextureUse, wrap: [Wrap; 2]) -> TextureInfo {
     let offset = used.transform.apply(DVec2::ZERO);
     let turn = DMat2::from_cols(used.transform.apply(DVec2::X) - offset, used.transform.apply(DVec2::Y) - offset).transpose();
     TextureInfo {
@@ -125,7 +127,7 @@ fn lookup(texture: TextureInfo, layer: u32, used: TextureUse) -> TextureInfo {
         uv_set: used.uv_set as u32,
         row_u: turn.x_axis.as_vec2(),
         row_v: turn.y_axis.as_vec2(),
-        offset: offset.as_vec2(),
+        offset: turns::near_offset(offset, wrap).as_vec2(),
         ..texture
     }
 }
@@ -135,9 +137,21 @@ pub(super) fn is_needed(scene: &Scene) -> bool {
     scene.materials.iter().any(|material| material.has_layer_textures() || material.layers.anisotropy > 0.0)
 }
 
-pub(super) fn of_triangle(mesh: &Mesh, triangle: usize, part: Option<&[DVec3; 3]>) -> TriangleLayers {
+/// How the textures of a material's layers, those of each set of coordinates, look up what lies far from 0; `None` where they do so in
+/// several ways.
+pub(super) fn turns(material: &Material, textures: &[Texture]) -> [Option<Turns>; 2] {
+    let layers = Material { base_colour_texture: None, emission_texture: None, ..material.clone() };
+    [0, 1].map(|set| {
+        let mut all = layers.textures().filter(|used| used.uv_set == set).map(|used| (used.transform, textures[used.texture].wrap));
+        let first = all.next()?;
+        all.all(|other| other == first).then(|| Turns::new(first.0, first.1)).flatten()
+    })
+}
+
+pub(super) fn of_triangle(mesh: &Mesh, triangle: usize, part: Option<&[DVec3; 3]>, turns: &[Option<Turns>; 2]) -> TriangleLayers {
     let corners = |set: usize| {
         let uvs = mesh.triangles[triangle].map(|vertex| mesh.uvs[set].get(vertex as usize).copied().unwrap_or_default());
+        let uvs = turns[set].as_ref().map_or(uvs, |turns| turns.near(uvs));
         at_corners(uvs, part).map(DVec2::as_vec2)
     };
     let tangents = |tangents: &[[DVec4; 3]]| {

@@ -8,6 +8,7 @@
 mod emitters;
 mod lamp_pieces;
 mod layered;
+mod turns;
 
 use std::cell::LazyCell;
 use std::collections::BTreeSet;
@@ -17,18 +18,18 @@ use glam::{DVec2, DVec3, Vec2, Vec2Swizzles as _, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::bvh::Bvh;
+use super::hair::Moves;
 use super::material::TextureUse;
-use super::overlap;
 use super::planes::{Planes, for_equals, hash_of};
 use super::texture::{Filter, LINEAR_OF_SRGB, Texels, Wrap};
-use super::{Material, Mesh, Progress, Scene, Surface, Texture};
+use super::{Light, LightKind, Material, Mesh, Progress, Scene, Surface, Texture, contact, overlap, solids};
 use crate::constants::*;
 use crate::error::{Error, Result};
 use crate::records::{
     BvhNode, Emitter, LayeredMaterial, SurfaceMaterial, TextureInfo, Triangle, TriangleColours, TriangleLayers, TriangleNormals,
     TriangleUvs,
 };
-use crate::text::counted;
+use crate::text::{counted, in_metres, some_of};
 
 #[derive(Debug, Clone)]
 pub struct Geometry {
@@ -73,6 +74,8 @@ pub struct Geometry {
     pub overlaps: Vec<(u32, u32)>,
     /// Triangles that more others overlap than are cut out of one.
     pub crowded: usize,
+    /// Bits that a path keeps the number of a medium in, in a word for all solids that it is in.
+    pub medium_bits: u32,
     /// Pieces of textured lamps that have spots much smaller and brighter than they are.
     pub coarse_pieces: usize,
 }
@@ -84,6 +87,9 @@ const MAX_TRIANGLES: usize = 1 << 28;
 pub const MAX_TEXELS: usize = TEXEL_BUFFERS * TEXELS_PER_BUFFER as usize;
 /// As many as `glsl/material/textures.glsl` looks into, so that none is larger than 128 MiB, the least that devices promise.
 pub const TEXEL_BUFFERS: usize = 4;
+/// Metres: a place that is rounded by more than that is said.
+pub const PLACE_ERROR: f64 = 1e-4;
+
 fn refuse(scene: &Scene, object: &str, reason: String) -> Error {
     Error::Scene { path: (&scene.name).into(), object: object.into(), reason }
 }
@@ -118,14 +124,16 @@ impl Geometry {
             sources.extend((0..of.triangles.len() as u32).map(|triangle| (mesh, triangle)));
         }
         progress("preparing triangles", 0.0);
+        let kinds = contact::kinds(scene);
+        let moves = Moves::of(scene, &kinds);
         let mut corners: Vec<[Vec3; 3]> =
-            sources.par_iter().map(|&(mesh, triangle)| scene.meshes[mesh as usize].corners(triangle as usize).map(local)).collect();
+            sources.par_iter().map(|&(mesh, triangle)| moves.corners(scene, mesh, triangle).map(local)).collect();
         // What f32 makes a line of cannot be hit, and its normal would be no number; on a device that takes numbers
         // without a leading 1 for nothing, neither would that of a square below the least normal one.
         let is_solid = |[a, b, c]: &[Vec3; 3]| (*b - *a).cross(*c - *a).length_squared() >= f32::MIN_POSITIVE;
         // Of triangles that are the same, facing alike, only one can be met; the others would shine, and count as surface,
         // where none is seen.
-        let ranks = LazyCell::new(|| overlap::ranks(scene));
+        let ranks = LazyCell::new(|| overlap::ranks(scene, &kinds));
         let mut overlaps = BTreeSet::new();
         let mut crowded = 0;
         let mut is_kept: Vec<bool> = corners.par_iter().map(is_solid).collect();
@@ -159,7 +167,7 @@ impl Geometry {
         // Parts of triangles, behind the whole ones: weights of the corners.
         let whole_count = corners.len();
         let mut weights: Vec<[DVec3; 3]> = Vec::new();
-        for covered in overlap::find(scene, || &ranks, &sources, &corners, |done| progress("looking for overlaps", done)) {
+        for covered in overlap::find(scene, &kinds, || &ranks, &sources, &corners, |done| progress("looking for overlaps", done)) {
             let (source, [a, b, c], plane) =
                 (sources[covered.triangle], corners[covered.triangle].map(Vec3::as_dvec3), planes.of_triangles[covered.triangle]);
             crowded += usize::from(covered.crowded);
@@ -191,7 +199,7 @@ impl Geometry {
         let normals = order.par_iter().zip(&sources).map(normals_of).collect();
         let uvs_of = |(&place, &(mesh, triangle)): (&u32, &(u32, u32))| {
             let mesh = &scene.meshes[mesh as usize];
-            corner_uvs(mesh, &scene.materials[mesh.material], triangle as usize, part_of(place))
+            corner_uvs(mesh, &scene.materials[mesh.material], &scene.textures, triangle as usize, part_of(place))
         };
         let uvs = order.par_iter().zip(&sources).map(uvs_of).collect();
         let colours_of = |(&place, &(mesh, triangle)): (&u32, &(u32, u32))| {
@@ -203,8 +211,11 @@ impl Geometry {
         };
         let mut layered_materials = layered::records(scene, unit)
             .map_err(|count| refuse(scene, "the scene", format!("has solids of {count} different media; at most 255 can be told apart")))?;
+        let layer_turns: Vec<_> = scene.materials.iter().map(|material| layered::turns(material, &scene.textures)).collect();
+        let medium_bits = medium_bits(scene, &layered_materials, &moves)?;
         let layers_of = |(&place, &(mesh, triangle)): (&u32, &(u32, u32))| {
-            layered::of_triangle(&scene.meshes[mesh as usize], triangle as usize, part_of(place))
+            let mesh = &scene.meshes[mesh as usize];
+            layered::of_triangle(mesh, triangle as usize, part_of(place), &layer_turns[mesh.material])
         };
         let triangle_layers = match layered::is_needed(scene) {
             false => vec![TriangleLayers::default()],
@@ -243,6 +254,7 @@ impl Geometry {
             left_out,
             overlaps: overlaps.into_iter().collect(),
             crowded,
+            medium_bits,
             coarse_pieces: 0,
         };
         progress("collecting lights", 0.0);
@@ -265,10 +277,37 @@ impl Geometry {
         ((position - self.centre) / self.unit).as_vec3()
     }
 
+    /// How far single precision moves a place, metres.
+    pub fn place_error(&self, position: DVec3) -> f64 {
+        (self.to_world(self.to_local(position)) - position).abs().max_element()
+    }
+
+    /// That some places, of points or of a camera, are moved so far that it shows.
+    pub fn place_warning(&self, what: &str, positions: impl IntoIterator<Item = DVec3>) -> Option<String> {
+        let most = positions.into_iter().map(|position| self.place_error(position)).fold(0.0, f64::max);
+        (most > PLACE_ERROR).then(|| {
+            format!("{what}: off by up to {} in single precision, so far from the middle of the scene; go nearer to it", in_metres(most))
+        })
+    }
+
+    /// Meshes whose vertices single precision moves so far that it shows, and how far at most; nothing of scenes that are not kilometres
+    /// wide.
+    fn rounded_meshes(&self, scene: &Scene) -> (Vec<u32>, f64) {
+        // Half the step of the largest numbers.
+        if self.unit * 0.5 * f64::from(f32::EPSILON) * 0.25 <= PLACE_ERROR {
+            return (Vec::new(), 0.0);
+        }
+        let of_mesh = |mesh: &Mesh| mesh.positions.iter().map(|position| self.place_error(*position)).fold(0.0, f64::max);
+        let errors: Vec<f64> = scene.meshes.par_iter().map(of_mesh).collect();
+        let rounded = (0..).zip(&errors).filter(|(_, error)| **error > PLACE_ERROR).map(|(mesh, _)| mesh).collect();
+        (rounded, errors.into_iter().fold(0.0, f64::max))
+    }
+
     /// A line for triangles that are left out, for each pair of meshes that overlap in one plane, and for what is too many to be treated as it should.
     pub fn warnings(&self, scene: &Scene) -> Vec<String> {
         const MOST: usize = 5;
-        let name = |mesh: u32| &scene.meshes[mesh as usize].name;
+        let names = LazyCell::new(|| scene.mesh_names());
+        let name = |mesh: u32| &names[mesh as usize];
         let line = |&(hidden, seen): &(u32, u32)| {
             if hidden == seen {
                 return format!("mesh {:?} overlaps itself in one plane; what overlaps counts once", name(hidden));
@@ -279,6 +318,26 @@ impl Geometry {
         if self.left_out > 0 {
             let count = counted(self.left_out, "triangle");
             lines.push(format!("{count} without area in single precision, or on others, left out"));
+        }
+        let (rounded, most) = self.rounded_meshes(scene);
+        if !rounded.is_empty() {
+            lines.push(format!(
+                "the scene is {:.0} m wide, and single precision moves places in it by up to {} (mesh {}); leave out \
+                 what stands far from the rest, or render parts on their own",
+                2.0 * self.radius * self.unit / 1.001,
+                in_metres(most),
+                some_of(rounded.iter().map(|mesh| name(*mesh)))
+            ));
+        }
+        let place_of = |light: &Light| match light.kind {
+            LightKind::Point { position, .. } | LightKind::Spot { position, .. } | LightKind::Disc { centre: position, .. } => {
+                Some(position)
+            }
+            LightKind::Directional { .. } | LightKind::Environment { .. } | LightKind::Sky(_) => None,
+        };
+        lines.extend(scene.lights.iter().filter_map(|light| self.place_warning(&light.name, place_of(light))));
+        if let Some(warning) = turns::warning(scene) {
+            lines.push(warning);
         }
         lines.extend(self.overlaps.iter().take(MOST).map(line));
         if self.crowded > 0 {
@@ -296,8 +355,32 @@ impl Geometry {
         if self.overlaps.len() > MOST {
             lines.push(format!("{} more pairs of meshes overlap in one plane; one of each counts there", self.overlaps.len() - MOST));
         }
+        // Names may be the same where they are not from a file.
+        let mut said = BTreeSet::new();
+        lines.retain(|line| said.insert(line.clone()));
         lines
     }
+}
+
+/// How many bits each medium gets: so many that all solids that lie in one another have room in a word.
+fn medium_bits(scene: &Scene, materials: &[LayeredMaterial], moves: &Moves) -> Result<u32> {
+    const USUAL: u32 = 8;
+    let few = 32 / USUAL;
+    let Some((depth, mesh)) = solids::most_nested(scene, few as usize, |mesh, triangle| moves.corners(scene, mesh, triangle)) else {
+        return Ok(USUAL);
+    };
+    let media = materials.iter().map(|material| material.medium).max().unwrap_or(0);
+    let bits = 32 - media.leading_zeros();
+    let most = 32 / bits.max(1);
+    if depth > most as usize {
+        let name = &scene.meshes[mesh as usize].name;
+        let reason = format!(
+            "is one of {depth} solids that lie in one another; of {media} different media in the scene, at most {most} may: give some of them \
+             equal indices of refraction and attenuation, or take some out"
+        );
+        return Err(refuse(scene, &format!("mesh '{name}'"), reason));
+    }
+    Ok(bits)
 }
 
 /// The bits of a triangle's corners, the same from whichever corner it is read.
@@ -348,16 +431,13 @@ fn corner_colours(mesh: &Mesh, triangle: usize, part: Option<&[DVec3; 3]>) -> Tr
     TriangleColours { a, b, c, alphas }
 }
 
-fn corner_uvs(mesh: &Mesh, material: &Material, triangle: usize, part: Option<&[DVec3; 3]>) -> TriangleUvs {
+fn corner_uvs(mesh: &Mesh, material: &Material, textures: &[Texture], triangle: usize, part: Option<&[DVec3; 3]>) -> TriangleUvs {
     let of = |used: Option<TextureUse>| -> [Vec2; 3] {
         match used {
-            Some(TextureUse { uv_set, transform, .. }) => {
+            Some(TextureUse { uv_set, transform, texture }) => {
                 let own = |vertex: u32| mesh.uvs[uv_set].get(vertex as usize).copied().unwrap_or_default();
-                // Whole turns mean nothing and would cost digits.
                 let uvs = mesh.triangles[triangle].map(|vertex| transform.apply(own(vertex)));
-                let is_far = uvs[0].abs().max_element() > 64.0;
-                let base: DVec2 = if is_far { uvs[0].floor() - uvs[0].floor() % 2.0 } else { DVec2::ZERO };
-                at_corners(uvs, part).map(|uv| (uv - if base.abs().max_element() > 64.0 { base } else { DVec2::ZERO }).as_vec2())
+                at_corners(turns::near(uvs, textures[texture].wrap), part).map(DVec2::as_vec2)
             }
             _ => [Vec2::ZERO; 3],
         }
@@ -418,7 +498,7 @@ fn texture_record(texture: &Texture) -> TextureInfo {
         wrap: code(texture.wrap[0]) | code(texture.wrap[1]) << 2 | u32::from(texture.filter == Filter::Nearest) << 4,
         encoding: match texture.texels {
             Texels::Srgb(_) => TEXELS_SRGB,
-            Texels::SharedExponent(_) => TEXELS_SHARED_EXPONENT,
+            Texels::Float(_) => TEXELS_FLOAT,
             Texels::Linear(_) => TEXELS_LINEAR,
         },
         ..TextureInfo::default()

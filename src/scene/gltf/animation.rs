@@ -7,6 +7,7 @@ use gltf::animation::{Interpolation, Property};
 use gltf::{Accessor, Document};
 
 use super::accessor::{self, Vertices};
+use super::transforms::{self, Transform};
 use super::{Loader, called, node_name};
 use crate::error::{Error, Result};
 
@@ -17,16 +18,18 @@ pub(super) struct Pose {
     rotation: Option<DQuat>,
     scale: Option<DVec3>,
     pub(super) weights: Option<Vec<f32>>,
+    /// By how much single precision has moved its places, along each axis.
+    pub(super) rounding: DVec3,
 }
 
 impl Pose {
     /// With what the node has at rest where the animation says nothing.
-    pub(super) fn matrix(&self, rest: gltf::scene::Transform) -> DMat4 {
-        let (translation, rotation, scale) = rest.decomposed();
+    pub(super) fn matrix(&self, rest: &Transform) -> DMat4 {
+        let (scale, rotation, translation) = rest.parts();
         DMat4::from_scale_rotation_translation(
-            self.scale.unwrap_or(DVec3::from(scale.map(f64::from))),
-            self.rotation.unwrap_or(DQuat::from_array(rotation.map(f64::from))),
-            self.translation.unwrap_or(DVec3::from(translation.map(f64::from))),
+            self.scale.unwrap_or(scale),
+            self.rotation.unwrap_or(rotation),
+            self.translation.unwrap_or(translation),
         )
     }
 }
@@ -96,7 +99,12 @@ impl Loader {
             let keys = |width: usize| self.keys(&channel.sampler(), width, &what);
             let pose = poses.entry(node.index()).or_default();
             match channel.target().property() {
-                Property::Translation => pose.translation = Some(DVec3::from_slice(&keys(3)?.at(time, false))),
+                Property::Translation => {
+                    let keys = keys(3)?;
+                    let places: Vec<DVec3> = (0..keys.times.len()).map(|key| DVec3::from_slice(keys.value(key))).collect();
+                    pose.rounding = transforms::most_rounding(&channel.sampler().output(), &places);
+                    pose.translation = Some(DVec3::from_slice(&keys.at(time, false)));
+                }
                 Property::Scale => pose.scale = Some(DVec3::from_slice(&keys(3)?.at(time, false))),
                 Property::Rotation => {
                     let keys = keys(4)?;

@@ -15,7 +15,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::malformed::REMEDY;
-use super::{draco, named, one_line, read_uri};
+use super::{draco, named, one_line, uri};
 use crate::error::{Error, Result};
 
 const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
@@ -133,7 +133,7 @@ impl<'a> Packed<'a> {
             let what = format!("buffer {number}");
             let bytes = match (json["buffers"][number]["uri"].as_str(), self.binary) {
                 _ if number >= count => return Err(self.refuse(&what, format!("is named by what is compressed; there are {count}"))),
-                (Some(uri), _) => Cow::Owned(read_uri(self.path, uri).map_err(|reason| self.refuse(&what, reason))?),
+                (Some(uri), _) => Cow::Owned(uri::read(self.path, uri).map_err(|reason| self.refuse(&what, reason))?),
                 (None, Some(binary)) if number == 0 => Cow::Borrowed(binary),
                 _ => return Err(self.refuse(&what, "is the file's binary part, and there is none")),
             };

@@ -10,6 +10,7 @@ use serde_json::Value;
 use crate::text::echo;
 
 pub(super) const REMEDY: &str = "correct it, or export the file again";
+const OLD: &str = "is of glTF 1.0, and glTF 2.0 is read; convert it, as `npx gltf-pipeline -i OLD.gltf -o NEW.gltf` does";
 /// Which list a member's number is a place in.
 const LISTS: [(&str, &str); 17] = [
     ("buffer", "buffers"),
@@ -42,8 +43,8 @@ pub(super) fn parts(content: &[u8]) -> Result<Parts<'_>, String> {
         return Err("is empty; export it again".to_owned());
     }
     if !content.starts_with(b"glTF") {
-        // JSON begins with a bracket, after a byte order mark perhaps.
-        let start = content.strip_prefix(b"\xef\xbb\xbf").unwrap_or(content).trim_ascii_start();
+        // JSON begins with a bracket.
+        let start = without_mark(content).trim_ascii_start();
         if !start.starts_with(b"{") {
             let git =
                 if content.starts_with(b"version https://git-lfs") { "; git lfs pull fetches the file that it stands for" } else { "" };
@@ -51,13 +52,37 @@ pub(super) fn parts(content: &[u8]) -> Result<Parts<'_>, String> {
         }
         return Ok(Parts { json: Cow::Borrowed(content), binary: None });
     }
+    if content.get(4..8) == Some(&1u32.to_le_bytes()) {
+        return Err(OLD.to_owned());
+    }
     binary_length(content)?;
     let glb = gltf::Glb::from_slice(content).map_err(|error| format!("is not valid glTF: {error}; export it again"))?;
     Ok(Parts { json: glb.json, binary: glb.bin.map(Cow::into_owned) })
 }
 
+/// Without the mark that some editors write in front of a text.
+fn without_mark(text: &[u8]) -> &[u8] {
+    text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text)
+}
+
+/// Refuses what is not glTF 2.
+pub(super) fn version(json: &Value) -> Result<(), String> {
+    let version = &json["asset"]["version"];
+    // The first version had its objects by names, and needed to say no version.
+    let is_old = version.as_str().is_some_and(|version| version.starts_with("1."))
+        || version.is_null() && ["meshes", "nodes", "scenes"].iter().any(|list| json[list].is_object());
+    match version.as_str() {
+        _ if is_old => Err(OLD.to_owned()),
+        Some(version) if version != "2" && !version.starts_with("2.") => Err(format!("is of glTF version {}; 2.0 is read", echo(version))),
+        _ => Ok(()),
+    }
+}
+
 /// Whole numbers are integers in it, however they are written, as `3.0`.
 pub(super) fn json(text: &[u8]) -> Result<Value, String> {
+    // Some writers fill a part of a .glb file with zeros.
+    let text = without_mark(text);
+    let text = &text[..text.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1)];
     let mut value = serde_json::from_slice(text).map_err(|error| {
         const AROUND: usize = 25;
         let line = text.split(|byte| *byte == b'\n').nth(error.line().saturating_sub(1)).unwrap_or_default();
@@ -192,8 +217,8 @@ pub(super) fn missing_members(root: &Root) -> Result<(), String> {
         }
     }
     for (number, image) in root.images.iter().enumerate() {
-        if image.uri.is_none() && (image.buffer_view.is_none() || image.mime_type.is_none()) {
-            return Err(format!("has an image {number} with neither a URI nor a buffer view and its MIME type"));
+        if image.uri.is_none() && image.buffer_view.is_none() {
+            return Err(format!("has an image {number} with neither a URI nor a buffer view"));
         }
     }
     for (number, camera) in root.cameras.iter().enumerate() {

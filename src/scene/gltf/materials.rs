@@ -17,10 +17,14 @@ use crate::error::Result;
 use crate::scene::Surface;
 use crate::scene::material::{Coverage, Layers, Material, Medium, NormalMap, TextureUse, UvTransform};
 
-/// Texture coordinates that are moved or scaled by more have no digits left, nor has a normal that is.
+/// Texture coordinates that are scaled by more have no digits left, nor has a normal that is.
 const MAX_TRANSFORM: f32 = 1e6;
 /// Of factors without an upper limit of their own.
 const ANY: f32 = f32::MAX;
+/// Larger indices of refraction are as good as this one: all but 4 millionths of the light is reflected.
+const MAX_IOR: f32 = 1e6;
+/// Largest that is spread over colours.
+const MAX_DISPERSED_IOR: f32 = 100.0;
 
 /// KHR_materials_anisotropy.
 #[derive(Default, Deserialize)]
@@ -169,9 +173,9 @@ impl Reader<'_> {
         let reason = || format!("emits {emission}; each channel must be 0 or more and finite");
         self.loader.require(emission.is_finite() && emission.min_element() >= 0.0, &self.object, reason)?;
         let ior = extensions.ior.as_ref().map_or(1.5, |extension| extension.ior.0);
-        let reason = || format!("has the index of refraction {ior}; it must be 0, or from 1 to 100");
-        self.loader.require(ior == 0.0 || (1.0..=100.0).contains(&ior), &self.object, reason)?;
-        let mut layers = Layers { ior, ..Layers::default() };
+        let reason = || format!("has the index of refraction {ior}; it must be 0, or from 1");
+        self.loader.require(ior == 0.0 || ior >= 1.0, &self.object, reason)?;
+        let mut layers = Layers { ior: ior.min(MAX_IOR), ..Layers::default() };
         match glossy {
             Some(glossy) => {
                 let glossiness = self.factor("glossiness", glossy.glossiness_factor.0, 1.0)?;
@@ -225,7 +229,9 @@ impl Reader<'_> {
         }
         if let Some(Dispersion { dispersion }) = self.extension(extensions, "KHR_materials_dispersion")? {
             let dispersion = self.factor("dispersion", dispersion, ANY)?;
-            if layers.medium.is_some() && layers.transmission > 0.0 {
+            if ior > MAX_DISPERSED_IOR && dispersion > 0.0 {
+                self.loader.leave_out(format!("dispersion of indices of refraction above {MAX_DISPERSED_IOR}"), &self.object);
+            } else if layers.medium.is_some() && layers.transmission > 0.0 {
                 layers.dispersion = dispersion;
             } else if dispersion > 0.0 {
                 self.loader
@@ -235,9 +241,9 @@ impl Reader<'_> {
         if let Some(film) = self.extension::<Iridescence>(extensions, "KHR_materials_iridescence")? {
             layers.iridescence = self.factor("iridescence factor", film.iridescence_factor, 1.0)?;
             layers.iridescence_texture = self.texture(film.iridescence_texture.as_ref(), Meaning::Numbers)?;
-            layers.film_ior = film.iridescence_ior;
-            let reason = || format!("has a film of the index of refraction {}; it must be from 1 to 100", film.iridescence_ior);
-            self.loader.require((1.0..=100.0).contains(&film.iridescence_ior), &self.object, reason)?;
+            layers.film_ior = film.iridescence_ior.min(MAX_IOR);
+            let reason = || format!("has a film of the index of refraction {}; it must be from 1", film.iridescence_ior);
+            self.loader.require(film.iridescence_ior >= 1.0, &self.object, reason)?;
             let thickness = [film.iridescence_thickness_minimum, film.iridescence_thickness_maximum];
             for nanometres in thickness {
                 self.factor("thickness of its film", nanometres, ANY)?;
@@ -340,10 +346,11 @@ impl Reader<'_> {
 
     fn uv_transform(&self, transform: &TextureTransform) -> Result<UvTransform> {
         let ([ox, oy], [sx, sy], turn) = (transform.offset.0, transform.scale.0, transform.rotation.0);
-        let is_ok = [ox, oy, sx, sy, turn].iter().all(|number| number.abs() <= MAX_TRANSFORM);
+        // Of offsets whole turns are taken away.
+        let is_ok = [ox, oy].iter().all(|number| number.is_finite()) && [sx, sy, turn].iter().all(|number| number.abs() <= MAX_TRANSFORM);
         let reason = || {
             format!(
-                "has a texture transform of offset {ox:e} {oy:e}, scale {sx:e} {sy:e} and rotation {turn:e}; each must be within {MAX_TRANSFORM:e}"
+                "has a texture transform of offset {ox:e} {oy:e}, scale {sx:e} {sy:e} and rotation {turn:e}; the offset must be finite, the others within {MAX_TRANSFORM:e}"
             )
         };
         self.loader.require(is_ok, &self.object, reason)?;

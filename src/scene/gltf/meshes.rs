@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 use super::accessor::{self, Vertices};
 use super::tangents::{self, Surface};
+use super::transforms;
 use super::{Loader, called, node_name};
 use crate::error::Result;
 use crate::scene::Mesh;
@@ -21,8 +22,6 @@ use crate::scene::mesh::Source;
 const MAX_TRIANGLES: usize = 100_000_000;
 /// Of all instances together: each takes a kilobyte, however small it is.
 const MAX_PARTS: usize = 2_000_000;
-/// Texture coordinates beyond that have no digits left for a place in the picture.
-const MAX_UV: f64 = 1e6;
 
 /// A primitive of a node.
 pub(super) struct Part<'a> {
@@ -40,6 +39,17 @@ pub(super) struct Part<'a> {
     pub(super) material: usize,
 }
 
+/// A mesh, and what is to be said of it.
+pub(super) struct ReadPrimitive {
+    pub(super) mesh: Mesh,
+    /// Whether it has a normal map, or anisotropy, and nothing says in which directions.
+    pub(super) is_turned_anyhow: bool,
+    /// Whether texture coordinates that nothing uses cannot be read.
+    pub(super) lacks_unused_uvs: bool,
+    /// How far at most single precision has moved its vertices, metres.
+    pub(super) rounding: f64,
+}
+
 impl Part<'_> {
     /// Its name in complaints.
     fn what(&self) -> String {
@@ -50,7 +60,7 @@ impl Part<'_> {
 impl Loader {
     /// What takes a vertex that follows one joint alone into the world. The transform of the node that has the mesh
     /// is none of it.
-    pub(super) fn joint_matrices(&self, skin: &gltf::Skin, to_world: &HashMap<usize, DMat4>) -> Result<Vec<DMat4>> {
+    pub(super) fn joint_matrices(&mut self, skin: &gltf::Skin, to_world: &HashMap<usize, DMat4>) -> Result<Vec<DMat4>> {
         let what = called("skin", skin.name(), skin.index());
         let to_joint = match skin.inverse_bind_matrices() {
             Some(matrices) => {
@@ -64,7 +74,15 @@ impl Loader {
             Some(to_world) => Ok(*to_world * *to_joint),
             None => Err(self.refuse(&what, format!("has the joint {}, which is not in the scene", node_name(&joint)))),
         };
-        skin.joints().zip(&to_joint).map(matrix).collect()
+        let joints: Vec<DMat4> = skin.joints().zip(&to_joint).map(matrix).collect::<Result<_>>()?;
+        if let Some(stored) = skin.inverse_bind_matrices() {
+            let rounding = |(joint, to_joint): (gltf::Node, &DMat4)| {
+                transforms::moved(&to_world[&joint.index()], transforms::most_rounding(&stored, [&to_joint.w_axis.truncate()]))
+            };
+            let most = skin.joints().zip(&to_joint).map(rounding).fold(0.0, f64::max);
+            self.note_rounding(&what, most);
+        }
+        Ok(joints)
     }
 
     /// Refuses more primitives, once for each node and instance, than are read, before any is listed.
@@ -151,8 +169,7 @@ impl Loader {
         }))
     }
 
-    /// And whether it has a normal map, or anisotropy, and nothing says in which directions.
-    pub(super) fn read_primitive(&self, part: &Part) -> Result<(Mesh, bool)> {
+    pub(super) fn read_primitive(&self, part: &Part) -> Result<ReadPrimitive> {
         let Part { primitive, name, to_world, .. } = part;
         let what = part.what();
         let positions = primitive.get(&Semantic::Positions).expect("what is listed has positions");
@@ -182,27 +199,38 @@ impl Loader {
         };
         let targets = || primitive.morph_targets().zip(part.weights.iter().map(|weight| f64::from(*weight))).filter(|(_, w)| *w != 0.0);
         let shifts = targets().filter_map(|(target, weight)| Some((target.positions()?, weight))).collect();
-        let mut positions = shifted(read_vectors(&positions, "positions")?, shifts, "positions in a morph target")?;
+        let own = read_vectors(&positions, "positions")?;
+        let by = transforms::most_rounding(&positions, &own);
+        let mut positions = shifted(own, shifts, "positions in a morph target")?;
+        let rounding = match &part.skin {
+            Some(joints) if matrices.is_some() => joints.iter().map(|joint| transforms::moved(joint, by)).fold(0.0, f64::max),
+            _ => transforms::moved(to_world, by),
+        };
         let mut normals = Vec::new();
         if let Some(own) = primitive.get(&Semantic::Normals) {
             let shifts = targets().filter_map(|(target, weight)| Some((target.normals()?, weight))).collect();
             normals = shifted(read_vectors(&own, "normals")?, shifts, "normals in a morph target")?;
         }
+        let material = &self.scene.materials[part.material];
         let mut uvs = [Vec::new(), Vec::new()];
+        let mut lacks_unused_uvs = false;
         for (set, uvs) in uvs.iter_mut().enumerate() {
-            if let Some(coordinates) = primitive.get(&Semantic::TexCoords(set as u32)) {
-                of_vertices(&coordinates, "texture coordinates")?;
-                *uvs = accessor::read(self, &coordinates, &vertices, &what, |[u, v]: [f32; 2]| DVec2::new(f64::from(u), f64::from(v)))?;
-                if let Some(uv) = uvs.iter().find(|uv| uv.is_nan() || uv.abs().max_element() > MAX_UV) {
-                    return Err(self.refuse(&what, format!("has the texture coordinates {}; they must be within {MAX_UV:e}", uv.as_vec2())));
-                }
+            let Some(coordinates) = primitive.get(&Semantic::TexCoords(set as u32)) else { continue };
+            let read = of_vertices(&coordinates, "texture coordinates").and_then(|()| {
+                accessor::read(self, &coordinates, &vertices, &what, |[u, v]: [f32; 2]| DVec2::new(f64::from(u), f64::from(v)))
+            });
+            let is_used = material.textures().any(|used| used.uv_set == set)
+                || material.tangent_coordinates().is_some_and(|(of_tangents, _)| of_tangents == set);
+            match read {
+                Err(fault) if is_used => return Err(fault),
+                Err(_) => lacks_unused_uvs = true,
+                Ok(read) => *uvs = read,
             }
         }
         let indices = indices.unwrap_or_else(|| (0..positions.len() as u32).collect());
         let mut triangles = triangles_of(primitive.mode(), &indices);
 
         // Tangents belong to the mesh's own space, as normal maps were made there.
-        let material = &self.scene.materials[part.material];
         let of_coat = material.layers.coat_normal_map.map(|map| (map.texture.uv_set, map.texture.transform));
         let maps = [material.tangent_coordinates(), of_coat];
         let mut of_file: Option<Vec<DVec4>> = None;
@@ -259,7 +287,7 @@ impl Loader {
         let vertices = if let Vertices::Some(vertices) = vertices { vertices } else { Vec::new() };
         let source = Some(Source { node: part.node, mesh: part.mesh, primitive: primitive.index(), vertices });
         let mesh = Mesh { name, positions, normals, uvs, colours, alphas, tangents, coat_tangents, triangles, material, source };
-        Ok((mesh, is_turned_anyhow))
+        Ok(ReadPrimitive { mesh, is_turned_anyhow, lacks_unused_uvs, rounding })
     }
 
     /// Indices into those of the vertices that the primitive uses, as many primitives may share one list of vertices;

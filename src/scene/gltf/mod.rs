@@ -18,30 +18,32 @@ mod meshes;
 pub mod source;
 mod tangents;
 mod textures;
+mod transforms;
 mod unread;
+mod uri;
 
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD as BASE64;
 use glam::{DMat4, DQuat, DVec3};
 use gltf::Document;
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
 use super::file::read as read_file;
+use super::geometry::PLACE_ERROR;
 use super::light::LUMENS_PER_WATT;
-use super::{Material, Mesh, Progress, Reading, Scene};
+use super::{Material, Mesh, Progress, Reading, Scene, solids};
 use crate::error::{Error, Result};
-use crate::text::{counted, some_of};
+use crate::text::{counted, in_metres, some_of};
 use accessor::Vertices;
 use animation::Pose;
 use compressed::Target;
-use meshes::Part;
+use meshes::{Part, ReadPrimitive};
 use textures::Wanted;
+use transforms::Transform;
 
 /// Hides nodes and all below them.
 const VISIBILITY: &str = "KHR_node_visibility";
@@ -112,10 +114,9 @@ pub fn load(path: &Path, reading: Reading, progress: Progress) -> Result<Scene> 
     progress("reading the file", 0.0);
     let refuse = |reason: String| Error::Scene { path: path.to_owned(), object: "the file".into(), reason: one_line(&reason) };
     let content = read_file(path).map_err(refuse)?;
-    // The mark that some editors write in front of a text.
-    let content = content.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&content);
-    let malformed::Parts { json: text, binary } = malformed::parts(content).map_err(refuse)?;
+    let malformed::Parts { json: text, binary } = malformed::parts(&content).map_err(refuse)?;
     let mut json = malformed::json(&text).map_err(refuse)?;
+    malformed::version(&json).map_err(refuse)?;
     let mut left_out = LeftOut::default();
     let shown = unread::take_out(&mut json, reading.at.is_some(), &mut left_out);
     let image_light = image_light::of(&json);
@@ -124,11 +125,8 @@ pub fn load(path: &Path, reading: Reading, progress: Progress) -> Result<Scene> 
     if let (false, Some(buffers)) = (unpacked.is_empty(), json.get_mut("buffers").and_then(Value::as_array_mut)) {
         buffers.push(json!({"byteLength": unpacked.len()}));
     }
+    let transforms = transforms::of_nodes(&json);
     let mut root = malformed::root(json).map_err(refuse)?;
-    let version = root.asset.version.as_str();
-    if !version.starts_with("2.") {
-        return Err(refuse(format!("is of glTF version {version}; 2.0 is read")));
-    }
     // Before anything else: what a file needs an extension for may look missing without it.
     let is_unread = |name: &&str| !READ_EXTENSIONS.contains(name) && !OPTIONAL_EXTENSIONS.contains(name);
     let unread: Vec<&str> = root.extensions_required.iter().map(String::as_str).filter(is_unread).collect();
@@ -152,6 +150,8 @@ pub fn load(path: &Path, reading: Reading, progress: Progress) -> Result<Scene> 
             ..Scene::default()
         },
         left_out,
+        transforms,
+        rounded: BTreeMap::new(),
         triangle_count: 0,
         wanted_textures: Vec::new(),
         texture_places: HashMap::new(),
@@ -193,27 +193,6 @@ fn remedy(extension: &str) -> &'static str {
         name if name.contains("_materials_") => "export its materials without it, by the settings of the program that wrote it",
         _ => "switch it off in the export settings of the program that wrote it",
     }
-}
-
-/// The content of a data URI, or of a file beside the scene at `path`; or what is wrong with it.
-fn read_uri(path: &Path, uri: &str) -> std::result::Result<Vec<u8>, String> {
-    if let Some(embedded) = uri.strip_prefix("data:") {
-        let text = embedded.split_once(";base64,").map(|(_, text)| text);
-        return text.and_then(|text| BASE64.decode(text).ok()).ok_or_else(|| "has a data URI that is not base64".into());
-    }
-    if uri.contains(':') {
-        return Err(format!("lies at {uri}; only files beside this one are read"));
-    }
-    let name = percent_decoded(uri).ok_or_else(|| format!("has a name that cannot be decoded: {uri}"))?;
-    let folder = path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
-    let place = folder.join(&name);
-    // A link may lead out as well as a name.
-    let leads_out = || matches!((place.canonicalize(), folder.canonicalize()), (Ok(place), Ok(folder)) if !place.starts_with(&folder));
-    if leaves_folder(Path::new(&name)) || leads_out() {
-        return Err(format!("lies at {uri}, outside the scene's folder, and is not read; copy it into that folder"));
-    }
-    read_file(&place)
-        .map_err(|reason| format!("lies at {uri}, which {reason}; copy it along with the scene, or export a .glb, which holds everything"))
 }
 
 /// A name without line breaks and other control characters, nor those that are not seen and change the order of what is.
@@ -261,6 +240,10 @@ pub(super) struct Loader {
     buffers: Vec<Vec<u8>>,
     scene: Scene,
     left_out: LeftOut,
+    /// Of all nodes.
+    transforms: Vec<Transform>,
+    /// What has places that single precision moved, and how far at most, metres.
+    rounded: BTreeMap<String, f64>,
     /// Triangles and vertices of all instances so far.
     triangle_count: usize,
     /// The scene's textures, in order.
@@ -291,6 +274,14 @@ impl Loader {
         self.left_out.add(what, owner);
     }
 
+    /// Takes note of what single precision has moved by up to so many metres.
+    fn note_rounding(&mut self, owner: &str, metres: f64) {
+        if metres > PLACE_ERROR {
+            let most = self.rounded.entry(owner.to_owned()).or_default();
+            *most = most.max(metres);
+        }
+    }
+
     /// `unpacked`: the number of the buffer that holds what was compressed, and its bytes.
     fn read_buffers(&mut self, document: &Document, mut blob: Option<Vec<u8>>, mut unpacked: (usize, Vec<u8>)) -> Result<()> {
         for buffer in document.buffers() {
@@ -313,13 +304,13 @@ impl Loader {
     }
 
     fn read_uri(&self, uri: &str, what: &str) -> Result<Vec<u8>> {
-        read_uri(&self.path, uri).map_err(|reason| self.refuse(what, reason))
+        uri::read(&self.path, uri).map_err(|reason| self.refuse(what, reason))
     }
 
     /// Reads cameras, lights and the materials of the primitives that it lists, of the nodes `shown`.
     fn read_nodes<'a>(&mut self, document: &'a Document, poses: &HashMap<usize, Pose>, shown: &BTreeSet<usize>) -> Result<Vec<Part<'a>>> {
         let Some(scene) = document.default_scene().or_else(|| document.scenes().next()) else {
-            return Err(self.refuse("the file", "holds no scene"));
+            return Err(self.refuse("the file", "holds neither a scene nor a node"));
         };
         if document.scenes().len() > 1 {
             self.leave_out("scenes beside the default one", "");
@@ -348,7 +339,7 @@ impl Loader {
                 };
                 let posed = poses.get(&node.index()).and_then(|pose| pose.weights.as_deref());
                 let weights: Arc<[f32]> = posed.or(node.weights()).or(mesh.weights()).unwrap_or_default().into();
-                for to_node in self.instances(document, node, &what)? {
+                for to_node in self.instances(document, node, &what, &own)? {
                     for primitive in mesh.primitives() {
                         let (name, skin, weights) = (name.clone(), skin.clone(), weights.clone());
                         let (node, mesh, to_world) = (node.index(), mesh.index(), own * to_node);
@@ -370,9 +361,14 @@ impl Loader {
     fn read_meshes(&mut self, parts: &[Part], progress: Progress) -> Result<()> {
         for batch in parts.chunks((parts.len() / 100).max(16 * rayon::current_num_threads())) {
             progress("reading meshes", self.scene.meshes.len() as f64 / parts.len() as f64);
-            let read: Vec<Result<(Mesh, bool)>> = batch.par_iter().map(|part| self.read_primitive(part)).collect();
+            let read: Vec<Result<ReadPrimitive>> = batch.par_iter().map(|part| self.read_primitive(part)).collect();
             for read in read {
-                let (mesh, is_turned_anyhow) = read?;
+                let ReadPrimitive { mesh, is_turned_anyhow, lacks_unused_uvs, rounding } = read?;
+                self.note_rounding(&format!("mesh '{}'", mesh.name), rounding);
+                if lacks_unused_uvs {
+                    let owner = format!("mesh '{}'", mesh.name);
+                    self.leave_out("texture coordinates that no texture uses and that cannot be read", &owner);
+                }
                 if is_turned_anyhow {
                     let owner = format!("material '{}' on mesh '{}'", self.scene.materials[mesh.material].name, mesh.name);
                     self.leave_out(
@@ -388,7 +384,7 @@ impl Loader {
 
     /// Lists a node and all below it, and where each stands in the world.
     fn place_node<'a>(
-        &self,
+        &mut self,
         node: gltf::Node<'a>,
         poses: &HashMap<usize, Pose>,
         parent: DMat4,
@@ -398,12 +394,15 @@ impl Loader {
     ) -> Result<()> {
         let what = node_name(&node);
         self.require(depth <= MAX_DEPTH, &what, || format!("lies more than {MAX_DEPTH} nodes deep, or within itself"))?;
-        let matrix = match poses.get(&node.index()) {
-            Some(pose) => pose.matrix(node.transform()),
-            None => DMat4::from_cols_array_2d(&node.transform().matrix().map(|column| column.map(f64::from))),
-        };
+        let rest = self.transforms[node.index()];
+        let pose = poses.get(&node.index());
+        if let Some(pose) = pose {
+            self.note_rounding(&format!("the animation of {what}"), transforms::moved(&parent, pose.rounding));
+        }
+        let matrix = pose.map_or_else(|| rest.matrix(), |pose| pose.matrix(&rest));
         let own = parent * matrix;
-        self.require(own.is_finite(), &what, || "has a transform that is not finite".into())?;
+        let is_finite = own.to_cols_array().iter().all(|number| number.abs() <= f64::from(f32::MAX));
+        self.require(is_finite, &what, || "has a transform that is not finite in single precision".into())?;
         let is_new = to_world.insert(node.index(), own).is_none();
         self.require(is_new, &what, || "has two parents; a node has one place in a scene".into())?;
         nodes.push(node.clone());
@@ -428,14 +427,15 @@ impl Loader {
         Ok(Some([accessor("TRANSLATION")?, accessor("ROTATION")?, accessor("SCALE")?]))
     }
 
-    /// Transforms of a node's instances; of a node without them, one that does nothing.
-    fn instances(&self, document: &Document, node: &gltf::Node, what: &str) -> Result<Vec<DMat4>> {
+    /// Transforms of the instances of a node, whose own is `to_world`; of a node without them, one that does nothing.
+    fn instances(&mut self, document: &Document, node: &gltf::Node, what: &str, to_world: &DMat4) -> Result<Vec<DMat4>> {
         let Some([translations, rotations, scales]) = self.instance_accessors(document, node, what)? else {
             return Ok(vec![DMat4::IDENTITY]);
         };
         let rows = |accessor: gltf::Accessor| {
             accessor::read(self, &accessor, &Vertices::All, what, |row: [f32; 3]| DVec3::from(row.map(f64::from)))
         };
+        let stored = translations.clone();
         let (translations, scales) = (translations.map(rows).transpose()?, scales.map(rows).transpose()?);
         let turn = |of: [f32; 4]| DQuat::from_array(of.map(f64::from)).normalize();
         let rotations = rotations.map(|of| accessor::read(self, &of, &Vertices::All, what, turn)).transpose()?;
@@ -451,6 +451,10 @@ impl Loader {
         };
         if let Some(place) = rotations.iter().flatten().position(|turn| !turn.is_finite()) {
             return Err(self.refuse(what, format!("has an instance {place} with a rotation of length 0")));
+        }
+        if let (Some(stored), Some(translations)) = (stored, &translations) {
+            let by = transforms::most_rounding(&stored, translations);
+            self.note_rounding(&format!("instances of {what}"), transforms::moved(to_world, by));
         }
         let of = |place: usize| {
             DMat4::from_scale_rotation_translation(
@@ -474,6 +478,17 @@ impl Loader {
         by_material.values().flatten().map(|mesh| format!("mesh '{}'", mesh.name)).collect()
     }
 
+    /// That places far from 0 stand in the file in single precision.
+    fn rounding_warning(&self) -> Option<String> {
+        let most = self.rounded.values().copied().reduce(f64::max)?;
+        Some(format!(
+            "places far from 0 are off by up to {}: glTF's buffers hold them in single precision ({}); export with the site's offset in the \
+             translation of a node, which is read in double precision, and the rest near 0",
+            in_metres(most),
+            some_of(self.rounded.keys())
+        ))
+    }
+
     /// The scene, degenerate triangles gone, with its warnings.
     fn finish(mut self) -> Result<Scene> {
         let cut: Vec<bool> = self.scene.meshes.par_iter_mut().map(Mesh::clamp_colours).collect();
@@ -483,6 +498,12 @@ impl Loader {
             self.leave_out("what vertex colours have below 0 or above 1", &name);
         }
         // Before triangles without area go, which may stand between others.
+        let turned = solids::turn_outwards(&mut self.scene);
+        if !turned.is_empty() {
+            self.scene
+                .warnings
+                .push(format!("solids whose faces look inwards ({}): turned, so that they look outwards", some_of(turned.iter())));
+        }
         let open = self.solids_with_holes();
         if !open.is_empty() {
             self.scene.warnings.push(format!(
@@ -502,6 +523,7 @@ impl Loader {
             self.scene.warnings.push(format!("{} without area left out ({})", counted(count, "triangle"), some_of(flat.iter())));
         }
         self.scene.warnings.extend(self.left_out.listed());
+        self.scene.warnings.extend(self.rounding_warning());
         self.require(self.scene.triangle_count() > 0, "the scene", || {
             let left_out = self.scene.warnings.iter().map(|warning| format!("; {warning}"));
             "holds no triangle".to_owned() + &left_out.collect::<String>()
@@ -522,33 +544,4 @@ fn named(kind: &str, name: Option<&str>, number: usize) -> String {
 /// An object in complaints: its name, or its number.
 fn called(kind: &str, name: Option<&str>, number: usize) -> String {
     name.map_or_else(|| format!("{kind} {number}"), |name| format!("{kind} '{}'", printable(name)))
-}
-
-/// Whether a relative name leads out of the folder that it starts from.
-fn leaves_folder(name: &Path) -> bool {
-    let mut depth = 0;
-    name.components().any(|component| {
-        depth += match component {
-            Component::Normal(_) => 1,
-            Component::CurDir => 0,
-            Component::ParentDir => -1,
-            Component::RootDir | Component::Prefix(_) => i32::MIN / 2,
-        };
-        depth < 0
-    })
-}
-
-/// `%20` and the like turned into bytes; `None` if that gives no text.
-fn percent_decoded(uri: &str) -> Option<String> {
-    let mut bytes = Vec::new();
-    let mut rest = uri.bytes();
-    while let Some(byte) = rest.next() {
-        if byte == b'%' {
-            let digit = |byte: Option<u8>| byte.and_then(|byte| char::from(byte).to_digit(16));
-            bytes.push((digit(rest.next())? * 16 + digit(rest.next())?) as u8);
-        } else {
-            bytes.push(byte);
-        }
-    }
-    String::from_utf8(bytes).ok()
 }

@@ -7,7 +7,7 @@ use base64::engine::general_purpose::STANDARD as BASE64;
 use serde_json::{Value, json};
 
 use super::compressed::{self, Target};
-use super::{malformed, one_line, percent_decoded, read_file, read_uri};
+use super::{malformed, one_line, read_file, uri};
 use crate::error::{Error, Result};
 
 /// The chunk of a `.glb` file that is its first buffer.
@@ -55,9 +55,8 @@ impl File {
     pub fn open(path: &Path) -> Result<File> {
         let refuse = |reason: String| Error::Scene { path: path.to_owned(), object: "the file".into(), reason: one_line(&reason) };
         let content = read_file(path).map_err(refuse)?;
-        let content = content.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&content);
         let is_binary = content.starts_with(b"glTF");
-        let mut chunks = if is_binary { chunks(content).map_err(refuse)? } else { vec![(JSON_CHUNK, content.to_vec())] }.into_iter();
+        let mut chunks = if is_binary { chunks(&content).map_err(refuse)? } else { vec![(JSON_CHUNK, content)] }.into_iter();
         let text = chunks.next().filter(|(kind, _)| *kind == JSON_CHUNK).ok_or_else(|| refuse("has no JSON".into()))?.1;
         let mut json = malformed::json(&text).map_err(refuse)?;
         let mut other_chunks: Vec<_> = chunks.collect();
@@ -66,7 +65,7 @@ impl File {
         let mut buffers = Vec::new();
         for (index, buffer) in json["buffers"].as_array().into_iter().flatten().enumerate() {
             buffers.push(match buffer["uri"].as_str() {
-                Some(uri) => Some(read_uri(path, uri).map_err(|reason| refuse(format!("has a buffer {index} that {reason}")))?),
+                Some(uri) => Some(uri::read(path, uri).map_err(|reason| refuse(format!("has a buffer {index} that {reason}")))?),
                 None if index == 0 => binary.clone(),
                 None => None,
             });
@@ -84,7 +83,10 @@ impl File {
         let mut uris: Vec<&str> = of("buffers").chain(of("images")).filter(|uri| !uri.contains(':') && !uri.is_empty()).collect();
         uris.sort_unstable();
         uris.dedup();
-        let read = |uri: &str| Beside { name: percent_decoded(uri).unwrap_or_else(|| uri.to_owned()), content: read_uri(&self.path, uri) };
+        let read = |uri: &str| Beside {
+            name: uri::name_beside(&self.path, uri).unwrap_or_else(|| uri.to_owned()),
+            content: uri::read(&self.path, uri),
+        };
         uris.into_iter().map(read).collect()
     }
 

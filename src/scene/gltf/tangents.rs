@@ -65,7 +65,10 @@ impl Surface<'_> {
             false => self.normals.iter().map(|normal| single(*normal)).collect(),
         };
         // glTF's v runs down the picture, the bitangent up.
-        let uv = |uv: &DVec2| (transform.apply(*uv) * DVec2::new(1.0, -1.0) + DVec2::ZERO).as_vec2().to_array();
+        // Only their differences count, which have more digits near 0.
+        let first = uvs.first().map_or(DVec2::ZERO, |uv| transform.apply(*uv).floor());
+        let base = if first.abs().max_element() > 64.0 { first } else { DVec2::ZERO };
+        let uv = |uv: &DVec2| ((transform.apply(*uv) - base) * DVec2::new(1.0, -1.0) + DVec2::ZERO).as_vec2().to_array();
         let mut corners = Corners {
             surface: self,
             positions: self.positions.iter().map(|position| single(scale * *position)).collect(),

@@ -16,6 +16,9 @@ use crate::scene::texture::{Filter, Texels, Texture, Wrap};
 /// Of one picture as its file has it: a few bytes must not unfold into gigabytes.
 const MAX_BYTES: u64 = 1 << 30;
 
+/// The mark at the end of a JPEG.
+const END: [u8; 2] = [0xff, 0xd9];
+
 /// What the numbers of a picture mean.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) enum Meaning {
@@ -142,7 +145,6 @@ impl Loader {
         self.require(is_read, what, || {
             "cannot be decoded: it is neither PNG, JPEG, WebP nor KTX 2, the formats that are read; convert it".into()
         })?;
-        self.require(has_its_end(bytes), what, || "is cut off: a JPEG without its end; export it again".into())?;
         reader.limits(image_limits());
         reader.into_decoder().map_err(|error| self.undecodable(what, &error))
     }
@@ -151,6 +153,17 @@ impl Loader {
         if ktx2::is_one(bytes) {
             return ktx2::decoded(bytes).map_err(|reason| self.broken_ktx2(what, &reason));
         }
+        if has_its_end(bytes) {
+            return self.pixels(what, bytes);
+        }
+        // What follows the last pixel of a whole picture changes nothing; what follows a part of one becomes pixels.
+        let ended = |by: &[u8]| self.pixels(what, &[bytes.strip_suffix(&[0xff]).unwrap_or(bytes), by, &END].concat());
+        let (found, other) = (ended(&[])?, ended(&[0x55; 64])?);
+        self.require(found == other, what, || "is cut off: a JPEG without its end; export it again".into())?;
+        Ok(found)
+    }
+
+    fn pixels(&self, what: &str, bytes: &[u8]) -> Result<RgbaImage> {
         let undecodable = |error: image::ImageError| self.undecodable(what, &error);
         let decoder = self.decoder(what, bytes)?;
         image_limits().reserve(decoder.total_bytes()).map_err(undecodable)?;
@@ -195,7 +208,6 @@ fn image_limits() -> image::Limits {
 /// Whether no end of a JPEG is missing: decoders make grey of what is not there. The mark of the end stands behind the last scan.
 fn has_its_end(bytes: &[u8]) -> bool {
     const START: [u8; 2] = [0xff, 0xd8];
-    const END: [u8; 2] = [0xff, 0xd9];
     const SCAN: [u8; 2] = [0xff, 0xda];
     let last = |mark: [u8; 2]| bytes.windows(2).rposition(|pair| pair == mark);
     !bytes.starts_with(&START) || last(END) > last(SCAN)

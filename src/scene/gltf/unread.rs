@@ -13,6 +13,7 @@ use serde_json::{Value, json};
 use super::{LeftOut, READ_EXTENSIONS, VISIBILITY, called, image_light, named};
 use crate::text::echo;
 
+const LIGHTS: &str = "/extensions/KHR_lights_punctual";
 const SPEC_GLOSS: &str = "KHR_materials_pbrSpecularGlossiness";
 /// Each of these says that it must not stand beside [`SPEC_GLOSS`].
 const NOT_BESIDE_SPEC_GLOSS: [&str; 10] = [
@@ -30,6 +31,7 @@ const NOT_BESIDE_SPEC_GLOSS: [&str; 10] = [
 
 /// Lists keep their length, as their members are named by numbers. Gives the numbers of the scene's nodes that are not hidden.
 pub(super) fn take_out(root: &mut Value, is_posed: bool, left_out: &mut LeftOut) -> BTreeSet<usize> {
+    add_scene(root);
     // Lists that may be missing.
     for scene in items_mut(root, "scenes").filter_map(|(_, scene)| scene.as_object_mut()) {
         scene.entry("nodes").or_insert_with(|| json!([]));
@@ -111,6 +113,20 @@ pub(super) fn take_out(root: &mut Value, is_posed: bool, left_out: &mut LeftOut)
         }
     }
     nodes
+}
+
+/// Puts all nodes that are below no other into a scene where there is none: a file may be a library of them.
+fn add_scene(root: &mut Value) {
+    if items(&root["scenes"]).next().is_some() {
+        return;
+    }
+    take(root, "", "scene");
+    if items(&root["nodes"]).next().is_none() {
+        return;
+    }
+    let below: BTreeSet<usize> = items(&root["nodes"]).flat_map(|node| items(&node["children"])).filter_map(number).collect();
+    let roots: Vec<usize> = (0..items(&root["nodes"]).count()).filter(|node| !below.contains(node)).collect();
+    root["scenes"] = json!([{"nodes": roots}]);
 }
 
 /// All animations; where a pose is asked for all but the first, of which only what moves nodes is left.
@@ -201,13 +217,29 @@ fn take_out_of_mesh(mesh: &mut Value, owner: &str, left_out: &mut LeftOut) {
     }
 }
 
-/// Puts in what glTF asks for and nothing here reads: bounds of positions, what cameras clip.
+/// Puts in what glTF asks for and nothing here reads, or what other readers do without: bounds of positions, what cameras clip, the kind
+/// of pictures, which their bytes say, the cone of a spot light. Takes out what views say to graphics cards.
 fn allow_missing_members(root: &mut Value) {
     let primitives = || items(&root["meshes"]).flat_map(|mesh| items(&mesh["primitives"]));
     let positions: BTreeSet<usize> = primitives().filter_map(|primitive| number(&primitive["attributes"]["POSITION"])).collect();
     for (_, accessor) in items_mut(root, "accessors").filter(|(place, _)| positions.contains(place)) {
         if let Some(accessor) = accessor.as_object_mut() {
             accessor.extend([("min".to_owned(), json!([0, 0, 0])), ("max".to_owned(), json!([0, 0, 0]))]);
+        }
+    }
+    for (_, view) in items_mut(root, "bufferViews") {
+        take(view, "", "target");
+        // As tight as its elements are.
+        if view["byteStride"] == 0 {
+            take(view, "", "byteStride");
+        }
+    }
+    for (_, image) in items_mut(root, "images").filter(|(_, image)| !image["bufferView"].is_null() && image["mimeType"].is_null()) {
+        image["mimeType"] = json!("image/png");
+    }
+    for (_, light) in root.pointer_mut(LIGHTS).into_iter().flat_map(|lights| items_mut(lights, "lights")) {
+        if light["type"] == "spot" && light["spot"].is_null() {
+            light["spot"] = json!({});
         }
     }
     for (_, camera) in items_mut(root, "cameras") {

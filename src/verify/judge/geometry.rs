@@ -8,8 +8,9 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 
+use crate::scene::hair::Moves;
 use crate::scene::material::{TextureUse, UvTransform};
-use crate::scene::{Material, Mesh, Scene, Surface, overlap};
+use crate::scene::{Material, Mesh, Scene, Surface, contact, overlap};
 
 /// Rays start this share of the scene's largest coordinate off the surface that they leave: some 10^5
 /// roundings of f64, and less than a nanometre in a room.
@@ -133,7 +134,10 @@ impl Triangle<'_> {
 impl<'a> Geometry<'a> {
     pub fn new(scene: &'a Scene) -> Geometry<'a> {
         let mut triangles = Vec::new();
-        let overlaps = overlap::of_scene(scene);
+        let kinds = contact::kinds(scene);
+        let moves = Moves::of(scene, &kinds);
+        let corners_of = |mesh: u32, triangle: u32| moves.corners(scene, mesh, triangle);
+        let overlaps = overlap::of_scene(scene, &kinds, corners_of);
         for (number, mesh) in (0u32..).zip(&scene.meshes) {
             for index in (0..mesh.triangles.len()).filter(|index| mesh.area(*index) > 0.0) {
                 let whole = Triangle {
@@ -141,7 +145,7 @@ impl<'a> Geometry<'a> {
                     index,
                     vertices: mesh.triangles[index].map(|vertex| vertex as usize),
                     part: None,
-                    corners: mesh.corners(index),
+                    corners: corners_of(number, index as u32),
                     normal: mesh.normal(index),
                     area: mesh.area(index),
                     material: &scene.materials[mesh.material],

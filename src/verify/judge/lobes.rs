@@ -193,14 +193,15 @@ impl Lobes {
             Wall::Thin => f0,
             Wall::Solid { from, to } => inputs.f0(along_normal(from, to)),
         };
-        let coat_leaves = (1.0 - inputs.coat_albedo(frame.n.dot(frame.wo))).max(0.0);
+        let coat_leaves = (1.0 - inputs.coat_albedo(frame.coat_n.dot(frame.wo))).max(0.0);
         let sheen_leaves = (1.0 - inputs.sheen_albedo(frame.n.dot(frame.wo))).max(0.0);
         let mut lobes =
             Lobes { inputs, frame, f0, f0_transmission, diffuse: 0.0, coat_leaves, sheen_leaves, chances: [(Kind::Diffuse, 0.0); 6] };
         let n_v = frame.n.dot(frame.wo);
         if inputs.diffuse_colour().max_element() > 0.0 || inputs.colour_beyond().max_element() > 0.0 {
-            let norm: f64 = COSINES.iter().map(|(cosine, weight)| 2.0 * weight * cosine * lobes.reaches_diffuse(*cosine)).sum();
-            lobes.diffuse = if norm > 0.0 { lobes.reaches_diffuse(n_v) / norm } else { 0.0 };
+            // As of one normal: of two, no more gets through.
+            let norm: f64 = COSINES.iter().map(|(cosine, weight)| 2.0 * weight * cosine * lobes.reaches_diffuse(*cosine, *cosine)).sum();
+            lobes.diffuse = if norm > 0.0 { lobes.leaves_diffuse() / norm } else { 0.0 };
         }
         lobes.set_chances(n_v);
         lobes
@@ -222,8 +223,9 @@ impl Lobes {
         }
         let transmitted = dielectric * transmission * base_colour * (1.0 - through) * both;
         // The norm of diffuse reflection is left out here.
-        let diffuse = self.inputs.diffuse_colour() * self.reaches_diffuse(n_v);
-        let beyond = self.inputs.colour_beyond() * self.reaches_diffuse(n_v);
+        let leaves_diffuse = self.leaves_diffuse();
+        let diffuse = self.inputs.diffuse_colour() * leaves_diffuse;
+        let beyond = self.inputs.colour_beyond() * leaves_diffuse;
         let under_coat = self.coat_leaves;
         let under = under_coat * self.sheen_leaves;
         let albedos = [
@@ -251,18 +253,30 @@ impl Lobes {
         self.chances = raised.map(|(kind, albedo)| (kind, if sum > 0.0 { albedo / sum } else { 0.0 }));
     }
 
-    /// What reaches the diffuse lobe at a cosine, or gets out of it: (1 - E) (1 - C).
-    fn reaches_diffuse(&self, cosine: f64) -> f64 {
+    /// What reaches the diffuse lobe at cosines to the normals of base and coat, or gets out of it: (1 - E) (1 - C).
+    fn reaches_diffuse(&self, cosine: f64, coat_cosine: f64) -> f64 {
+        self.leaves_base(cosine, 0.0) * (1.0 - self.inputs.coat_albedo(coat_cosine)).max(0.0)
+    }
+
+    /// The same towards the eye. A stretched base may reflect more there than E, which is that of an even one.
+    fn leaves_diffuse(&self) -> f64 {
+        let (n_v, coat_v) = (self.frame.n.dot(self.frame.wo), self.frame.coat_n.dot(self.frame.wo));
+        let excess = if self.inputs.stretch.is_some() { 0.004 + 0.1 * (1.0 - 4.5 * n_v).max(0.0) } else { 0.0 };
+        self.leaves_base(n_v, excess) * (1.0 - self.inputs.coat_albedo(coat_v)).max(0.0)
+    }
+
+    /// What the base's reflection leaves, if it is so much above E.
+    fn leaves_base(&self, cosine: f64, excess: f64) -> f64 {
         let albedo = ggx(cosine, self.inputs.alpha);
         let Film { share, bound, .. } = self.inputs.film;
         let (f0, f90) = (self.f0.max_element(), self.inputs.specular);
-        let reflected = (f0 + share * (bound - f0)) * albedo.a + (f90 + share * (1.0 - f90)) * albedo.b;
-        (1.0 - reflected).max(0.0) * (1.0 - self.inputs.coat_albedo(cosine)).max(0.0)
+        let (f0, f90) = (f0 + share * (bound - f0), f90 + share * (1.0 - f90));
+        (1.0 - f0 * albedo.a - f90 * (albedo.b + excess)).max(0.0)
     }
 
-    /// What the coat leaves to all but the diffuse lobe, by the cosines to the base's normal.
+    /// What the coat leaves to all but the diffuse lobe, by the cosines to its own normal.
     fn under_coat(&self, wi: DVec3) -> f64 {
-        self.coat_leaves.min((1.0 - self.inputs.coat_albedo(self.frame.n.dot(wi).abs())).max(0.0))
+        self.coat_leaves.min((1.0 - self.inputs.coat_albedo(self.frame.coat_n.dot(wi).abs())).max(0.0))
     }
 
     fn under_sheen(&self, wi: DVec3) -> f64 {
@@ -412,11 +426,11 @@ impl Lobes {
         let under = || self.under_coat(wi) * self.under_sheen(wi);
         match kind {
             Kind::Diffuse => {
-                let share = self.diffuse * self.reaches_diffuse(n_l) * self.under_sheen(wi);
+                let share = self.diffuse * self.reaches_diffuse(n_l, self.frame.coat_n.dot(wi).abs()) * self.under_sheen(wi);
                 FRAC_1_PI * share * self.inputs.diffuse_colour()
             }
             Kind::DiffuseTransmission => {
-                let share = self.diffuse * self.reaches_diffuse(n_l) * self.under_sheen(wi);
+                let share = self.diffuse * self.reaches_diffuse(n_l, self.frame.coat_n.dot(wi).abs()) * self.under_sheen(wi);
                 FRAC_1_PI * share * self.inputs.colour_beyond()
             }
             Kind::Reflection => d_v(self.base()) * under() * self.reflectance(v_h),

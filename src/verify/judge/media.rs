@@ -5,9 +5,6 @@ use glam::DVec3;
 use super::geometry::{Geometry, Ray};
 use crate::scene::{Material, Surface};
 
-/// Solids that are known at a time; of more the one entered first is forgotten.
-const MOST: usize = 4;
-
 /// Towards what a point looks for the solids around it: no axis of a scene.
 const OUTWARDS: DVec3 = DVec3::new(0.290_380_3, 0.829_658_1, 0.476_861_2);
 
@@ -80,9 +77,6 @@ impl<'a> Media<'a> {
     }
 
     fn enter(&mut self, solid: &'a Material) {
-        if self.0.len() == MOST {
-            self.0.remove(0);
-        }
         self.0.push(solid);
     }
 
@@ -103,7 +97,6 @@ impl<'a> Media<'a> {
             ray = geometry.leaving(triangle.point(hit.weights), triangle.normal, ray.direction);
         }
         // The one left first is the innermost.
-        left.truncate(MOST);
         left.reverse();
         Media(left)
     }

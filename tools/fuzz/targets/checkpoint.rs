@@ -75,6 +75,7 @@ fn metadata(run: &SavedRun, film: &SceneFilm, version: &str) -> Metadata {
         error,
         error_bound,
         confidence,
+        degrees_of_freedom: film.error_freedom(),
         denoiser: None,
         units: String::new(),
         command: String::new(),

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 use numpy::ndarray::{Array, Array2, Array3, Dimension};
-use numpy::{IntoPyArray, PyArray, PyArray2, PyArray3, PyArrayMethods};
+use numpy::{IntoPyArray, PyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use photonmill::output::colour::{Format, Tone};
 use photonmill::output::show::{Layer, Surface};
 use photonmill::render::{Lightmaps as Baked, Picture, Style};
@@ -142,6 +142,29 @@ impl Film {
         self.standard_error.get_or_init(py, || array(py, py.detach(errors)).unbind()).bind(py).clone()
     }
 
+    #[doc = doc!("Film.unseen")]
+    #[getter]
+    fn unseen<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f32>> {
+        let Picture { run, size, .. } = self.picture();
+        let bounds: Vec<f32> = py.detach(|| (0..run.film.pixels()).map(run.film.unseen_bounds()).map(|most| most as f32).collect());
+        array(py, Array2::from_shape_vec((size.1 as usize, size.0 as usize), bounds).expect("one bound a pixel"))
+    }
+
+    #[doc = doc!("Film.degrees_of_freedom")]
+    #[getter]
+    fn degrees_of_freedom(&self) -> u32 {
+        self.picture().run.film.error_freedom()
+    }
+
+    #[doc = doc!("Film.interval")]
+    fn interval<'py>(&self, py: Python<'py>) -> [Bound<'py, PyArray3<f32>>; 2] {
+        let Picture { run, size, .. } = self.picture();
+        [0, 1].map(|end| {
+            let ends = run.film.intervals();
+            array(py, py.detach(|| picture(*size, (0..run.film.pixels()).map(|pixel| ends(pixel)[end].as_vec3()))))
+        })
+    }
+
     #[doc = doc!("Film.parts")]
     #[getter]
     fn parts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
@@ -243,6 +266,29 @@ impl Irradiance {
         self.standard_error.get_or_init(py, make).bind(py).clone()
     }
 
+    #[doc = doc!("Irradiance.unseen")]
+    #[getter]
+    fn unseen<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f32>> {
+        let film = &self.run().film;
+        let bounds: Vec<f32> = (0..film.pixels()).map(film.unseen_bounds()).map(|most| most as f32).collect();
+        PyArray1::from_vec(py, bounds)
+    }
+
+    #[doc = doc!("Irradiance.degrees_of_freedom")]
+    #[getter]
+    fn degrees_of_freedom(&self) -> u32 {
+        self.run().film.error_freedom()
+    }
+
+    #[doc = doc!("Irradiance.interval")]
+    fn interval<'py>(&self, py: Python<'py>) -> [Bound<'py, PyArray2<f32>>; 2] {
+        let film = &self.run().film;
+        [0, 1].map(|end| {
+            let ends = film.intervals();
+            array(py, rows((0..film.pixels()).map(|point| ends(point)[end].as_vec3())))
+        })
+    }
+
     #[doc = doc!("Irradiance.__len__")]
     fn __len__(&self) -> usize {
         self.run().film.pixels()
@@ -261,6 +307,12 @@ pub struct Lightmap {
     #[doc = doc!("Lightmap.standard_error")]
     #[pyo3(get)]
     standard_error: Py<PyArray3<f32>>,
+    #[doc = doc!("Lightmap.unseen")]
+    #[pyo3(get)]
+    unseen: Py<PyArray2<f32>>,
+    #[doc = doc!("Lightmap.degrees_of_freedom")]
+    #[pyo3(get)]
+    degrees_of_freedom: u32,
 }
 
 #[pymethods]
@@ -297,7 +349,10 @@ impl Lightmaps {
             let map = |map: &photonmill::render::Lightmap| {
                 let values = |colours: &[Vec3]| array(py, picture((map.width, map.height), colours.iter().copied())).unbind();
                 let (irradiance, standard_error) = (values(&map.irradiance), values(&map.standard_error));
-                Py::new(py, Lightmap { name: map.name.clone(), irradiance, standard_error })
+                let unseen = Array2::from_shape_vec((map.height as usize, map.width as usize), map.unseen.clone());
+                let unseen = array(py, unseen.expect("one bound a texel")).unbind();
+                let degrees_of_freedom = map.source.degrees_of_freedom;
+                Py::new(py, Lightmap { name: map.name.clone(), irradiance, standard_error, unseen, degrees_of_freedom })
             };
             self.baked().maps.iter().map(map).collect()
         })

@@ -19,7 +19,7 @@ import pytest
 
 import photonmill as pm
 
-QUICK: pm.Settings = {"rounds": 16, "photons": 4096, "seed": 7}
+QUICK: pm.Settings = {"rounds": 32, "photons": 4096, "seed": 7}
 SIZE = (24, 24)
 SOURCE = Path(os.environ.get("PHOTONMILL_SOURCE", Path(__file__).parents[3]))
 
@@ -53,7 +53,7 @@ def test_a_film_is_arrays_with_their_errors(film: pm.Film) -> None:
 
 def test_a_run_says_how_wrong_it_is(film: pm.Film) -> None:
     assert 0.0 < film.relative_error < film.bound < np.inf
-    assert (film.confidence, film.rounds, film.end, film.seed) == (0.95, 16, "rounds", 7)
+    assert (film.confidence, film.rounds, film.end, film.seed) == (0.95, 32, "rounds", 7)
     assert film.seconds > 0.0 and film.bias is not None
     ledger = film.ledger
     assert ledger["emitted"] == ledger["absorbed"] + ledger["escaped"] + ledger["cut_off"] + ledger["dropped"] > 0
@@ -61,7 +61,7 @@ def test_a_run_says_how_wrong_it_is(film: pm.Film) -> None:
     assert "noise:" in film.report and "photons stored" in film.report
     details = film.details
     assert details["relative_error"] == film.relative_error and details["total_bound"] == film.bound
-    assert repr(film).startswith("Film('cornell-spheres', 16 rounds")
+    assert repr(film).startswith("Film('cornell-spheres', 32 rounds")
 
 
 def test_arrays_are_made_once_and_cannot_be_written_to(film: pm.Film) -> None:
@@ -91,8 +91,8 @@ def test_the_same_bits_as_the_program(spheres: pm.Scene, film: pm.Film, tmp_path
 
     ours = tmp_path / "ours.exr"
     film.save(ours)
-    theirs, saved = run("theirs.exr", "--size", "24x24", "--rounds", "16", "--photons", "4096", "--seed", "7"), channels(ours)
-    assert theirs.keys() == saved.keys() and len(theirs) == 25
+    theirs, saved = run("theirs.exr", "--size", "24x24", "--rounds", "32", "--photons", "4096", "--seed", "7"), channels(ours)
+    assert theirs.keys() == saved.keys() and len(theirs) == 28
     for name in theirs:
         np.testing.assert_array_equal(theirs[name].view(np.uint32), saved[name].view(np.uint32), err_msg=name)
     layers = {"": film.radiance, "standard_error.": film.standard_error, "albedo.": film.albedo}
@@ -172,7 +172,9 @@ def test_points_have_the_irradiance_of_a_closed_form() -> None:
     points = np.array([[0.5, 0.001, 0.5], [0.3, 0.001, 0.4]])
     found = scene.probe(points, [[0, 2, 0], [0, 1, 0]], rounds=32, photons=8192)
     assert found.irradiance.shape == found.standard_error.shape == (2, 3) and len(found) == 2
-    assert np.all(found.standard_error < 0.5)
+    assert np.all(found.standard_error < 0.5) and found.degrees_of_freedom == 7 and found.unseen.shape == (2,)
+    low, high = found.interval()
+    np.testing.assert_allclose(high - low, 2 * 2.3646 * found.standard_error, rtol=1e-3)
     assert np.all(np.abs(found.irradiance - 2 * np.pi) < 4 * found.standard_error + 0.02)
     # Whatever the points come in.
     again = scene.probe(points.tolist(), [[0, 1, 0]] * 2, rounds=32, photons=8192)
@@ -181,7 +183,7 @@ def test_points_have_the_irradiance_of_a_closed_form() -> None:
 
 def test_lightmaps_are_arrays_and_files(tmp_path: Path) -> None:
     scene = pm.Scene("cornell")
-    baked = scene.bake(tmp_path, texels_per_metre=4, rounds=16, photons=4096)
+    baked = scene.bake(tmp_path, texels_per_metre=4, rounds=32, photons=4096)
     assert len(baked) == len(baked.maps) > 0
     for lightmap in baked.maps:
         assert lightmap.irradiance.shape == lightmap.standard_error.shape and lightmap.irradiance.shape[2] == 3
@@ -192,7 +194,7 @@ def test_lightmaps_are_arrays_and_files(tmp_path: Path) -> None:
     written = channels(tmp_path / stem)
     shapes = {lightmap.irradiance.shape[:2]: lightmap for lightmap in baked.maps}
     assert written["R"].shape in shapes
-    without = scene.bake(texels_per_metre=4, rounds=16, photons=4096)
+    without = scene.bake(texels_per_metre=4, rounds=32, photons=4096)
     assert without.files == []
     np.testing.assert_array_equal(without.maps[0].irradiance, baked.maps[0].irradiance)
 

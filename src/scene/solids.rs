@@ -1,0 +1,185 @@
+//! Solids that light enters, as closed shells of triangles: which way they face, and how many lie in one another.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+use glam::DVec3;
+
+use super::Scene;
+
+/// Triangles that are connected by their corners' places, of one material.
+struct Shell {
+    /// Mesh and triangle.
+    triangles: Vec<(u32, u32)>,
+    corners: Vec<[DVec3; 3]>,
+    min: DVec3,
+    max: DVec3,
+}
+
+/// Along no axis and no diagonal.
+const DIRECTION: DVec3 = DVec3::new(0.290_380_3, 0.829_658_1, 0.476_861_2);
+
+/// Triangles of a shell just inside of which one looks for the solids around.
+const PLACES: usize = 8;
+
+impl Shell {
+    /// Positive where faces look outwards; whatever the origin, of a closed shell.
+    fn volume(&self) -> f64 {
+        self.corners.iter().map(|[a, b, c]| (*a - self.min).dot((*b - self.min).cross(*c - self.min)) / 6.0).sum()
+    }
+
+    /// But for rounding, also of the corners along a seam: the areas that look one way are as large as those that look the other.
+    fn is_closed(&self) -> bool {
+        let areas = || self.corners.iter().map(|[a, b, c]| (*b - *a).cross(*c - *a));
+        areas().sum::<DVec3>().length() < 1e-6 * areas().map(DVec3::length).sum::<f64>()
+    }
+
+    /// How often it goes around a point: 1 inside of a shell that faces outwards, -1 of one that faces inwards.
+    fn winding(&self, point: DVec3) -> i32 {
+        if point.cmplt(self.min).any() || point.cmpgt(self.max).any() {
+            return 0;
+        }
+        let crossed = |[a, b, c]: &[DVec3; 3]| {
+            let (a, b, c) = (*a - point, *b - point, *c - point);
+            let sides = [a.cross(b), b.cross(c), c.cross(a)].map(|side| DIRECTION.dot(side));
+            let leaves = i32::from(sides.iter().all(|side| *side > 0.0)) - i32::from(sides.iter().all(|side| *side < 0.0));
+            // The plane is ahead of the point, not behind it.
+            let normal = (b - a).cross(c - a);
+            if normal.dot(a) * f64::from(leaves) > 0.0 { leaves } else { 0 }
+        };
+        self.corners.iter().map(crossed).sum()
+    }
+
+    fn middle(&self, triangle: usize) -> DVec3 {
+        let [a, b, c] = self.corners[triangle];
+        (a + b + c) / 3.0
+    }
+}
+
+/// The shells of meshes that enclose a medium, by material.
+fn shells(scene: &Scene, corners_of: impl Fn(u32, u32) -> [DVec3; 3]) -> BTreeMap<usize, Vec<Shell>> {
+    let mut by_material: BTreeMap<usize, Vec<u32>> = BTreeMap::new();
+    for (number, mesh) in (0u32..).zip(&scene.meshes) {
+        if scene.materials[mesh.material].enclosed_medium().is_some() {
+            by_material.entry(mesh.material).or_default().push(number);
+        }
+    }
+    by_material.into_iter().map(|(material, meshes)| (material, shells_of(scene, &meshes, &corners_of))).collect()
+}
+
+fn shells_of(scene: &Scene, meshes: &[u32], corners_of: impl Fn(u32, u32) -> [DVec3; 3]) -> Vec<Shell> {
+    // Places that are connected have one root.
+    let mut places: HashMap<[u64; 3], usize> = HashMap::new();
+    let mut roots: Vec<usize> = Vec::new();
+    fn root_of(roots: &mut [usize], mut place: usize) -> usize {
+        while roots[place] != place {
+            roots[place] = roots[roots[place]];
+            place = roots[place];
+        }
+        place
+    }
+    let mut all: Vec<((u32, u32), [DVec3; 3], usize)> = Vec::new();
+    for mesh in meshes {
+        for triangle in 0..scene.meshes[*mesh as usize].triangles.len() as u32 {
+            let corners = corners_of(*mesh, triangle);
+            let own = corners.map(|corner| {
+                // The sum turns -0 into 0.
+                let next = roots.len();
+                let place = *places.entry((corner + DVec3::ZERO).to_array().map(f64::to_bits)).or_insert(next);
+                if place == next {
+                    roots.push(next);
+                }
+                root_of(&mut roots, place)
+            });
+            own.iter().for_each(|place| {
+                let (a, b) = (root_of(&mut roots, own[0]), root_of(&mut roots, *place));
+                roots[b] = a;
+            });
+            all.push(((*mesh, triangle), corners, own[0]));
+        }
+    }
+    let mut by_root: BTreeMap<usize, Shell> = BTreeMap::new();
+    for (source, corners, place) in all {
+        let empty = || Shell { triangles: Vec::new(), corners: Vec::new(), min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
+        let shell = by_root.entry(root_of(&mut roots, place)).or_insert_with(empty);
+        shell.triangles.push(source);
+        shell.corners.push(corners);
+        corners.iter().for_each(|corner| (shell.min, shell.max) = (shell.min.min(*corner), shell.max.max(*corner)));
+    }
+    by_root.into_values().collect()
+}
+
+/// Turns closed solids whose faces look inwards, and returns the names of their meshes. A shell that looks inwards within another of its
+/// material is a hollow.
+pub fn turn_outwards(scene: &mut Scene) -> BTreeSet<String> {
+    let mut turned: Vec<(u32, u32)> = Vec::new();
+    for shells in shells(scene, |mesh, triangle| scene.meshes[mesh as usize].corners(triangle as usize)).values() {
+        let volumes: Vec<f64> = shells.iter().map(Shell::volume).collect();
+        if volumes.iter().all(|volume| *volume >= 0.0) {
+            continue;
+        }
+        let around = |own: usize| -> Vec<usize> {
+            let middle = shells[own].middle(0);
+            (0..shells.len()).filter(|other| *other != own && shells[*other].winding(middle) % 2 != 0).collect()
+        };
+        let is_turned = |own: usize| volumes[own] < 0.0 && around(own).len() % 2 == 0 && shells[own].is_closed();
+        for own in 0..shells.len() {
+            // The hollows of what is inside out are so, too.
+            let is_hollow_of_turned =
+                || volumes[own] > 0.0 && around(own).len() % 2 == 1 && around(own).iter().any(|other| is_turned(*other));
+            if is_turned(own) || is_hollow_of_turned() {
+                turned.extend(&shells[own].triangles);
+            }
+        }
+    }
+    let mut names = BTreeSet::new();
+    let mut turned_normals: BTreeSet<(u32, u32)> = BTreeSet::new();
+    for (number, triangle) in turned {
+        let mesh = &mut scene.meshes[number as usize];
+        names.insert(format!("mesh '{}'", mesh.name));
+        mesh.triangles[triangle as usize].swap(1, 2);
+        for tangents in [&mut mesh.tangents, &mut mesh.coat_tangents] {
+            if let Some(corners) = tangents.get_mut(triangle as usize) {
+                corners.swap(1, 2);
+            }
+        }
+        if !mesh.normals.is_empty() {
+            let front = mesh.normal(triangle as usize);
+            for vertex in mesh.triangles[triangle as usize] {
+                let normal = &mut mesh.normals[vertex as usize];
+                if normal.dot(front) < 0.0 && turned_normals.insert((number, vertex)) {
+                    *normal = -*normal;
+                }
+            }
+        }
+    }
+    names
+}
+
+/// The most solids that lie in one another anywhere, as far as places just inside of their shells tell, if it may be more than `few`; and
+/// a mesh that has so many around it.
+pub fn most_nested(scene: &Scene, few: usize, corners_of: impl Fn(u32, u32) -> [DVec3; 3]) -> Option<(usize, u32)> {
+    let shells: Vec<Shell> = shells(scene, corners_of).into_values().flatten().collect();
+    let meet = |a: &Shell, b: &Shell| a.min.cmple(b.max).all() && b.min.cmple(a.max).all();
+    let mut order: Vec<&Shell> = shells.iter().collect();
+    order.sort_by(|a, b| a.min.x.total_cmp(&b.min.x));
+    let mut most: Option<(usize, u32)> = None;
+    for (place, shell) in order.iter().enumerate() {
+        // Along one axis, those that begin before this one does and those that begin before it ends.
+        let after = order[place + 1..].iter().take_while(|other| other.min.x <= shell.max.x);
+        let near: Vec<&Shell> = order[..place].iter().chain(after).copied().filter(|other| meet(shell, other)).collect();
+        if near.len() < few {
+            continue;
+        }
+        let step = shell.corners.len().div_ceil(PLACES);
+        for triangle in (0..shell.corners.len()).step_by(step) {
+            let [a, b, c] = shell.corners[triangle];
+            let inside = shell.middle(triangle) - (b - a).cross(c - a).normalize_or_zero() * (1e-6 * (shell.max - shell.min).length());
+            // Its own side is known, whatever rounding says.
+            let depth = 1 + near.iter().map(|other| other.winding(inside)).sum::<i32>().max(0) as usize;
+            if depth > few && most.is_none_or(|(known, _)| depth > known) {
+                most = Some((depth, shell.triangles[triangle].0));
+            }
+        }
+    }
+    most
+}
