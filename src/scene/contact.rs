@@ -4,9 +4,9 @@
 //! - **Opaque surfaces** that some side shows both of count once: [`super::overlap`] cuts the others out.
 //! - **An opaque surface and a solid**, as a table and the glass on it: the opaque one counts from both sides, and the solid has no face
 //!   there. Light goes from the one into the other with nothing between.
-//! - **A sheet that lets light through**, by gaps of alpha or as a thin wall, is glued onto what it lies on: both count, the sheet first.
-//!   It is a hair above ([`super::hair`]), so that a ray that passes it meets the other. Sheets of one material count once.
-//! - **Two solids**: light goes from one to the other with no air between. They reach into each other by a hair; where both faces look the
+//! - **A sheet that lets light through**, by gaps of alpha or as a thin wall, lies on the other: both count, the sheet first. It is moved
+//!   slightly above ([`super::contact_offsets`]), so that a ray that passes it meets the other. Sheets of one material count once.
+//! - **Two solids**: light goes from one to the other with no air between. They are moved slightly into each other; where both faces look the
 //!   same way, the smaller lies inside the larger.
 
 use std::collections::HashMap;
@@ -31,8 +31,8 @@ pub enum Contact {
     None,
     /// One counts, by [`super::overlap::ranks`].
     Once,
-    /// Both count, and are moved apart, or into each other, by a hair.
-    Hair,
+    /// Both count, and are moved slightly apart or into each other.
+    Both,
 }
 
 /// A surface as others that touch it see it.
@@ -47,7 +47,7 @@ impl Touching<'_> {
     pub fn contact(&self, other: &Touching, cosine: f64) -> Contact {
         let shows_both = cosine > 0.0 || self.material.has_two_sides() || other.material.has_two_sides();
         match (self.kind, other.kind) {
-            (Kind::Solid, Kind::Solid) if has_medium(self.material) && has_medium(other.material) => Contact::Hair,
+            (Kind::Solid, Kind::Solid) if has_medium(self.material) && has_medium(other.material) => Contact::Both,
             (Kind::Solid, Kind::Solid) => {
                 if cosine > 0.0 {
                     Contact::Once
@@ -59,7 +59,7 @@ impl Touching<'_> {
             _ if !shows_both => Contact::None,
             (Kind::Opaque, Kind::Opaque) => Contact::Once,
             (Kind::Sheet, Kind::Sheet) if std::ptr::eq(self.material, other.material) => Contact::Once,
-            _ => Contact::Hair,
+            _ => Contact::Both,
         }
     }
 }

@@ -7,12 +7,12 @@ pub mod bvh;
 pub mod camera;
 pub mod closed_forms;
 pub mod contact;
+pub mod contact_offsets;
 pub mod daylight;
 pub mod file;
 pub mod film;
 pub mod geometry;
 pub mod gltf;
-pub mod hair;
 pub mod light;
 pub mod light_tree;
 pub mod linear_picture;
@@ -97,7 +97,7 @@ impl Scene {
         match path.extension().and_then(|extension| extension.to_str()).map(str::to_lowercase).as_deref() {
             Some("gltf" | "glb") => {
                 let mut scene = gltf::load(path, reading, progress)?;
-                hair::settle(&mut scene);
+                contact_offsets::apply(&mut scene);
                 Ok(scene)
             }
             _ if path.is_file() => {

@@ -18,7 +18,7 @@ use glam::{DVec2, DVec3, Vec2, Vec2Swizzles as _, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::bvh::Bvh;
-use super::hair::Moves;
+use super::contact_offsets::Offsets;
 use super::material::TextureUse;
 use super::planes::{Planes, for_equals, hash_of};
 use super::texture::{Filter, LINEAR_OF_SRGB, Texels, Wrap};
@@ -125,9 +125,9 @@ impl Geometry {
         }
         progress("preparing triangles", 0.0);
         let kinds = contact::kinds(scene);
-        let moves = Moves::of(scene, &kinds);
+        let offsets = Offsets::of(scene, &kinds);
         let mut corners: Vec<[Vec3; 3]> =
-            sources.par_iter().map(|&(mesh, triangle)| moves.corners(scene, mesh, triangle).map(local)).collect();
+            sources.par_iter().map(|&(mesh, triangle)| offsets.corners(scene, mesh, triangle).map(local)).collect();
         // What f32 makes a line of cannot be hit, and its normal would be no number; on a device that takes numbers
         // without a leading 1 for nothing, neither would that of a square below the least normal one.
         let is_solid = |[a, b, c]: &[Vec3; 3]| (*b - *a).cross(*c - *a).length_squared() >= f32::MIN_POSITIVE;
@@ -212,7 +212,7 @@ impl Geometry {
         let mut layered_materials = layered::records(scene, unit)
             .map_err(|count| refuse(scene, "the scene", format!("has solids of {count} different media; at most 255 can be told apart")))?;
         let layer_turns: Vec<_> = scene.materials.iter().map(|material| layered::turns(material, &scene.textures)).collect();
-        let medium_bits = medium_bits(scene, &layered_materials, &moves)?;
+        let medium_bits = medium_bits(scene, &layered_materials, &offsets)?;
         let layers_of = |(&place, &(mesh, triangle)): (&u32, &(u32, u32))| {
             let mesh = &scene.meshes[mesh as usize];
             layered::of_triangle(mesh, triangle as usize, part_of(place), &layer_turns[mesh.material])
@@ -363,10 +363,10 @@ impl Geometry {
 }
 
 /// How many bits each medium gets: so many that all solids that lie in one another have room in a word.
-fn medium_bits(scene: &Scene, materials: &[LayeredMaterial], moves: &Moves) -> Result<u32> {
+fn medium_bits(scene: &Scene, materials: &[LayeredMaterial], offsets: &Offsets) -> Result<u32> {
     const USUAL: u32 = 8;
     let few = 32 / USUAL;
-    let Some((depth, mesh)) = solids::most_nested(scene, few as usize, |mesh, triangle| moves.corners(scene, mesh, triangle)) else {
+    let Some((depth, mesh)) = solids::most_nested(scene, few as usize, |mesh, triangle| offsets.corners(scene, mesh, triangle)) else {
         return Ok(USUAL);
     };
     let media = materials.iter().map(|material| material.medium).max().unwrap_or(0);

@@ -8,7 +8,7 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 
-use crate::scene::hair::Moves;
+use crate::scene::contact_offsets::Offsets;
 use crate::scene::material::{TextureUse, UvTransform};
 use crate::scene::{Material, Mesh, Scene, Surface, contact, overlap};
 
@@ -135,8 +135,8 @@ impl<'a> Geometry<'a> {
     pub fn new(scene: &'a Scene) -> Geometry<'a> {
         let mut triangles = Vec::new();
         let kinds = contact::kinds(scene);
-        let moves = Moves::of(scene, &kinds);
-        let corners_of = |mesh: u32, triangle: u32| moves.corners(scene, mesh, triangle);
+        let offsets = Offsets::of(scene, &kinds);
+        let corners_of = |mesh: u32, triangle: u32| offsets.corners(scene, mesh, triangle);
         let overlaps = overlap::of_scene(scene, &kinds, corners_of);
         for (number, mesh) in (0u32..).zip(&scene.meshes) {
             for index in (0..mesh.triangles.len()).filter(|index| mesh.area(*index) > 0.0) {

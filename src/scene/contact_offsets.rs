@@ -1,6 +1,5 @@
-//! Surfaces that touch and of which both count ([`super::contact`]): they are moved by a hair, some two millionths of the scene, so that
-//! rays meet the one, then the other. A sheet goes off what it lies on, to the side from which both are seen; a solid goes into the one
-//! beside it.
+//! Offsets of surfaces that touch and of which both count ([`super::contact`]): some two millionths of the scene's size, so that rays
+//! meet one, then the other. A sheet is moved off what it lies on, to the side from which both are seen; a solid into the one beside it.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -12,27 +11,27 @@ use super::planes::IN_PLANE;
 use super::{Mesh, Scene};
 
 /// In units of the scene: four times what lies in one plane. Where rays start is known to a quarter of it.
-const HAIR: f64 = 4.0 * IN_PLANE;
+const OFFSET: f64 = 4.0 * IN_PLANE;
 
-/// Sheets of different materials that lie on one another, each a hair above the next; of more, the uppermost lie in one plane.
+/// Sheets of different materials that lie on one another, each one offset above the next; of more, the uppermost lie in one plane.
 const MOST_LEVELS: u32 = 16;
 
 /// Directions that differ by less than this sine are one: facets of a curved surface.
 const LEAST_SINE: f64 = 0.1;
 
-/// Where vertices go: by mesh and vertex.
+/// By mesh and vertex, metres.
 #[derive(Debug, Default)]
-pub struct Moves(HashMap<(u32, u32), DVec3>);
+pub struct Offsets(HashMap<(u32, u32), DVec3>);
 
-/// That a vertex is to go so far along a direction.
-struct Wish {
+/// How far a vertex moves along a direction.
+struct Step {
     along: DVec3,
     by: f64,
     /// `None`: a face of a solid, which takes the rest of its solid along.
     sheet: Option<u32>,
 }
 
-impl Moves {
+impl Offsets {
     /// Corners of a triangle.
     pub fn corners(&self, scene: &Scene, mesh: u32, triangle: u32) -> [DVec3; 3] {
         let of = &scene.meshes[mesh as usize];
@@ -43,12 +42,12 @@ impl Moves {
             .map(|vertex| of.positions[vertex as usize] + self.0.get(&(mesh, vertex)).copied().unwrap_or(DVec3::ZERO))
     }
 
-    /// What a scene needs.
-    pub fn of(scene: &Scene, kinds: &[Kind]) -> Moves {
+    /// Those that a scene needs.
+    pub fn of(scene: &Scene, kinds: &[Kind]) -> Offsets {
         let (min, max) = scene.bounds();
         let (centre, extent) = (0.5 * (min + max), (max - min).max_element());
         if kinds.iter().all(|kind| *kind == Kind::Opaque) || !extent.is_normal() {
-            return Moves::default();
+            return Offsets::default();
         }
         // As scenes are normalised.
         let unit = 2f64.powi(extent.log2().ceil() as i32);
@@ -62,9 +61,9 @@ impl Moves {
             .unzip();
         let kind_of = |triangle: u32| kinds[sources[triangle as usize].0 as usize];
         let is_candidate = |triangle: u32| kind_of(triangle) != Kind::Opaque;
-        let mut pairs = overlap::pairs(scene, kinds, &sources, &corners, Contact::Hair, is_candidate, |_| ());
+        let mut pairs = overlap::pairs(scene, kinds, &sources, &corners, Contact::Both, is_candidate, |_| ());
         if pairs.is_empty() {
-            return Moves::default();
+            return Offsets::default();
         }
         let ranks = overlap::ranks(scene, kinds);
         let place = |triangle: u32| {
@@ -79,29 +78,29 @@ impl Moves {
         pairs.retain(|(a, b)| !is_double(&corners[*a as usize], &corners[*b as usize]));
         let levels = levels(&pairs, &sources, kinds, &ranks);
         let sheet = |triangle: u32| Sheet::new(scene, kinds, sources[triangle as usize].0, corners[triangle as usize]);
-        let mut wishes: HashMap<(usize, [u64; 3]), Vec<Wish>> = HashMap::new();
+        let mut steps: HashMap<(usize, [u64; 3]), Vec<Step>> = HashMap::new();
         for (mover, other) in pairs {
             let (mesh, triangle) = sources[mover as usize];
             let (own, beside) = (sheet(mover), sheet(other));
-            let wish = || match kinds[mesh as usize] {
-                Kind::Sheet => Wish {
+            let step = || match kinds[mesh as usize] {
+                Kind::Sheet => Step {
                     along: if beside.of.material.has_two_sides() { own.normal } else { beside.normal },
-                    by: f64::from(levels[&mesh]) * HAIR * unit,
+                    by: f64::from(levels[&mesh]) * OFFSET * unit,
                     sheet: Some(mesh),
                 },
-                _ => Wish { along: own.normal, by: -own.normal.dot(beside.normal).signum() * HAIR * unit, sheet: None },
+                _ => Step { along: own.normal, by: -own.normal.dot(beside.normal).signum() * OFFSET * unit, sheet: None },
             };
             let of = &scene.meshes[mesh as usize];
-            of.corners(triangle as usize).iter().for_each(|corner| wishes.entry((of.material, bits(*corner))).or_default().push(wish()));
+            of.corners(triangle as usize).iter().for_each(|corner| steps.entry((of.material, bits(*corner))).or_default().push(step()));
         }
         let meshes = (0u32..).zip(&scene.meshes);
-        Moves(meshes.flat_map(|(number, mesh)| moves_of(number, mesh, &wishes, IN_PLANE * unit)).collect())
+        Offsets(meshes.flat_map(|(number, mesh)| offsets_of(number, mesh, &steps, IN_PLANE * unit)).collect())
     }
 }
 
-/// Moves a scene's surfaces that touch, for good.
-pub fn settle(scene: &mut Scene) {
-    for ((mesh, vertex), way) in Moves::of(scene, &contact::kinds(scene)).0 {
+/// Moves the vertices of a scene's surfaces that touch.
+pub fn apply(scene: &mut Scene) {
+    for ((mesh, vertex), way) in Offsets::of(scene, &contact::kinds(scene)).0 {
         scene.meshes[mesh as usize].positions[vertex as usize] += way;
     }
 }
@@ -116,7 +115,7 @@ fn is_double(one: &[Vec3; 3], other: &[Vec3; 3]) -> bool {
     (0..3).any(|turn| (0..3).all(|corner| one[corner] == other[(corner + turn) % 3]))
 }
 
-/// How many hairs each sheet is off what lies below all.
+/// How many offsets each sheet lies above what is below all.
 fn levels(pairs: &[(u32, u32)], sources: &[(u32, u32)], kinds: &[Kind], ranks: &[u32]) -> BTreeMap<u32, u32> {
     let mesh_of = |triangle: u32| sources[triangle as usize].0;
     let mut below: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
@@ -133,45 +132,45 @@ fn levels(pairs: &[(u32, u32)], sources: &[(u32, u32)], kinds: &[Kind], ranks: &
     levels
 }
 
-/// Where the vertices of a mesh go.
-fn moves_of(number: u32, mesh: &Mesh, wishes: &HashMap<(usize, [u64; 3]), Vec<Wish>>, in_plane: f64) -> Vec<((u32, u32), DVec3)> {
-    let wishes_at = |vertex: u32| wishes.get(&(mesh.material, bits(mesh.positions[vertex as usize])));
+/// The offsets of a mesh's vertices.
+fn offsets_of(number: u32, mesh: &Mesh, steps: &HashMap<(usize, [u64; 3]), Vec<Step>>, in_plane: f64) -> Vec<((u32, u32), DVec3)> {
+    let steps_at = |vertex: u32| steps.get(&(mesh.material, bits(mesh.positions[vertex as usize])));
     // A solid that touches another of its material has vertices at the same places: whose they are, tells the side that their triangles
     // lie on.
     let mut others: HashSet<(u32, usize)> = HashSet::new();
     for (triangle, vertices) in mesh.triangles.iter().enumerate() {
         for vertex in vertices {
-            for (k, wish) in wishes_at(*vertex).into_iter().flatten().enumerate().filter(|(_, wish)| wish.sheet.is_none()) {
-                let heights = mesh.corners(triangle).map(|corner| wish.along.dot(corner - mesh.positions[*vertex as usize]));
+            for (k, step) in steps_at(*vertex).into_iter().flatten().enumerate().filter(|(_, step)| step.sheet.is_none()) {
+                let heights = mesh.corners(triangle).map(|corner| step.along.dot(corner - mesh.positions[*vertex as usize]));
                 let lies_in = heights.iter().all(|height| height.abs() <= in_plane);
                 let is_other =
-                    if lies_in { mesh.normal(triangle).dot(wish.along) < 0.0 } else { heights.iter().any(|height| *height > in_plane) };
+                    if lies_in { mesh.normal(triangle).dot(step.along) < 0.0 } else { heights.iter().any(|height| *height > in_plane) };
                 if is_other {
                     others.insert((*vertex, k));
                 }
             }
         }
     }
-    let mut moves = Vec::new();
+    let mut offsets = Vec::new();
     for vertex in 0..mesh.positions.len() as u32 {
-        let wanted = wishes_at(vertex).into_iter().flatten().enumerate();
-        let own = wanted.filter(|(k, wish)| wish.sheet.map_or(!others.contains(&(vertex, *k)), |of| of == number));
-        let way = together(own.map(|(_, wish)| wish));
+        let wanted = steps_at(vertex).into_iter().flatten().enumerate();
+        let own = wanted.filter(|(k, step)| step.sheet.map_or(!others.contains(&(vertex, *k)), |of| of == number));
+        let way = together(own.map(|(_, step)| step));
         if way != DVec3::ZERO {
-            moves.push(((number, vertex), way));
+            offsets.push(((number, vertex), way));
         }
     }
-    moves
+    offsets
 }
 
-/// The least way that goes as far along every direction as is wished; of directions that are nearly one the first counts.
-fn together<'a>(wishes: impl Iterator<Item = &'a Wish>) -> DVec3 {
+/// The shortest offset with all of these steps; of directions that are nearly the same the first counts.
+fn together<'a>(steps: impl Iterator<Item = &'a Step>) -> DVec3 {
     let mut way = DVec3::ZERO;
     let mut known: Vec<DVec3> = Vec::new();
-    for wish in wishes {
-        let rest = known.iter().fold(wish.along, |rest, direction| rest - *direction * direction.dot(rest));
+    for step in steps {
+        let rest = known.iter().fold(step.along, |rest, direction| rest - *direction * direction.dot(rest));
         if known.len() < 3 && rest.length() > LEAST_SINE {
-            way += rest * ((wish.by - wish.along.dot(way)) / rest.length_squared());
+            way += rest * ((step.by - step.along.dot(way)) / rest.length_squared());
             known.push(rest.normalize());
         }
     }
