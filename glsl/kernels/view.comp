@@ -13,6 +13,10 @@ layout(push_constant, scalar) uniform Push { ViewPush push; };
 #include "world/scene/seen_sky.glsl"
 #include "world/scene/tiles.glsl"
 
+// Of the eye from the middle of the scene, which lies within 0.87 of it: from farther away rays start so far before the middle.
+const float FAR_EYE = 8.0;
+const float NEAR_START = 1.5;
+
 void main()
 {
     work = push.work;
@@ -46,10 +50,10 @@ void main()
         way = push.focus * way - start;
     }
     vec3 direction = normalize(way);
-    // From very far away distances to surfaces that touch are one number: the ray starts short of the scene.
+    // From far away surfaces that lie on one another are at the same distance, as it is rounded.
     float distance_to_middle = norm(origin);
-    if (distance_to_middle > 8.0) {
-        origin += (distance_to_middle - 1.5) * direction;
+    if (distance_to_middle > FAR_EYE) {
+        origin += (distance_to_middle - NEAR_START) * direction;
     }
 
     start_chain(origin, direction, vec3(1.0));

@@ -64,6 +64,7 @@ enum Question {
     LeaningScatterer,
     PatchInPlane,
     StackFromAfar,
+    OneCorner,
     CoarseMirror,
     CoarseGlass,
     RoomBesideHall,
@@ -77,6 +78,7 @@ enum Question {
     HiddenLamp,
     LampBehindHole,
     SecondOpening,
+    Skylight,
     DimPhotons,
     TinyPlates,
     VertexColours,
@@ -161,7 +163,7 @@ impl Question {
             | CoatsAndBacks
             | PhotonsOffAPane
             | BlendedLamp => Subject::Layers,
-            BrightSpot | DimRoom(_) | ManyLamps(_) | MissedLamp | HiddenLamp | LampBehindHole | SecondOpening | DimPhotons => {
+            BrightSpot | DimRoom(_) | ManyLamps(_) | MissedLamp | HiddenLamp | LampBehindHole | SecondOpening | Skylight | DimPhotons => {
                 Subject::Lamps
             }
             _ => Subject::Scenes,
@@ -182,7 +184,7 @@ struct Fault {
 }
 
 #[rustfmt::skip]
-const FAULTS: [Fault; 139] = [
+const FAULTS: [Fault; 141] = [
     Fault { what: "what rounding takes from a pair of floats is forgotten",
         file: "film/float_u64.glsl", from: "precise float rest = sum.y + (", to: "precise float rest = 0.0 * (",
         kernels: &["gather_brute_u64", "gather_grid_u64"], noticed_by: &[(Pairs, SumsTooSmall)] },
@@ -397,7 +399,10 @@ const FAULTS: [Fault; 139] = [
         kernels: &["trace_persistent_scene", "trace_scene_ballot"], noticed_by: &[(PatchInPlane, PhotonsAdded)] },
     Fault { what: "of triangles equally near, the first that is tested is met",
         file: "world/scene/bvh.glsl", from: "t < hit.t || (t == hit.t && index < hit.triangle)", to: "t < hit.t",
-        kernels: &["view"], noticed_by: &[(StackFromAfar, OtherSums)] },
+        kernels: &["view"], noticed_by: &[(OneCorner, OtherSums)] },
+    Fault { what: "rays of a far eye start at the eye",
+        file: "kernels/view.comp", from: "if (distance_to_middle > FAR_EYE) {", to: "if (false) {",
+        kernels: &["view"], noticed_by: &[(StackFromAfar, TooDark)] },
     Fault { what: "shadow rays end 0.5 % before their lamp",
         file: "world/scene/direct.glsl", from: "arriving.wi : arriving.target - start;", to: "arriving.wi : 0.995 * (arriving.target - start);",
         kernels: &["receive"], noticed_by: &[(LampInBox(Illumination::Split), Leak)] },
@@ -490,6 +495,9 @@ const FAULTS: [Fault; 139] = [
     Fault { what: "the sky beside the openings that are known counts as seen",
         file: "world/scene/lights.glsl", from: "arriving.is_beside = !sampled.is_aimed;", to: "",
         kernels: &["receive"], noticed_by: &[(SecondOpening, TooDark)] },
+    Fault { what: "where no known opening shows the sun, the sky's table is not asked",
+        file: "world/scene/openings.glsl", from: "const float LEAST_BY_TABLE = 0.25;", to: "const float LEAST_BY_TABLE = 0.0;",
+        kernels: &["receive"], noticed_by: &[(Skylight, TooDark)] },
     Fault { what: "what stands before hidden lamps is forgotten",
         file: "world/scene/direct.glsl", from: "stopped_unseen_light = is_unseen ? max(stopped_unseen_light, stopped) : stopped_unseen_light;", to: "",
         kernels: &["receive"], noticed_by: &[(LampBehindHole, TooDark)] },
@@ -753,6 +761,7 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         LeaningScatterer => known::leaning_scatterer(gpu),
         PatchInPlane => known::patch_in_a_plane(gpu),
         StackFromAfar => known::stack_from_afar(gpu),
+        OneCorner => known::triangles_of_one_corner(gpu),
         CoarseMirror => known::coarse_sphere_in_a_furnace(gpu, mirror(1.0), 8),
         CoarseGlass => known::coarse_sphere_in_a_furnace(gpu, glass(1.5), 8),
         RoomBesideHall => known::room_beside_a_hall(gpu, true),
@@ -764,6 +773,7 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         TinyPlates => known::tiny_plates(gpu),
         LampBehindHole => crate::engine::unseen_light::hidden_lamp(gpu),
         SecondOpening => crate::light::openings::second_opening(gpu),
+        Skylight => crate::light::openings::sun_through_a_small_window(gpu),
         DimPhotons => crate::engine::unseen_light::dim_photons(gpu),
         VertexColours => known::vertex_colours(gpu),
         ManyLamps(side) => lamps::many_lamps(gpu, side, true),
