@@ -543,6 +543,8 @@ struct PhotonStore {
     uint stored;
     // 1: photons end where they scatter, as those of a caustic map do.
     uint caustic_only;
+    // 1: and so each lands once at most, as no surface that keeps photons lets light pass.
+    uint lands_once;
     // Mask of the surfaces (1 << `SURFACE_...`) whose caustics are wanted.
     uint caustic_surfaces;
 };
@@ -585,6 +587,7 @@ struct TryLightsPush {
     // Pairs of a point and a cluster, cluster by cluster of each point.
     uint first_pair;
     uint end_pair;
+    uint cluster_count;
     // Shadow rays of each.
     uint ray_count;
 };

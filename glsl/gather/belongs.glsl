@@ -3,7 +3,8 @@
 // Only planes decide what belongs: that of the visible point, and that of a photon or a triangle. So photons are counted
 // on the very surfaces whose area is.
 
-// Unit normal n of the front, and what makes n . p + offset = 0: one load each.
+// Unit normal n of the front, and what makes n . p + offset = 0: one load each. The last one has, as bits, the number of the first plane
+// that only sheets of points in the air lie in (src/scene/sensors.rs).
 layout(set = 0, binding = 9, scalar) readonly buffer Planes { vec4 planes[]; };
 
 // Least cosine between normals: 41 degrees take in the facets of a curved surface, no box's corner.
@@ -33,6 +34,16 @@ float plane_height(uint plane, vec3 position)
 bool belongs(vec3 normal, vec3 other, float height, float radius)
 {
     return dot(normal, other) >= MIN_NORMAL_COSINE && abs(height) <= radius * norm(cross(normal, other)) + HEIGHT_ERROR;
+}
+
+// Whether one of two planes, with their sides, is that of points in the air: such a sheet goes over into no other surface.
+bool are_apart(uint plane, uint other)
+{
+    if (HAS_PASSING) {
+        uint first = floatBitsToUint(planes[planes.length() - 1].x);
+        return plane != other && max(plane, other) >> 1 >= first;
+    }
+    return false;
 }
 
 // Weight of a photon at the squared share `s` of the radius.

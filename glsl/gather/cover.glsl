@@ -92,7 +92,7 @@ bool may_cover(Cover cover, uint plane, vec3 side, float height, float radius)
         return false;
     }
     if (cover.plane != NONE) {
-        return plane == cover.plane || belongs(cover.normal, side, height, radius);
+        return plane == cover.plane || (belongs(cover.normal, side, height, radius) && !are_apart(cover.plane, plane));
     }
     float cosine = dot(cover.normal, side);
     float sine = sqrt(max(1.0 - cosine * cosine, 0.0));

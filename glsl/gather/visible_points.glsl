@@ -134,7 +134,8 @@ void gather_photons()
                         photon_normal = plane_normal(words.w);
                         height = plane_height(words.w, point.position);
                     }
-                    bool counts = (is_alike || belongs(normal, photon_normal, height, radius)) && !(has_cuts && is_cut_off(cuts, way))
+                    bool may_count = is_alike || (belongs(normal, photon_normal, height, radius) && !are_apart(point.plane, words.w));
+                    bool counts = may_count && !(has_cuts && is_cut_off(cuts, way))
                                   && ((point.arrivals >> (light.w >> 30)) & 1u) != 0;
                     vec3 wi = ns;
                     float cosine = 1.0;

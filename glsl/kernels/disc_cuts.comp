@@ -57,7 +57,7 @@ vec3 on_site(Site site, vec3 position)
 void look_at(Site site, uint index, Cuts cuts, inout Foot nearest)
 {
     Triangle triangle = triangles[index];
-    if (triangle.plane >= HIDDEN) {
+    if (triangle.plane >= HIDDEN || is_not_there(triangle.material)) {
         return;
     }
     vec3 a = on_site(site, triangle.a), b = on_site(site, triangle.b), c = on_site(site, triangle.c);

@@ -45,7 +45,8 @@ uvec2 photons_near(VisiblePoint point, float radius)
                 float squared = way.x * way.x + way.y * way.y + way.z * way.z;
                 bool counts = squared <= radius * radius && cell_at(position, push.cells).yz == ivec2(y, z);
                 if (counts && words.w != point.plane) {
-                    counts = belongs(normal, plane_normal(words.w), plane_height(words.w, point.position), radius);
+                    counts = belongs(normal, plane_normal(words.w), plane_height(words.w, point.position), radius)
+                             && !are_apart(point.plane, words.w);
                 }
                 found += uvec2(counts, counts && squared <= 0.25 * radius * radius);
             }

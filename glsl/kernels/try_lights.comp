@@ -26,8 +26,8 @@ void main()
     if (pair >= push.end_pair) {
         return;
     }
-    uint cluster = pair % LIGHT_CLUSTERS;
-    Receiver receiver = receivers[pair / LIGHT_CLUSTERS];
+    uint cluster = pair % push.cluster_count;
+    Receiver receiver = receivers[pair / push.cluster_count];
     // It may lie on a triangle whose corners are known no better than the point.
     Target here = plain_target(receiver.position, 4.0 * position_error(receiver.position), receiver.normal, receiver.shading_normal,
                          receiver.shading_normal, SURFACE_RECEIVER, 0.0);

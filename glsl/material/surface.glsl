@@ -339,6 +339,16 @@ Surface surface_at(Hit hit, vec3 wo)
 
 #include "material/media.glsl"
 
+// Whether all light passes a material as if it were not there, such as that of sheets for points in the air (src/scene/sensors.rs).
+bool is_not_there(uint material)
+{
+    if (HAS_PASSING) {
+        LayeredMaterial layered = layered_materials[material];
+        return materials[material].surface == SURFACE_LAYERED && layered.coverage == COVERAGE_BLEND && layered.alpha == 0.0;
+    }
+    return false;
+}
+
 // Whether photons are stored on a material, and so whether its area is what they are counted over: both ask here. Light leaves mirrors
 // and glass in single directions, so that no density can tell it.
 bool keeps_photons(uint material)

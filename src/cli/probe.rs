@@ -1,5 +1,6 @@
 //! `photonmill probe`: irradiance at given points, as Radiance's `rtrace -I` gives it.
 
+use std::borrow::Cow;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -19,6 +20,7 @@ use crate::output::scene_report;
 use crate::plan::sensor::Sensor;
 use crate::plan::work_division::Free;
 use crate::render::{MAX_POINTS, point_of};
+use crate::scene::sensors::with_sensors;
 use crate::text::{counted, echo, refusal};
 
 #[derive(Args)]
@@ -57,6 +59,8 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
 
     let reporter = ProgressReporter::new(&args.messages.progress);
     let scene = args.scene.open(&reporter)?;
+    // Photons of a file are those of the scene alone.
+    let scene = if map.is_some() { Cow::Borrowed(&scene) } else { with_sensors(&scene, &points, &settings) };
     let geometry = geometry(&scene, &settings, &reporter)?;
     let far = geometry.place_warning("points", points.iter().map(|(position, _)| *position));
     far.iter().for_each(|line| complain(&format!("warning: {line}")));

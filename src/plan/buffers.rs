@@ -216,11 +216,11 @@ impl ScenePlan {
         let (textured, layered) = (self.keeps(Effect::Textures), self.keeps(Effect::Layers));
         let has_tangents = textured || self.keeps(Effect::Anisotropy);
         let has_texels = textured || (self.keeps(Effect::Environment) && geometry.has_sky_picture());
-        let (nodes, regions, shares) = self.lights().map_or((0, 0, 0), |of| (of.nodes.len(), of.regions.len(), of.shares.len()));
+        let (nodes, regions, shares) = self.lights().map_or((0, 0, 0), |of| (of.nodes.len(), of.regions.len(), of.shares.len() + 1));
         vec![
             of("nodes", &geometry.nodes, self.keeps(Effect::Bvh), "the triangles' hierarchy"),
             of("triangles", &geometry.triangles, true, "triangles"),
-            of::<Vec4>("planes", &geometry.planes, true, "the triangles' planes"),
+            buffer::<Vec4>("planes", geometry.planes.len() as u64 + 1, "the triangles' planes"),
             of("normals", &geometry.normals, self.keeps(Effect::SmoothNormals), "the triangles' normals"),
             of("texture coordinates", &geometry.uvs, textured, "the triangles' texture coordinates"),
             of("vertex colours", &geometry.colours, self.keeps(Effect::VertexColours), "the triangles' vertex colours"),

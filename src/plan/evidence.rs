@@ -143,7 +143,9 @@ impl<'a> Facts<'a> {
             Effect::Indirect if !wants(Part::Indirect) => (false, format!("only {:?} light was asked for", self.part).to_lowercase()),
             Effect::Indirect => {
                 // What a layered surface reflects beside its colour is light, too.
-                let is_bright = |material: &Material| material.surface == Surface::Layered || material.base_colour.max_element() > 0.0;
+                let is_bright = |material: &Material| {
+                    !material.is_not_there() && (material.surface == Surface::Layered || material.base_colour.max_element() > 0.0)
+                };
                 match self.named(|material, kinds| kinds.matt && is_bright(material)) {
                     Some(names) => (true, format!("diffuse or glossy: {names}")),
                     None => (false, "every diffuse or glossy surface is black".into()),

@@ -125,6 +125,11 @@ impl LightChoice {
         format!("; chosen among {clusters} by what a trial saw of them in {regions}")
     }
 
+    /// Shares as kernels have them: behind the number of clusters.
+    pub fn words(&self) -> Vec<f32> {
+        [&[f32::from_bits(self.clusters)], self.shares.as_slice()].concat()
+    }
+
     /// Device memory that exists for it.
     pub(super) fn bytes(&self) -> u64 {
         (size_of_val(self.nodes.as_slice()) + size_of_val(self.regions.as_slice()) + size_of_val(self.shares.as_slice())) as u64

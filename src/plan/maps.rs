@@ -57,8 +57,8 @@ impl Maps {
             | of(caustics && !split, ARRIVED_CAUSTIC)
             | of(keeps(Effect::Indirect), ARRIVED_INDIRECT);
 
-        let landings = expected_landings(scene, settings.bounces);
-        let map = |caustic_only, stored| map(caustic_only, stored, geometry, settings, limits, trial, landings);
+        let landings = Landings::of(scene, settings.bounces);
+        let map = |caustic_only, stored| map(caustic_only, stored, geometry, settings, limits, trial, &landings);
         // Without a light there is nothing to trace.
         let has_light = !geometry.emitters.is_empty();
         let global = (has_light && stored != 0).then(|| map(false, stored)).transpose()?;
@@ -77,7 +77,7 @@ fn map(
     settings: &SceneSettings,
     limits: &Limits,
     trial: Option<&Trial>,
-    landings_of_each: f64,
+    landings: &Landings,
 ) -> Result<MapPlan> {
     let (name, domain, photons, neighbours, radius) = if caustic_only {
         let radius = ("--caustic-radius", settings.caustic_radius);
@@ -86,14 +86,15 @@ fn map(
         ("global", DOMAIN_PHOTONS, settings.photons, settings.neighbours, ("--radius", settings.radius))
     };
     let FirstRadius { radius, from, expected, classes } = FirstRadius::new(geometry, (photons, neighbours), caustic_only, radius, trial)?;
-    // Photons of a round land once at every bounce at most; a caustic's only once.
-    let landings = if caustic_only { 1 } else { u64::from(settings.bounces.min(SEGMENT_BOUNCES)) };
-    let chunk_photons = chunk_photons(photons, landings, settings, limits)?;
-    let capacity = chunk_photons * landings as u32;
-    let fits = caustic_only || settings.bounces <= SEGMENT_BOUNCES || {
+    // Photons of a round land once at every bounce at most; a caustic's only once, but for what they pass.
+    let lands_once = caustic_only && !landings.some_pass;
+    let most_landings = if lands_once { 1 } else { u64::from(settings.bounces.min(SEGMENT_BOUNCES)) };
+    let chunk_photons = chunk_photons(photons, most_landings, settings, limits)?;
+    let capacity = chunk_photons * most_landings as u32;
+    let fits = lands_once || settings.bounces <= SEGMENT_BOUNCES || {
         // Ten deviations above what is expected, twice.
         let photons = f64::from(chunk_photons);
-        2.0 * landings_of_each * (photons + 10.0 * photons.sqrt()) <= f64::from(capacity)
+        2.0 * landings.expected * (photons + 10.0 * photons.sqrt()) <= f64::from(capacity)
     };
     let through_openings = !caustic_only && trial.is_some_and(|trial| !trial.openings.is_empty());
     let is_persistent = settings.builder == Some(Builder::Persistent);
@@ -111,6 +112,7 @@ fn map(
         segment_bounces,
         stored,
         caustic_only,
+        lands_once,
         bucket_count: chunk_photons.clamp(1 << 10, 1 << 24).next_power_of_two(),
         radius,
         radius_from: from,
@@ -149,19 +151,28 @@ fn aim(map: &mut MapPlan, scene: &Scene, geometry: &Geometry, caustic_surfaces: 
     targets
 }
 
-/// Landings of a photon in a map, at most on average: roulette keeps as large a share of photons as the brightest channel of the
-/// brightest surface that scatters; shading normals and rounding have room in what the plan makes of it.
-fn expected_landings(scene: &Scene, bounces: u32) -> f64 {
-    let brightest = |(material, kinds): (&Material, LobeKinds)| match material.surface {
-        // Each sheet that light passes is a landing.
-        _ if kinds.passing => 1.0,
-        // Reflection is at most some share of what a colour leaves.
-        Surface::Layered => 0.7 * f64::from(material.base_colour.max_element()) + 0.3,
-        _ => f64::from(material.base_colour.max_element()),
-    };
-    let scatterers = scene.materials.iter().zip(scene.lobe_kinds()).filter(|(_, kinds)| kinds.matt);
-    let most = scatterers.map(brightest).fold(0.0, f64::max);
-    (1.0 / (1.0 - most).max(1e-9)).min(f64::from(bounces))
+/// How often photons land in a map.
+struct Landings {
+    /// At most, on average: roulette keeps as large a share of photons as the brightest channel of the brightest surface that scatters;
+    /// shading normals and rounding have room in what the plan makes of it.
+    expected: f64,
+    /// Some surfaces that keep photons let light pass, and each of those is a landing.
+    some_pass: bool,
+}
+
+impl Landings {
+    fn of(scene: &Scene, bounces: u32) -> Landings {
+        let brightest = |(material, kinds): &(&Material, LobeKinds)| match material.surface {
+            _ if kinds.passing => 1.0,
+            // Reflection is at most some share of what a colour leaves.
+            Surface::Layered => 0.7 * f64::from(material.base_colour.max_element()) + 0.3,
+            _ => f64::from(material.base_colour.max_element()),
+        };
+        let scatterers: Vec<_> = scene.materials.iter().zip(scene.lobe_kinds()).filter(|(_, kinds)| kinds.matt).collect();
+        let most = scatterers.iter().map(brightest).fold(0.0, f64::max);
+        let expected = (1.0 / (1.0 - most).max(1e-9)).min(f64::from(bounces));
+        Landings { expected, some_pass: scatterers.iter().any(|(_, kinds)| kinds.passing) }
+    }
 }
 
 /// Flights that one invocation may take: software devices count loops, others only time, of which so many take milliseconds.

@@ -127,8 +127,8 @@ impl ScenePlan {
         let mut constants = constants(geometry, &settings, &facts, &maps, &keeps);
         constants.extend([("GATHER_RAYS", gather_rays), ("CHAIN_STEPS", chain_steps)]);
         constants.push(("HAS_SEEN_LIGHT", u32::from(is_picture)));
-        let clusters = trial.as_ref().and_then(|trial| trial.lights.as_ref()).map_or(0, |lights| lights.clusters);
-        constants.push(("LIGHT_CLUSTERS", clusters));
+        let has_clusters = trial.as_ref().is_some_and(|trial| trial.lights.is_some());
+        constants.push(("HAS_LIGHT_CLUSTERS", u32::from(has_clusters)));
         let Maps { global, caustic, caustic_surfaces, targets, arrivals } = maps;
         let tiles = settings.tiles.as_ref().filter(|_| is_picture);
         tiles.map_or(Ok(()), |tiles| tiles.check(samples, sensor.size()))?;

@@ -40,6 +40,8 @@ pub struct MapPlan {
     pub stored: u32,
     /// Photons end where they scatter.
     pub caustic_only: bool,
+    /// And so each lands once at most: no surface that keeps photons lets light pass.
+    pub lands_once: bool,
     pub bucket_count: u32,
     /// Of the first round, normalised; where it differs from point to point, that of the median one.
     pub radius: f64,
@@ -237,7 +239,7 @@ impl ScenePlan {
 
     /// How shadow rays choose lights; `None` where they do by power.
     pub fn lights(&self) -> Option<&LightChoice> {
-        self.trial.as_ref()?.lights.as_deref().filter(|_| self.constant("LIGHT_CLUSTERS") != 0)
+        self.trial.as_ref()?.lights.as_deref().filter(|_| self.constant("HAS_LIGHT_CLUSTERS") != 0)
     }
 
     /// Radius of class 0 in a round, normalised; of all points where there are no classes.

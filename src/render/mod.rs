@@ -45,6 +45,7 @@
 mod lightmaps;
 mod picture;
 
+use std::borrow::Cow;
 use std::cell::RefCell;
 use std::ops::Deref;
 use std::path::{Path, PathBuf};
@@ -65,6 +66,7 @@ use crate::plan::sensor::Sensor;
 use crate::plan::work_division::Free;
 use crate::scene::geometry::Geometry;
 use crate::scene::picture_size::PictureSize;
+use crate::scene::sensors::with_sensors;
 use crate::scene::surroundings::Surroundings;
 use crate::scene::{Camera, Reading, Scene, built_in};
 use crate::settings::request::{GOOD_ERROR, MOST_ROUNDS, longest_seconds};
@@ -193,6 +195,25 @@ impl PreparedScene {
         let allowed = format!("must be from 1 to {MAX_POINTS}, the number of points");
         require((1..=MAX_POINTS).contains(&points.len()), "--points", points.len(), allowed)?;
         let settings = request.settings(None);
+        settings.validate()?;
+        if let Cow::Owned(scene) = with_sensors(&self.scene, points, &settings) {
+            let geometry = Geometry::new(&scene)?;
+            // Of its sheets nothing is to be said.
+            let with = PreparedScene { scene: Arc::new(scene), geometry, path: self.path.clone(), warnings: Vec::new() };
+            return with.probe_as_it_is(gpus, points, request, settings, control);
+        }
+        self.probe_as_it_is(gpus, points, request, settings, control)
+    }
+
+    /// The same, of points that lie on a surface, or in the air where nothing tells what light is lost there.
+    fn probe_as_it_is(
+        &self,
+        gpus: &mut Vec<Gpu>,
+        points: &[(DVec3, DVec3)],
+        request: &Request,
+        settings: SceneSettings,
+        control: &mut Control,
+    ) -> Result<Run> {
         let (own, mut warnings) = self.geometry_of(&settings)?;
         let geometry = own.as_ref().unwrap_or(&self.geometry);
         warnings.extend(geometry.place_warning("points", points.iter().map(|(position, _)| *position)));

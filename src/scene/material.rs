@@ -388,6 +388,11 @@ impl Material {
         self.is_entered() || self.transmits() || has_gaps
     }
 
+    /// Whether all light passes it as if it were not there, whatever its textures have.
+    pub fn is_not_there(&self) -> bool {
+        self.surface == Surface::Layered && self.coverage == Coverage::Blend { alpha: 0.0 }
+    }
+
     /// Every use of a texture.
     pub fn textures(&self) -> impl Iterator<Item = TextureUse> + use<> {
         let layers = &self.layers;

@@ -25,6 +25,7 @@ pub mod picture_size;
 mod planes;
 pub mod rectangle;
 pub mod room;
+pub mod sensors;
 pub mod showcase;
 pub mod sky;
 pub mod solids;

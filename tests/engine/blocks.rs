@@ -37,6 +37,12 @@ const SCENE: &str = "cornell-spheres";
 
 /// A small picture of the scene, and what of it was saved.
 fn kept(gpu: &Gpu, settings: &SceneSettings, part: Part) -> (RunResult, SavedRun) {
+    let (lit, saved) = lit(gpu, settings, part);
+    (lit, saved.expect("a block was done"))
+}
+
+/// The same where not a block may be done.
+fn lit(gpu: &Gpu, settings: &SceneSettings, part: Part) -> (RunResult, Option<SavedRun>) {
     let scene = scene(SCENE);
     let geometry = Geometry::new(&scene).unwrap();
     let view = View { geometry: &geometry, camera: Some(&scene.first_camera()), phases: &[] };
@@ -50,17 +56,17 @@ fn kept(gpu: &Gpu, settings: &SceneSettings, part: Part) -> (RunResult, SavedRun
     let resume = part.resume.map(|run| (PathBuf::from("a file"), run));
     let keep = Keep { scene: SCENE, share: part.share, resume, every: Duration::ZERO, save: Some(&mut latest), dealt: None };
     let lit = scene::light(gpu, &view, plan, &mut Control { cancelled: &cancelled, progress: &mut watch, keep }).unwrap();
-    (lit, latest.0.expect("a block was done"))
+    (lit, latest.0)
 }
 
 fn small(block: u32, rounds: u32) -> SceneSettings {
     SceneSettings { photons: 2000, caustic_photons: 1000, shadow_rays: 2, block: Some(block), rounds, ..SceneSettings::default() }
 }
 
-#[test]
-fn parts_of_a_run_come_to_the_bits_of_one() {
+/// Of rounds of a block, samples and parts.
+fn parts_come_to_the_bits_of_one(cases: &[(u32, u32, u32)]) {
     let Some(gpu) = device() else { return };
-    for (block, samples, of) in [(1, 1, 5), (4, 2, 2)] {
+    for &(block, samples, of) in cases {
         let settings = SceneSettings { samples, ..small(block, 12) };
         let (whole, saved) = kept(&gpu, &settings, Part::default());
         assert_eq!((whole.end, whole.film.rounds, saved.missing()), (End::Rounds, 12, 0));
@@ -86,6 +92,17 @@ fn parts_of_a_run_come_to_the_bits_of_one() {
     }
 }
 
+#[test]
+fn parts_of_a_run_come_to_the_bits_of_one() {
+    parts_come_to_the_bits_of_one(&[(4, 2, 2)]);
+}
+
+#[test]
+#[ignore = "long: minutes on a software device"]
+fn many_parts_of_a_run_come_to_the_bits_of_one() {
+    parts_come_to_the_bits_of_one(&[(1, 1, 5), (4, 2, 2)]);
+}
+
 /// A run that goes on looks at its error where one without a break does, at once if it was saved there.
 #[test]
 fn what_goes_on_ends_at_the_same_look() {
@@ -101,6 +118,13 @@ fn what_goes_on_ends_at_the_same_look() {
         assert!(on.end == End::Error && on.film == whole.film && on.fates == whole.fates, "from {blocks}: {} blocks", on.film.blocks);
         assert!(saved_on.film == saved.film && saved_on.done == saved.done);
     }
+}
+
+/// Pictures without a trial, with kernels that fit all of them, which changes no bit (`tests/light/transport.rs`).
+fn shared(settings: SceneSettings) -> SceneSettings {
+    let with =
+        vec![Effect::Direct, Effect::Indirect, Effect::MeshLights, Effect::DiscLights, Effect::Environment, Effect::Bvh, Effect::TwoSided];
+    SceneSettings { with, aim: false, ..settings }
 }
 
 #[test]
@@ -140,7 +164,7 @@ fn a_block_cut_short_leaves_nothing() {
     assert!(cut.ledger().closes() && cut.ledger().emitted == u64::from(4 * blocks) * photons);
     assert!(cut.left_out.is_multiple_of(photons) && cut.left_out < 4 * photons, "{}", cut.left_out);
     // Fewer rounds than a block has are all there is.
-    let [few, more] = [3, 4].map(|rounds| seen(&gpu, &scene("cornell"), &small(4, rounds), &scene("cornell").first_camera(), [8; 2]));
+    let [few, more] = [3, 4].map(|rounds| lit(&gpu, &small(4, rounds), Part::default()).0);
     assert_eq!((few.end, few.film.rounds, few.film.blocks, few.left_out), (End::Rounds, 3, 0, 0));
     assert!(few.film.relative_error().is_infinite() && mean_red(&few) > 0.0);
     assert!((mean_red(&few) / mean_red(&more) - 1.0).abs() < 0.2);
@@ -155,7 +179,7 @@ fn samples_are_even_over_a_block() {
     let camera = Camera::looking_at("above", DVec3::new(0.013, 2.0, 0.007), DVec3::new(0.013, 0.0, 0.007), DVec3::Z, 0.93);
     let of = |block: u32, rounds: u32, seed| {
         let settings = SceneSettings { rounds, seed, block: Some(block), photons: 1, ..SceneSettings::default() };
-        means(&seen(&gpu, &lamp, &settings, &camera, [16; 2]))
+        means(&seen(&gpu, &lamp, &shared(settings), &camera, [16; 2]))
     };
     // Its own error is 1/32 of what a block's is.
     let truth = of(16, 512, 99);
@@ -177,7 +201,7 @@ fn the_spread_of_blocks_is_the_error() {
     let cornell = scene("cornell");
     let of = |seed| {
         let settings = SceneSettings { seed, photons: 300, shadow_rays: 1, alpha: 1.0, radius: Some(0.2), ..small(4, 64) };
-        seen(&gpu, &cornell, &settings, &cornell.first_camera(), [8; 2])
+        seen(&gpu, &cornell, &shared(settings), &cornell.first_camera(), [8; 2])
     };
     let runs: Vec<RunResult> = (1..13).map(of).collect();
     let (mut spread, mut stated) = (0.0, 0.0);
@@ -204,7 +228,7 @@ fn errors_are_of_what_surfaces_scatter() {
         room
     };
     let error = |scene: &Scene, camera: &Camera, size| {
-        let lit = seen(&gpu, scene, &small(1, 32), camera, size);
+        let lit = seen(&gpu, scene, &shared(small(1, 32)), camera, size);
         (lit.film.error(0.95).noise, lit)
     };
     let camera = cornell.first_camera();

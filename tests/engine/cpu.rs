@@ -55,7 +55,7 @@ fn neither_threads_nor_vectors_change_a_photon() {
         for (emission, shininess) in
             [(EmissionLaw::Uniform, [None; 5]), (EmissionLaw::Cosine, [Some(2.0), None, Some(0.5), Some(0.0), Some(50.0)])]
         {
-            for photons in [2, 33, 513, 4099, 10_007] {
+            for photons in [2, 33, 513, 10_007] {
                 let phong_direction = if photons % 2 == 0 { PhongDirection::Mirror } else { PhongDirection::Sampled };
                 let walls = RoomSettings { shininess, phong_direction, ..RoomSettings::default() };
                 let lights = RoomSettings { emission, light_power: [3.0, 0.5], ..walls };
@@ -63,7 +63,7 @@ fn neither_threads_nor_vectors_change_a_photon() {
                 let (scene, plan) = (open_box(&settings), plan_for_host(&settings));
                 let expected = traced(&scene, &plan, Arch::Scalar, 1);
                 assert!(photons < 500 || expected.iter().map(|(photons, _)| photons.len()).sum::<usize>() > photons as usize);
-                for (vectors, threads) in kinds.iter().flat_map(|kind| [1, 2, 3].map(|threads| (*kind, threads))) {
+                for (vectors, threads) in kinds.iter().flat_map(|kind| [1, 3].map(|threads| (*kind, threads))) {
                     let found = traced(&scene, &plan, vectors, threads);
                     let what = format!("{rng:?}, {emission:?}, {photons} photons, {vectors:?}, {threads} threads");
                     assert_holds(&what, same_blocks(&found, &expected));

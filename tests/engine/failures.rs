@@ -8,24 +8,25 @@ use crate::common::prelude::*;
 use crate::common::program::on_device;
 use photonmill::engine::saved::SavedRun;
 
-const SMALL: &str = "--size 8x8 --photons 500 --caustic-photons 300 --block 1 -q";
+/// A radius that is given needs no trial.
+const SMALL: &str = "--size 8x8 --photons 500 --caustic-photons 300 --radius 0.05 --block 1 -q";
 
 /// Ends a run by one signal after another, so many of them KILL, goes on from its checkpoint each time, and at last lets it end. (That a
 /// file is whole or not there is what a full disk shows: it takes little time to write one.)
-fn ended_runs_go_on(kills: usize) {
+fn ended_runs_go_on(signals: &[(&str, i32)], kills: usize) {
     let place = Place::new();
     // More rounds than any device does before it is told, and no more than may have other units.
     let line = |rounds: u32, more: &str| on_device(&format!("render cornell {SMALL} --rounds {rounds} {more}"));
-    let asked = [("INT", Some(130), "1h"), ("TERM", Some(143), "1h"), ("HUP", Some(129), "1h")];
+    let asked = signals.iter().map(|(signal, code)| (*signal, Some(*code), "1h"));
     let (mut done, mut done_when_asked) = (0, 0);
-    for (number, (signal, code, every)) in asked.into_iter().chain(std::iter::repeat_n(("KILL", None, "1ms"), kills)).enumerate() {
+    for (number, (signal, code, every)) in asked.chain(std::iter::repeat_n(("KILL", None, "1ms"), kills)).enumerate() {
         let resume = if done > 0 { "--resume c.pms" } else { "" };
         let line = line(65_536, &format!("-o a.exr --checkpoint c.pms --every {every} {resume}")).replace(" -q ", " --progress json ");
         let mut child = place.shell(&format!("exec env --default-signal=INT,TERM,HUP photonmill {line}"));
         let mut child = child.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
         let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map_while(Result::ok);
         // Some blocks later each time.
-        let progress = lines.by_ref().filter(|line| line.contains("\"photons\"")).nth(number * 3 % 17);
+        let progress = lines.by_ref().filter(|line| line.contains("\"photons\"")).nth((number * 3 + 6) % 17);
         assert!(progress.is_some(), "SIG{signal}: no progress");
         assert!(Command::new("kill").args([&format!("-{signal}"), &child.id().to_string()]).status().unwrap().success());
         let rest: Vec<String> = lines.collect();
@@ -46,15 +47,15 @@ fn ended_runs_go_on(kills: usize) {
 #[test]
 fn ended_runs_go_on_to_the_same_bits() {
     if device().is_some() {
-        ended_runs_go_on(1);
+        ended_runs_go_on(&[("INT", 130)], 1);
     }
 }
 
 #[test]
-#[ignore = "minutes: 100 kills"]
+#[ignore = "long: 100 kills"]
 fn runs_killed_at_100_moments_go_on_to_the_same_bits() {
     if device().is_some() {
-        ended_runs_go_on(100);
+        ended_runs_go_on(&[("INT", 130), ("TERM", 143), ("HUP", 129)], 100);
     }
 }
 
@@ -140,14 +141,15 @@ const SMALLER: &str = "goes on in smaller pieces, with";
 
 /// A device that is lost or whose memory is full goes on to the same bits, in the trial as in any round. What one that is lost for good had
 /// done is in the checkpoint.
-#[test]
-fn a_device_that_fails_goes_on_to_the_same_bits() {
+fn failing_devices_go_on(all: bool) {
     let Some(_) = device() else { return };
     let scene = Faulty::new("render cornell --size 8x8 --photons 1500 --block 1 -q --rounds 40");
     let alone = &on_device("");
-    scene.assert_goes_on(&format!("vkQueueSubmit2@6=lost,vkWaitForFences@15=lost,vkQueueSubmit2@{MIDWAY}=lost"), alone, &[ANEW; 3]);
-    let memory = "vkAllocateMemory@20=device-memory,vkAllocateMemory@60=device-memory,vkCreateComputePipelines@4=host-memory";
-    scene.assert_goes_on(&format!("{memory},vkQueueSubmit2@{MIDWAY}=lost"), alone, &[SMALLER, SMALLER, SMALLER, ANEW]);
+    if all {
+        scene.assert_goes_on(&format!("vkQueueSubmit2@6=lost,vkWaitForFences@15=lost,vkQueueSubmit2@{MIDWAY}=lost"), alone, &[ANEW; 3]);
+        let memory = "vkAllocateMemory@20=device-memory,vkAllocateMemory@60=device-memory,vkCreateComputePipelines@4=host-memory";
+        scene.assert_goes_on(&format!("{memory},vkQueueSubmit2@{MIDWAY}=lost"), alone, &[SMALLER, SMALLER, SMALLER, ANEW]);
+    }
     // One of two devices, too.
     let number = std::env::var("PHOTONMILL_DEVICE").map_or(0, |_| device().unwrap().facts().index);
     let one_of_two = format!("vkQueueSubmit2@{MIDWAY}=lost,vkAllocateMemory@90=device-memory");
@@ -163,10 +165,22 @@ fn a_device_that_fails_goes_on_to_the_same_bits() {
     scene.assert_whole("gone on from the checkpoint");
     // Not a line of Rust's own, and no file, where it is lost before anything is done.
     let names = scene.place.names();
-    for faults in ["vkCreateDevice@1=lost", "vkAllocateMemory@1+=device-memory", "vkQueueSubmit2@12+=lost"] {
+    let early = ["vkCreateDevice@1=lost", "vkAllocateMemory@1+=device-memory", "vkQueueSubmit2@12+=lost"];
+    for faults in early.into_iter().take(if all { 3 } else { 2 }) {
         scene.assert_ends(faults, alone, "photonmill: ");
         assert_eq!(scene.place.names(), names, "{faults}");
     }
+}
+
+#[test]
+fn a_device_that_fails_goes_on_to_the_same_bits() {
+    failing_devices_go_on(false);
+}
+
+#[test]
+#[ignore = "long: minutes on a software device"]
+fn a_device_that_fails_anywhere_goes_on_to_the_same_bits() {
+    failing_devices_go_on(true);
 }
 
 /// Photons for a file go on behind the last whole round.
@@ -188,15 +202,14 @@ fn a_map_goes_on_behind_its_last_whole_round() {
 }
 
 /// What --memory allows is never exceeded: smaller pieces, and the same bits; too little is refused by what is needed.
-#[test]
-fn memory_is_kept_to() {
+fn memory_is_kept_within(limits: &[(&str, u64)]) {
     let Some(_) = device() else { return };
     let place = Place::new();
     let line = "render cornell --size 24x24 --photons 60000 --rounds 2 --block 1 -q";
     place.succeed(&format!("{line} -o whole.exr --json whole.json"));
     let bytes = |name: &str| place.json(name)["plan"]["bytes"].as_u64().unwrap();
     let chunk = |name: &str| place.json(name)["plan"]["maps"][0]["chunk_photons"].as_u64().unwrap();
-    for (limit, most) in [("20MiB", 20 << 20), ("12582912", 12 << 20)] {
+    for &(limit, most) in limits {
         place.succeed(&format!("{line} -o a.exr --json a.json --memory {limit}"));
         assert!(std::fs::read(place.at("a.exr")).unwrap() == std::fs::read(place.at("whole.exr")).unwrap(), "{limit}: another picture");
         assert!(bytes("a.json") <= most && bytes("whole.json") > most, "{limit}: {}, {}", bytes("a.json"), bytes("whole.json"));
@@ -209,6 +222,17 @@ fn memory_is_kept_to() {
         (on_device(&format!("{line} -o b.exr --memory -1G")), ["--memory", "512M"].as_slice()),
         ("--variant cpu --memory 1G -o b.png".to_owned(), ["--memory", "--variant cpu"].as_slice()),
     ]);
+}
+
+#[test]
+fn memory_is_kept_to() {
+    memory_is_kept_within(&[("12MiB", 12 << 20)]);
+}
+
+#[test]
+#[ignore = "long: minutes on a software device"]
+fn memory_is_kept_to_whatever_it_is() {
+    memory_is_kept_within(&[("20MiB", 20 << 20), ("12582912", 12 << 20)]);
 }
 
 /// Nothing that is read, and nothing that is no file, is lost to an output; what is asked for and cannot be had is told of.

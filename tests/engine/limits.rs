@@ -29,10 +29,9 @@ const POINT: [(DVec3, DVec3); 1] = [(DVec3::new(0.5, 0.0, 0.5), DVec3::Y)];
 
 /// Roulette ends paths, and takes nothing: irradiance is pi / (1 - albedo). Finds 20 % with 5 standard errors; the cap of 32 bounces that
 /// was the default took 28 %.
-#[test]
-fn bright_rooms_lose_no_light() {
+fn bright_rooms_keep_all(rooms: &[(f32, Builder)]) {
     let Some(gpu) = device() else { return };
-    for (albedo, builder) in [(0.95f32, Builder::Ballot), (0.99, Builder::Persistent)] {
+    for &(albedo, builder) in rooms {
         let exact = PI / (1.0 - f64::from(albedo));
         let what = format!("albedo {albedo}, {}", builder.name());
         let settings = SceneSettings { builder: Some(builder), radius: Some(0.4), alpha: 1.0, ..settings() };
@@ -49,12 +48,21 @@ fn bright_rooms_lose_no_light() {
     }
 }
 
-/// What a cap cuts off is counted in watts, and bounds what it takes from the result.
 #[test]
-fn what_a_cap_cuts_off_is_counted() {
+fn bright_rooms_lose_no_light() {
+    bright_rooms_keep_all(&[(0.95, Builder::Persistent)]);
+}
+
+#[test]
+#[ignore = "long: minutes on a software device"]
+fn the_brightest_rooms_lose_no_light() {
+    bright_rooms_keep_all(&[(0.95, Builder::Ballot), (0.99, Builder::Persistent)]);
+}
+
+/// What a cap cuts off is counted in watts, and bounds what it takes from the result.
+fn what_caps_cut_off_is_counted(cases: &[(Illumination, f32, u32)]) {
     let Some(gpu) = device() else { return };
-    let [split, all] = BOTH;
-    for (illumination, albedo, bounces) in [(split, 0.5f32, 1), (split, 0.9, 6), (all, 0.5, 6)] {
+    for &(illumination, albedo, bounces) in cases {
         let what = format!("{illumination:?}, albedo {albedo}, {bounces} bounces");
         let settings = SceneSettings { illumination, bounces, radius: Some(0.4), alpha: 1.0, ..settings() };
         let lit = received(&gpu, &furnace(albedo), &settings, &POINT);
@@ -71,6 +79,17 @@ fn what_a_cap_cuts_off_is_counted() {
     }
 }
 
+#[test]
+fn what_a_cap_cuts_off_is_counted() {
+    what_caps_cut_off_is_counted(&[(Illumination::Split, 0.5, 1), (Illumination::Split, 0.9, 6)]);
+}
+
+#[test]
+#[ignore = "long: minutes on a software device"]
+fn what_a_cap_cuts_off_of_all_light_is_counted() {
+    what_caps_cut_off_is_counted(&[(Illumination::Photons, 0.5, 6)]);
+}
+
 /// An error that a cap makes impossible is refused, when the run first looks: after 30 rounds.
 #[test]
 fn an_error_beyond_a_cap_is_refused() {
@@ -79,6 +98,12 @@ fn an_error_beyond_a_cap_is_refused() {
     let settings = SceneSettings { bounces: 4, photons: 500, rounds: 31, stop, ..settings() };
     let refused = run(&gpu, &furnace(0.9), &settings, 16, &AtomicBool::new(false)).unwrap_err();
     assert!(refused.to_string().starts_with("--error 1%: cannot be reached"), "{refused}");
+}
+
+/// Settings with kernels that fit every scene of mirrors, which changes no bit (`tests/light/transport.rs`).
+fn of_mirrors() -> SceneSettings {
+    let with = vec![Effect::Indirect, Effect::SpecularChains, Effect::MeshLights, Effect::PointLights];
+    SceneSettings { with, illumination: Illumination::Photons, ..settings() }
 }
 
 /// Perfect mirrors, a hundred of them before the lamp at the end of the shaft.
@@ -91,7 +116,7 @@ fn long_chains_of_mirrors_end_at_what_they_show() {
     let scene = scene_of(meshes, vec![mirror(1.0), shining(0.0)], vec![]);
     // Two metres across for each one along: a hundred reflections.
     let camera = Camera::looking_at("ray", DVec3::new(0.0, 0.01, 0.1), DVec3::new(0.49, 0.255, 0.1), DVec3::Y, 1e-4);
-    let lit = seen(&gpu, &scene, &SceneSettings { rounds: 2, photons: 10, caustic_photons: 10, ..settings() }, &camera, [4, 4]);
+    let lit = seen(&gpu, &scene, &SceneSettings { rounds: 2, photons: 10, ..of_mirrors() }, &camera, [4, 4]);
     let mean = mean_red(&lit);
     assert!((mean - 1.0).abs() < 1e-5, "{mean}");
     assert_eq!(lit.losses.camera_paths, 0);
@@ -105,9 +130,8 @@ fn light_trapped_for_ever_is_counted() {
     meshes.extend([level(0.0, [1.0; 2], true, 0), level(1.0, [1.0; 2], false, 0)]);
     let lamp = LightKind::Point { position: DVec3::new(0.1, 0.4, 0.2), intensity: Vec3::ONE };
     let scene = scene_of(meshes, vec![mirror(1.0), matt(0.5), glass(1.5)], vec![lamp]);
-    let settings = SceneSettings { rounds: 1, photons: 40, illumination: Illumination::Photons, ..settings() };
     let camera = Camera::looking_at("ray", DVec3::new(0.0, 0.5, 0.1), DVec3::new(0.4, 0.8, 0.2), DVec3::Y, 0.5);
-    let lit = seen(&gpu, &scene, &SceneSettings { with: vec![Effect::Indirect], ..settings }, &camera, [2, 1]);
+    let lit = seen(&gpu, &scene, &SceneSettings { rounds: 1, photons: 40, ..of_mirrors() }, &camera, [2, 1]);
     // Roulette ends what the eye sees there.
     assert_eq!(lit.losses.camera_paths, 0);
     let ledger = lit.fates[0].ledger();
@@ -119,11 +143,10 @@ fn light_trapped_for_ever_is_counted() {
 }
 
 /// The ledger's photons stored are those that lie in the map.
-#[test]
-fn photons_stored_are_the_length_of_the_map() {
+fn photons_stored_lie_in_the_map(illumination: Illumination) {
     let Some(gpu) = device() else { return };
     let scene = scene("cornell-spheres");
-    for (builder, illumination) in pairs([Builder::Ballot, Builder::Persistent], BOTH) {
+    for builder in [Builder::Ballot, Builder::Persistent] {
         let settings = SceneSettings { builder: Some(builder), illumination, photons: 3000, rounds: 1, chunk: Some(700), ..settings() };
         let lit = run(&gpu, &scene, &settings, 8, &AtomicBool::new(false)).unwrap();
         let geometry = Geometry::new(&scene).unwrap();
@@ -145,6 +168,17 @@ fn photons_stored_are_the_length_of_the_map() {
             assert_eq!(fates.ledger().stored, stored, "{builder:?}, {illumination:?}, {}", map.name);
         }
     }
+}
+
+#[test]
+fn photons_stored_are_the_length_of_the_map() {
+    photons_stored_lie_in_the_map(Illumination::Split);
+}
+
+#[test]
+#[ignore = "long: minutes on a software device"]
+fn photons_stored_of_all_light_are_the_length_of_the_map() {
+    photons_stored_lie_in_the_map(Illumination::Photons);
 }
 
 /// Radii by their closed form are those of the recurrence, at once for any round.

@@ -51,14 +51,11 @@ fn few() -> SceneSettings {
 }
 
 /// Within a factor: rare light is met by chance, and even samples vary less the more there are.
-#[test]
-fn rounds_vary_as_the_pilot_expects() {
-    let Some(gpu) = device() else { return };
-    let spheres = Spheres::new();
-    let found = spheres.chosen(&gpu, &few(), Free { photons: false, caustic_photons: false, ..Free::ALL }).unwrap();
+fn rounds_vary_as_the_pilot_expects(gpu: &Gpu, spheres: &Spheres) {
+    let found = spheres.chosen(gpu, &few(), Free { photons: false, caustic_photons: false, ..Free::ALL }).unwrap();
     for division in [found.before, found.chosen] {
         // The squared noise of a round, relative to the mean.
-        let lit = spheres.lit(&gpu, &SceneSettings { rounds: 32, alpha: 1.0, seed: 5, stop: Stop::default(), ..division.set(&few()) });
+        let lit = spheres.lit(gpu, &SceneSettings { rounds: 32, alpha: 1.0, seed: 5, stop: Stop::default(), ..division.set(&few()) });
         let measured = lit.film.relative_error().powi(2) * f64::from(lit.film.rounds);
         let variance = &found.rounds.variance;
         let of_paths = variance.of_paths_in_round(division);
@@ -69,38 +66,32 @@ fn rounds_vary_as_the_pilot_expects() {
     }
 }
 
-#[test]
-fn what_is_set_stays_and_the_rest_is_chosen_alike_each_time() {
-    let Some(gpu) = device() else { return };
-    let spheres = Spheres::new();
+fn what_is_set_stays_and_the_rest_is_chosen_alike_each_time(gpu: &Gpu, spheres: &Spheres) {
     let goal = |error| SceneSettings { stop: Stop { error: Some(error), ..Stop::default() }, ..SceneSettings::default() };
     let (usual, coarse) = (goal(0.1), goal(0.4));
-    let found = spheres.chosen(&gpu, &usual, Free::ALL).unwrap();
+    let found = spheres.chosen(gpu, &usual, Free::ALL).unwrap();
     assert!(found.gain(&usual.stop) > 2.0, "{}: {found:?}", found.gain(&usual.stop));
-    let again = spheres.chosen(&gpu, &SceneSettings { seed: 77, ..usual.clone() }, Free::ALL).unwrap();
+    let again = spheres.chosen(gpu, &SceneSettings { seed: 77, ..usual.clone() }, Free::ALL).unwrap();
     assert_eq!((found.chosen, found.rounds), (again.chosen, again.rounds));
-    let of_rays = spheres.chosen(&gpu, &usual, Free { shadow_rays: true, ..Free::default() }).unwrap();
+    let of_rays = spheres.chosen(gpu, &usual, Free { shadow_rays: true, ..Free::default() }).unwrap();
     assert_eq!(of_rays.chosen, Division { shadow_rays: of_rays.chosen.shadow_rays, ..of_rays.before });
     let three = SceneSettings { shadow_rays: 3, ..usual.clone() };
-    let of_others = spheres.chosen(&gpu, &three, Free { shadow_rays: false, ..Free::ALL }).unwrap();
+    let of_others = spheres.chosen(gpu, &three, Free { shadow_rays: false, ..Free::ALL }).unwrap();
     assert!(of_others.chosen.shadow_rays == 3 && of_others.chosen != of_others.before, "{of_others:?}");
-    assert_eq!(spheres.chosen(&gpu, &usual, Free::default()), None);
+    assert_eq!(spheres.chosen(gpu, &usual, Free::default()), None);
     // A small error takes more of it.
-    let rough = spheres.chosen(&gpu, &coarse, Free::ALL).unwrap();
+    let rough = spheres.chosen(gpu, &coarse, Free::ALL).unwrap();
     let [rough, good] = [(&rough, 0.4), (&found, 0.1)].map(|(pilot, error)| pilot.rounds.until(pilot.chosen, error));
     assert!(rough.0 >= 16.0 && rough.1 < 0.5 * good.1, "{rough:?} {good:?}");
 }
 
 /// The work until an error, by what the pilot says of a round and the rounds that runs took.
-#[test]
-fn what_a_pilot_chooses_is_less_work_and_takes_about_the_rounds_that_it_expects() {
-    let Some(gpu) = device() else { return };
-    let spheres = Spheres::new();
+fn what_a_pilot_chooses_is_less_work_and_takes_about_the_rounds_that_it_expects(gpu: &Gpu, spheres: &Spheres) {
     let stop = Stop { error: Some(0.5), ..Stop::default() };
     let usual = SceneSettings { photons: 1 << 13, caustic_photons: 1 << 13, rounds: 1 << 12, stop, ..SceneSettings::default() };
-    let pilot = spheres.chosen(&gpu, &usual, Free::ALL).unwrap();
+    let pilot = spheres.chosen(gpu, &usual, Free::ALL).unwrap();
     let [(work, rounds), (before, _)] = [(pilot.chosen, pilot.set(&usual)), (pilot.before, usual)].map(|(division, settings)| {
-        let lit = spheres.lit(&gpu, &settings);
+        let lit = spheres.lit(gpu, &settings);
         assert_eq!(lit.end, End::Error, "{division:?}");
         let rounds = f64::from(lit.film.rounds);
         (1e-6 * rounds * pilot.rounds.cost(division), rounds)
@@ -112,17 +103,14 @@ fn what_a_pilot_chooses_is_less_work_and_takes_about_the_rounds_that_it_expects(
 }
 
 /// Nodes that rays visit: more shadow rays more of them, each path about as many, and whatever is dispatched at once.
-#[test]
-fn what_paths_meet_is_counted() {
-    let Some(gpu) = device() else { return };
-    let spheres = Spheres::new();
+fn what_paths_meet_is_counted(gpu: &Gpu, spheres: &Spheres) {
     let counted = |samples: u32, shadow_rays: u32, is_split: bool| {
         let settings = SceneSettings { samples, shadow_rays, rounds: 1, block: Some(1), stop: Stop::default(), ..few() };
-        let mut plan = spheres.plan(&gpu, &settings);
+        let mut plan = spheres.plan(gpu, &settings);
         if is_split {
             plan.work_per_submission = 1;
         }
-        let [nodes, triangles] = light(&gpu, &spheres.view(), plan, &mut Control::default()).unwrap().film.visited();
+        let [nodes, triangles] = light(gpu, &spheres.view(), plan, &mut Control::default()).unwrap().film.visited();
         let paths = f64::from(samples * SIZE * SIZE);
         (nodes as f64 / paths, triangles)
     };
@@ -134,40 +122,54 @@ fn what_paths_meet_is_counted() {
 }
 
 /// Tiles with more samples show the same picture: what differs is noise, and there is less of it.
+fn tiles_with_more_samples_change_no_mean(gpu: &Gpu, spheres: &Spheres, final_gather: bool) {
+    // The third column of tiles has eight times the samples.
+    let rows: Vec<u32> = (0..16).map(|tile| [0, 1, 3, 2][tile % 4]).collect();
+    let light_of = |tiles: Option<TileSamples>| {
+        spheres.lit(gpu, &SceneSettings { tiles, rounds: 16, final_gather, stop: Stop::default(), ..few() }).film
+    };
+    let (even, tiled) = (light_of(None), light_of(Some(TileSamples::new(&rows, (SIZE, SIZE)))));
+    let mut squares = 0.0;
+    for pixel in 0..even.pixels() {
+        let [one, other] = [&even, &tiled].map(|film| (film.mean(pixel), film.standard_error(pixel)));
+        let variance = one.1.length_squared() + other.1.length_squared();
+        // What shines by itself does not vary.
+        squares += if variance > 0.0 { (one.0 - other.0).length_squared() / variance } else { 0.0 };
+    }
+    // Of independent errors it is 1; those of the same photons go together.
+    let squares = squares / even.pixels() as f64;
+    println!("final gather {final_gather}: squared differences over their variance {squares:.2}");
+    assert!(squares < 2.0, "{squares}");
+    let [one, other] = [&even, &tiled].map(|film| film.surface_means().map(DVec3::element_sum).sum::<f64>());
+    assert!((one / other - 1.0).abs() < 0.02, "{one} {other}");
+    // There is less noise; that of gather rays is mostly the photons'.
+    let column = || (0..SIZE * SIZE).filter(|pixel| pixel % SIZE / 4 == 2);
+    let noise = |film: &SceneFilm| column().map(|pixel| film.surface_error(pixel as usize).length_squared()).sum::<f64>();
+    let quieter = noise(&tiled) / noise(&even);
+    println!("8 times the samples leave {quieter:.3} of the squared noise");
+    assert!(final_gather || quieter < 0.6, "{quieter}");
+    // As many pixels show surfaces.
+    let [one, other] = [&even, &tiled].map(|film| film.surface_means().filter(|mean| mean.max_element() > 0.0).count());
+    assert_eq!(one, other);
+}
+
+/// One device for all of it, which compiles the kernels of the scene once.
 #[test]
-fn tiles_with_more_samples_change_no_mean() {
+fn a_pilot_expects_what_rounds_are_like_and_chooses_the_same_twice() {
     let Some(gpu) = device() else { return };
     let spheres = Spheres::new();
-    for final_gather in [false, true] {
-        // The third column of tiles has eight times the samples.
-        let rows: Vec<u32> = (0..16).map(|tile| [0, 1, 3, 2][tile % 4]).collect();
-        let light_of = |tiles: Option<TileSamples>| {
-            spheres.lit(&gpu, &SceneSettings { tiles, rounds: 16, final_gather, stop: Stop::default(), ..few() }).film
-        };
-        let (even, tiled) = (light_of(None), light_of(Some(TileSamples::new(&rows, (SIZE, SIZE)))));
-        let mut squares = 0.0;
-        for pixel in 0..even.pixels() {
-            let [one, other] = [&even, &tiled].map(|film| (film.mean(pixel), film.standard_error(pixel)));
-            let variance = one.1.length_squared() + other.1.length_squared();
-            // What shines by itself does not vary.
-            squares += if variance > 0.0 { (one.0 - other.0).length_squared() / variance } else { 0.0 };
-        }
-        // Of independent errors it is 1; those of the same photons go together.
-        let squares = squares / even.pixels() as f64;
-        println!("final gather {final_gather}: squared differences over their variance {squares:.2}");
-        assert!(squares < 2.0, "{squares}");
-        let [one, other] = [&even, &tiled].map(|film| film.surface_means().map(DVec3::element_sum).sum::<f64>());
-        assert!((one / other - 1.0).abs() < 0.02, "{one} {other}");
-        // There is less noise; that of gather rays is mostly the photons'.
-        let column = || (0..SIZE * SIZE).filter(|pixel| pixel % SIZE / 4 == 2);
-        let noise = |film: &SceneFilm| column().map(|pixel| film.surface_error(pixel as usize).length_squared()).sum::<f64>();
-        let quieter = noise(&tiled) / noise(&even);
-        println!("8 times the samples leave {quieter:.3} of the squared noise");
-        assert!(final_gather || quieter < 0.6, "{quieter}");
-        // As many pixels show surfaces.
-        let [one, other] = [&even, &tiled].map(|film| film.surface_means().filter(|mean| mean.max_element() > 0.0).count());
-        assert_eq!(one, other);
-    }
+    rounds_vary_as_the_pilot_expects(&gpu, &spheres);
+    what_is_set_stays_and_the_rest_is_chosen_alike_each_time(&gpu, &spheres);
+    what_a_pilot_chooses_is_less_work_and_takes_about_the_rounds_that_it_expects(&gpu, &spheres);
+    what_paths_meet_is_counted(&gpu, &spheres);
+    tiles_with_more_samples_change_no_mean(&gpu, &spheres, false);
+}
+
+#[test]
+#[ignore = "long: kernels of their own"]
+fn tiles_with_more_gather_rays_change_no_mean() {
+    let Some(gpu) = device() else { return };
+    tiles_with_more_samples_change_no_mean(&gpu, &Spheres::new(), true);
 }
 
 /// The program takes what a pilot finds where an error ends the run and nothing is set.
@@ -189,8 +191,8 @@ fn the_program_has_a_pilot_where_an_error_ends_the_run() {
     assert!(!stderr.contains("pilot: "), "{stderr}");
 }
 
-/// What a pilot has chosen is kept in a file, and used again to the same bits.
-fn settings_are_kept(size: u32, [error, smaller]: [&str; 2], finds_tiles: bool) {
+/// What a pilot has chosen is kept in a file, and used again to the same bits; `all`: by a pilot alone and by shards too.
+fn settings_are_kept(size: u32, [error, smaller]: [&str; 2], finds_tiles: bool, all: bool) {
     let Some(_) = device() else { return };
     let place = Place::new();
     let scene = format!("render cornell-spheres --size {size}x{size}");
@@ -205,28 +207,32 @@ fn settings_are_kept(size: u32, [error, smaller]: [&str; 2], finds_tiles: bool) 
     assert!(!stderr.contains("pilot") && !stderr.contains("warning"), "{stderr}");
     let bytes = |name: &str| std::fs::read(place.at(name)).unwrap();
     assert!(bytes("a.exr") == bytes("b.exr"));
-    // A pilot alone.
-    let (_, stderr) = place.succeed(&format!("{line} --save-settings t.json"));
-    assert!(stderr.contains("wrote t.json") && bytes("s.json") == bytes("t.json"), "{stderr}");
+    if all {
+        // A pilot alone.
+        let (_, stderr) = place.succeed(&format!("{line} --save-settings t.json"));
+        assert!(stderr.contains("wrote t.json") && bytes("s.json") == bytes("t.json"), "{stderr}");
+    }
     // A checkpoint carries all of it.
     let (_, stderr) = place.succeed(&format!("{scene} --error {smaller} -o c.exr --json c.json --resume a.pms"));
     let kept = &place.json("c.json")["settings"];
     let is_kept = chosen["settings"].as_object().unwrap().iter().all(|(name, value)| kept[name] == *value);
     assert!(is_kept && kept["tiles"] == chosen["tiles"] && !stderr.contains("pilot: "), "{stderr}");
-    // Shards use it, with tiles.
+    // Shards use it, with tiles, and so does another scene.
     if !finds_tiles {
         chosen["tiles"] = vec!["0012"; size as usize / 4].into();
         place.write("s.json", serde_json::to_string_pretty(&chosen).unwrap());
     }
-    let short = format!("{scene} --settings s.json --rounds 8 -q");
-    for shard in [1, 2] {
-        place.succeed(&format!("{short} --shard {shard}/2 --checkpoint {shard}.pms"));
+    if all {
+        let short = format!("{scene} --settings s.json --rounds 8 -q");
+        for shard in [1, 2] {
+            place.succeed(&format!("{short} --shard {shard}/2 --checkpoint {shard}.pms"));
+        }
+        place.succeed("merge 1.pms 2.pms -o merged.exr");
+        place.succeed(&format!("{short} -o whole.exr"));
+        let light = |name: &str| image::open(place.at(name)).unwrap().into_rgb32f();
+        assert!(light("merged.exr") == light("whole.exr"));
     }
-    place.succeed("merge 1.pms 2.pms -o merged.exr");
-    place.succeed(&format!("{short} -o whole.exr"));
-    let light = |name: &str| image::open(place.at(name)).unwrap().into_rgb32f();
-    assert!(light("merged.exr") == light("whole.exr"));
-    let (_, stderr) = place.succeed(&format!("render cornell --size {size}x{size} --settings s.json --rounds 1 -o d.exr"));
+    let (_, stderr) = place.succeed(&format!("render point-over-plane --size {size}x{size} --settings s.json --rounds 1 -o d.exr"));
     assert!(stderr.contains("warning: --settings: chosen for cornell-spheres, which was another scene"), "{stderr}");
     std::fs::write(place.at("wrong.json"), b"{}").unwrap();
     let text = String::from_utf8(bytes("s.json")).unwrap();
@@ -241,7 +247,13 @@ fn settings_are_kept(size: u32, [error, smaller]: [&str; 2], finds_tiles: bool) 
 
 #[test]
 fn settings_are_kept_in_a_file() {
-    settings_are_kept(16, ["50%", "45%"], false);
+    settings_are_kept(16, ["50%", "45%"], false, false);
+}
+
+#[test]
+#[ignore = "long: each run of the program compiles its kernels"]
+fn settings_in_a_file_are_used_by_shards() {
+    settings_are_kept(16, ["50%", "45%"], false, true);
 }
 
 /// Of a run so long that the pilot looks at all pixels, and finds tiles.
@@ -249,5 +261,5 @@ fn settings_are_kept_in_a_file() {
 #[ignore = "half a minute on a software device"]
 fn tiles_are_kept_in_a_file() {
     let Some(gpu) = device() else { return };
-    settings_are_kept(24, if gpu.facts().kind == "cpu" { ["15%", "14%"] } else { ["3%", "2%"] }, true);
+    settings_are_kept(24, if gpu.facts().kind == "cpu" { ["15%", "14%"] } else { ["3%", "2%"] }, true, true);
 }

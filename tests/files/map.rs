@@ -75,16 +75,27 @@ fn line_of(error: &Error) -> String {
 
 #[test]
 fn pictures_from_a_file_have_the_bits_of_a_run() {
-    let Some(gpu) = device() else { return };
+    let settings = SceneSettings { chunk: Some(500), samples: 2, ..small() };
+    compare_pictures(vec![(scene("cornell-spheres"), settings, SceneSettings { chunk: Some(700), ..small() })]);
+}
+
+#[test]
+#[ignore = "long: kernels of a map alone, of a cone and of many lamps"]
+fn pictures_from_all_files_have_the_bits_of_a_run() {
     let cone = SceneSettings { kernel: Kernel::Cone, chunk: Some(500), samples: 2, ..small() };
     let many_lamps = Scene { lights: every_kind_of_light(1.0, 1.0, EmissionLaw::Cosine), ..scene("cornell") };
-    let layouts = [
+    compare_pictures(vec![
         (scene("cornell-spheres"), cone, SceneSettings { builder: Some(Builder::Naive), chunk: Some(700), ..small() }),
         // Every part from one map, with photons that are cut off.
         (scene("cornell-spheres"), SceneSettings { illumination: Illumination::Photons, bounces: 5, ..small() }, small()),
         // Many lamps, among which photons choose by what a trial found.
         (many_lamps, SceneSettings { chunk: Some(500), ..small() }, small()),
-    ];
+    ]);
+}
+
+/// Scenes, settings of a picture, and those of its file.
+fn compare_pictures(layouts: Vec<(Scene, SceneSettings, SceneSettings)>) {
+    let Some(gpu) = device() else { return };
     for (scene, settings, of_file) in layouts {
         let name = scene.name.clone();
         let room = Room::new(scene);
@@ -192,6 +203,16 @@ fn headers_that_contradict_themselves_are_refused() {
 
 #[test]
 fn files_of_other_light_are_refused() {
+    ask_for_other_light(false);
+}
+
+#[test]
+#[ignore = "long: kernels without caustics"]
+fn files_of_more_light_are_taken() {
+    ask_for_other_light(true);
+}
+
+fn ask_for_other_light(all: bool) {
     let Some(gpu) = device() else { return };
     let room = Room::new(scene("cornell-spheres"));
     let few = SceneSettings { photons: 300, caustic_photons: 300, rounds: 2, ..small() };
@@ -201,8 +222,10 @@ fn files_of_other_light_are_refused() {
     assert!(line.contains("of another scene (cornell-spheres"), "{line}");
     // Less is wanted than there is.
     let less = SceneSettings { without: vec![Effect::ReflectiveCaustics, Effect::RefractiveCaustics], ..few.clone() };
-    let found = room.lit_from(&gpu, &less, file.path()).unwrap();
-    assert!(found.film == room.traced(&gpu, &less).film && found.plan.caustic.is_none());
+    if all {
+        let found = room.lit_from(&gpu, &less, file.path()).unwrap();
+        assert!(found.film == room.traced(&gpu, &less).film && found.plan.caustic.is_none());
+    }
     // More is wanted.
     let (file, _) = room.write(&gpu, &less, u64::MAX);
     let line = line_of(&room.lit_from(&gpu, &few, file.path()).unwrap_err());
@@ -255,9 +278,6 @@ fn the_program_makes_reads_and_exports_files() {
     place.succeed(&format!("render cornell-spheres --photons 3000 --caustic-photons 2000 -o b.exr {common}"));
     let light = |name: &str| image::open(place.at(name)).unwrap().into_rgb32f();
     assert!(light("a.exr") == light("b.exr"));
-    place.write("points.txt", "0.5 0 0.5 0 1 0\n");
-    place.succeed("probe cornell-spheres --points points.txt --map map.pm -o e.csv -q");
-    place.succeed("bake cornell-spheres -o baked --texels-per-metre 2 --map map.pm --rounds 2 -q");
 
     place.succeed("map export map.pm -o some.ply --rounds 2 --only caustic");
     let mut reader = std::io::BufReader::new(std::fs::File::open(place.at("some.ply")).unwrap());
@@ -298,4 +318,24 @@ fn the_program_makes_reads_and_exports_files() {
         ("render cornell -q --map map.pm -o a.exr", ["--map", "map.pm", "another scene"]),
         ("render cornell-spheres --map b.exr -o a.exr", ["--map", "b.exr", "no photon map"]),
     ]);
+}
+
+#[test]
+fn the_program_lights_points_and_texels_from_a_file() {
+    light_points_and_texels("cornell");
+}
+
+#[test]
+#[ignore = "long: kernels of mirrors and glass for points"]
+fn the_program_lights_points_and_texels_from_a_file_of_two_maps() {
+    light_points_and_texels("cornell-spheres");
+}
+
+fn light_points_and_texels(scene: &str) {
+    let Some(_) = device() else { return };
+    let place = Place::new();
+    place.succeed(&format!("map {scene} -o map.pm --photons 500 --rounds 5 -q"));
+    place.write("points.txt", "0.5 0 0.5 0 1 0\n");
+    place.succeed(&format!("probe {scene} --points points.txt --map map.pm -o e.csv -q"));
+    place.succeed(&format!("bake {scene} -o baked --texels-per-metre 2 --map map.pm --rounds 2 -q"));
 }

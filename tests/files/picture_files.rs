@@ -12,6 +12,7 @@ use photonmill::output::metadata::{Metadata, Repeat};
 use photonmill::scene::material::Coverage;
 use photonmill::scene::texture::Filter;
 use photonmill::verify::judge::{FirstSurface, first_surfaces};
+use serde_json::json;
 
 const SMALL: &str = "--size 8x8 --photons 500 -q";
 
@@ -35,6 +36,17 @@ impl Place {
 
 #[test]
 fn layers_are_the_parts_the_error_and_what_is_seen() {
+    compare_layers(&["caustic"]);
+}
+
+#[test]
+#[ignore = "long: kernels of each part alone"]
+fn layers_are_all_parts_the_error_and_what_is_seen() {
+    compare_layers(&["specular", "caustic"]);
+}
+
+/// With runs of these parts alone.
+fn compare_layers(parts: &[&str]) {
     let Some(_) = device() else { return };
     let place = Place::new();
     place.succeed(&format!("render cornell-spheres --rounds 8 --block 1 -o a.exr --error-image e.exr {SMALL}"));
@@ -43,8 +55,8 @@ fn layers_are_the_parts_the_error_and_what_is_seen() {
     let mut expected: BTreeSet<String> = rgb.iter().flat_map(|layer| ["R", "G", "B"].map(|channel| format!("{layer}.{channel}"))).collect();
     expected.extend(["R", "G", "B", "normal.X", "normal.Y", "normal.Z", "depth.Z"].map(str::to_owned));
     assert_eq!(all.keys().cloned().collect::<BTreeSet<_>>(), expected);
-    // As if a part were asked for alone, as the next test has it of indirect light; and the sum of all but for the rounding of floats.
-    for part in ["specular", "caustic"] {
+    // As if a part were asked for alone; and the sum of all but for the rounding of floats.
+    for part in parts {
         place.succeed(&format!("render cornell-spheres --rounds 8 --block 1 --part {part} --layers none -o {part}.exr {SMALL}"));
         let alone = place.channels(&format!("{part}.exr"));
         assert_eq!(alone.len(), 3);
@@ -127,7 +139,21 @@ fn parts_of_runs_add_up_in_layers() {
     assert!(place.light("resumed.exr") == place.light("whole.exr"));
     // Three rounds are less than a block.
     run("--rounds 3 -o few.exr");
-    run("--rounds 3 --part indirect -o indirect.exr");
+    let few = place.channels("few.exr");
+    for (pixel, whole) in few["G"].iter().enumerate() {
+        let sum: f64 = ["direct", "specular", "caustic", "indirect"].iter().map(|part| f64::from(few[&format!("{part}.G")][pixel])).sum();
+        assert!((sum - f64::from(*whole)).abs() <= 3e-7 * f64::from(*whole), "pixel {pixel}: {sum}, {whole}");
+    }
+    assert!(few["indirect.G"].iter().any(|value| *value > 0.0));
+}
+
+#[test]
+#[ignore = "long: kernels of indirect light alone"]
+fn parts_of_less_than_a_block_are_those_that_are_asked_for_alone() {
+    let Some(_) = device() else { return };
+    let place = Place::new();
+    place.succeed(&format!("render cornell --rounds 3 -o few.exr {SMALL}"));
+    place.succeed(&format!("render cornell --rounds 3 --part indirect -o indirect.exr {SMALL}"));
     assert!(place.channels("few.exr")["indirect.G"] == place.light("indirect.exr")[1]);
 }
 
@@ -245,27 +271,54 @@ fn files_say_how_they_were_made() {
     assert!(!texts.values().any(|text| text.contains(&folder)) && !format!("{:?}", exr.settings).contains(&folder));
 }
 
-/// The square by hand.
+/// The square by hand, matt and without lamps.
 fn square_file() -> String {
-    crate::common::gltf_file::square().to_string()
+    let mut file = crate::common::gltf_file::square();
+    file["scenes"][0]["nodes"] = json!([0, 1]);
+    file["materials"][0] = json!({
+        "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.25, 0.125, 1], "metallicFactor": 0},
+        "extensions": {"KHR_materials_specular": {"specularFactor": 0}}
+    });
+    file["extensionsUsed"] = json!(["KHR_lights_punctual", "KHR_materials_specular"]);
+    file.to_string()
 }
 
-/// With what a pilot chose, tiles among it, and a scene of a file.
+/// With what a pilot chose, tiles that are put to it, and a scene of a file.
 #[test]
 fn pictures_are_made_again_to_the_bit() {
+    make_pictures_again(false);
+}
+
+/// With tiles that a pilot chose, and another filter.
+#[test]
+#[ignore = "long: a run that is long enough for a pilot's tiles"]
+fn pictures_of_long_runs_are_made_again_to_the_bit() {
+    make_pictures_again(true);
+}
+
+fn make_pictures_again(all: bool) {
     let Some(gpu) = device() else { return };
     let place = Place::new();
-    let error = if gpu.facts().kind == "cpu" { "12% --photons 1024 --caustic-photons 1024" } else { "3%" };
-    place.succeed(&format!("render cornell-spheres --size 24x24 --error {error} -o piloted.exr -q"));
+    if all {
+        let error = if gpu.facts().kind == "cpu" { "12% --photons 1024 --caustic-photons 1024" } else { "3%" };
+        place.succeed(&format!("render cornell-spheres --size 24x24 --error {error} -o piloted.exr -q"));
+    } else {
+        place.succeed("render cornell --size 16x16 --error 50% --photons 1024 --save-settings s.json -q");
+        let mut chosen = place.json("s.json");
+        chosen["tiles"] = vec!["0012"; 4].into();
+        place.write("s.json", chosen.to_string());
+        place.succeed("render cornell --size 16x16 --settings s.json --rounds 8 -o piloted.exr -q");
+    }
+    let filter = if all { "--filter tent" } else { "" };
     let Repeat::With { tiles, .. } = Metadata::read(&place.content("piloted.exr")).unwrap().repeat else { panic!("cannot be repeated") };
     assert!(tiles.is_some());
     place.write("a scene.gltf", square_file());
     // As many rounds as there is time for.
     let of_file = format!("render 'a scene.gltf' -o file.png --time 0.2s --environment 0.5 --tone linear --exposure 1 {SMALL}");
     place.succeed(&of_file);
-    place.succeed(&format!("render cornell -o half.exr --rounds 8 --filter tent --checkpoint half.pms {SMALL}"));
+    place.succeed(&format!("render cornell -o half.exr --rounds 8 {filter} --checkpoint half.pms {SMALL}"));
     // The last three are less than a block.
-    place.succeed(&format!("render cornell -o resumed.exr --rounds 11 --filter tent --resume half.pms {SMALL}"));
+    place.succeed(&format!("render cornell -o resumed.exr --rounds 11 {filter} --resume half.pms {SMALL}"));
     place.succeed("map cornell -o map.pm --photons 500 --rounds 8 -q");
     place.succeed("render cornell --map map.pm --rounds 4 -o mapped.png --size 8x8 -q");
     for line in ["piloted.exr", "resumed.exr -o again.exr", "mapped.png"] {
@@ -291,7 +344,7 @@ fn what_cannot_be_made_again_is_refused() {
     let Some(_) = device() else { return };
     let place = Place::new();
     place.write("scene.gltf", square_file());
-    place.succeed(&format!("render scene.gltf -o a.png --rounds 4 {SMALL}"));
+    place.succeed(&format!("render scene.gltf -o a.png --rounds 4 --environment 0.5 {SMALL}"));
     // Another scene of that name.
     place.write("scene.gltf", square_file().replace("[0.5,0.25,0.125,1]", "[0.5,0.25,0.25,1]"));
     // Without what it says, and without it as another version does.

@@ -175,9 +175,9 @@ fn let_in(ior: f64) -> f64 {
 
 /// A shaft of perfect mirrors is infinitely wide. Half of it is glass: of even light 0.908222 enters it, and
 /// 0.908222 / n^2 = 0.403654 leaves it (flux is not compressed, unlike radiance); the rest returns to the black lamp. The lamp
-/// above is red, the one below green. Notices 4.5 %: all angles as if straight on would be 6 %.
-#[test]
-fn diffuse_light_crosses_glass_by_its_mean_transmittance() {
+/// above is red, the one below green. Notices 4.5 %: all angles as if straight on would be 6 %. `all`: by shadow rays and a caustic map
+/// too, and by every builder.
+fn diffuse_light_crosses_glass(all: bool) {
     let Some(gpu) = device() else { return };
     let entering = let_in(IOR);
     assert!((entering - 0.908_222_0).abs() < 1e-6, "{entering}");
@@ -188,10 +188,10 @@ fn diffuse_light_crosses_glass_by_its_mean_transmittance() {
     let scene = scene_of(meshes, [vec![glass(IOR as f32)], lamps.to_vec(), vec![mirror(1.0)]].concat(), vec![]);
     let points = [grid(-0.5, DVec3::Y, 6), grid(0.5, DVec3::NEG_Y, 6)].concat();
     let mut family = Family::default();
-    for illumination in BOTH {
+    for illumination in BOTH.into_iter().filter(|illumination| all || *illumination == Illumination::Photons) {
         // More than n hits of the sides lie ahead of a ray with the chance 1.6 / n^2: 4e-4 of the light is left out.
         let settings = optics(fixed_radius(illumination, 20_000, 1, 64, 0.1));
-        if illumination == Illumination::Photons {
+        if all && illumination == Illumination::Photons {
             assert_builders_agree(&gpu, &scene, &settings, &points);
         }
         let runs = irradiances(&gpu, &scene, &settings, &points, 1..13);
@@ -207,6 +207,17 @@ fn diffuse_light_crosses_glass_by_its_mean_transmittance() {
     }
     // What returns into the air is so little of the light that it notices less.
     family.assert_tells(0.045, |what| !what.starts_with("back into the air"));
+}
+
+#[test]
+fn diffuse_light_crosses_glass_by_its_mean_transmittance() {
+    diffuse_light_crosses_glass(false);
+}
+
+#[test]
+#[ignore = "long: kernels of a caustic map and of another builder"]
+fn diffuse_light_crosses_glass_by_every_way_of_lighting() {
+    diffuse_light_crosses_glass(true);
 }
 
 /// A spot light between two mirrors of reflectance 0.8, 1 m before the end of their corridor: the end is lit by all

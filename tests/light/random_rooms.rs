@@ -425,12 +425,12 @@ fn show(seed: u64, found: &[Found]) {
     found.iter().for_each(|found| print!("{}", found.line()));
 }
 
-#[test]
-fn seven_random_rooms_are_right_within_their_errors() {
+/// So many rooms with more than so many points, which so much more light, or noise stated so many times, makes wrong.
+fn single_rooms_are_right(count: usize, points: usize, (gain, noise): (f64, f64)) {
     let Some(gpu) = device() else { return };
     // Of one room each.
     let (seeds, is_shown) = seeds(0..100);
-    let single = seeds.into_iter().filter(|seed| is_shown || rooms(*seed).len() == 1).take(7);
+    let single = seeds.into_iter().filter(|seed| is_shown || rooms(*seed).len() == 1).take(count);
     let found: Vec<Found> = single.flat_map(|seed| lit_rooms(&gpu, seed, false)).collect();
     if is_shown {
         show(found[0].seed, &found);
@@ -439,10 +439,22 @@ fn seven_random_rooms_are_right_within_their_errors() {
     }
     let clear = of(Place::Clear, &found);
     println!("{:?}", Statistics::new(&clear.iter().map(Found::z).collect::<Vec<_>>()));
-    assert!(clear.len() > 40, "{} points", clear.len());
-    assert_holds("seven rooms", judge(&clear));
-    assert_complains("a tenth more light", judge(&spoiled(&clear, 1.1, 1.0)));
-    assert_complains("half the noise", judge(&spoiled(&clear, 1.0, 0.5)));
+    assert!(clear.len() > points, "{} points", clear.len());
+    assert_holds(format!("{count} rooms"), judge(&clear));
+    assert_complains("more light", judge(&spoiled(&clear, gain, 1.0)));
+    assert_complains("less noise", judge(&spoiled(&clear, 1.0, noise)));
+}
+
+/// Few points notice only what is far off.
+#[test]
+fn two_random_rooms_are_right_within_their_errors() {
+    single_rooms_are_right(2, 8, (1.3, 0.25));
+}
+
+#[test]
+#[ignore = "long: most of a minute of radiosity on the host"]
+fn seven_random_rooms_are_right_within_their_errors() {
+    single_rooms_are_right(7, 40, (1.1, 0.5));
 }
 
 /// A point of a box of 1 mm, which two or three photons have found that have almost no blue: its right blue, 40 times what they have,
@@ -481,10 +493,9 @@ fn two_hundred_random_rooms_are_right_within_their_errors() {
 }
 
 /// Where every wall emits what it does not scatter, light is pi everywhere, behind boxes too.
-#[test]
-fn radiosity_of_a_cavity_is_even() {
-    for seed in [0, 9] {
-        let mut room = rooms(seed).remove(0);
+fn cavities_are_even(seeds: &[u64]) {
+    for seed in seeds {
+        let mut room = rooms(*seed).remove(0);
         room.rectangles.iter_mut().for_each(|side| side.emission = DVec3::ONE - side.albedo);
         let expected: Vec<[DVec3; 2]> = expected(&room).into_iter().flatten().collect();
         assert!(expected.len() > POINTS / 2, "seed {seed}");
@@ -493,17 +504,33 @@ fn radiosity_of_a_cavity_is_even() {
     }
 }
 
+#[test]
+fn radiosity_of_a_cavity_is_even() {
+    cavities_are_even(&[9]);
+}
+
+#[test]
+#[ignore = "long: with the other tests of the reference"]
+fn radiosity_of_cavities_is_even() {
+    cavities_are_even(&[0, 9]);
+}
+
 /// Of patches half as large light is the same within the error that is taken for it at three points of four, and
 /// nowhere further off than a run's noise.
 #[test]
+#[ignore = "long: patches of an eighth, ten seconds on the host"]
 fn finer_patches_change_less_than_the_error_stated() {
+    let known = [9, 16].map(|seed| {
+        let room = rooms(seed).remove(0);
+        let expected = expected(&room);
+        (room, expected)
+    });
     let off = |fineness: f64| {
         let mut off = Vec::new();
-        for seed in [9, 16] {
-            let room = rooms(seed).remove(0);
+        for (room, expected) in &known {
             let finer = Radiosity::solve(&room.rectangles, fineness);
-            for ((at, normal), expected) in pairs(&room.points, expected(&room)) {
-                let Some([light, error]) = expected else { continue };
+            for ((at, normal), expected) in pairs(&room.points, expected) {
+                let Some([light, error]) = *expected else { continue };
                 off.push(((finer.irradiance(*at, *normal) - light).abs() / error).max_element());
             }
         }

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use crate::common::estimate_check;
-use crate::common::layered::without_maps;
 use crate::common::prelude::*;
 use crate::light::openings::{direct, room_under};
 use glam::dvec3;
@@ -99,20 +98,22 @@ fn every_builder_has_the_same_photons_of_a_picture() {
     assert_builders_agree(&gpu, &floor_under(sunny(64, 3000.0)), &settings(Illumination::Photons), &[(DVec3::ZERO, DVec3::Y)]);
 }
 
-/// A scene with a ball of glass, a mirror and layered plates under a picture: each part is what the path tracer finds.
-#[test]
-fn every_part_of_the_light_is_what_the_path_tracer_finds() {
+/// A scene with a ball of glass and a mirror under a picture, and a ball of layers or none: each part is what the path tracer finds.
+fn every_part_is_found(has_layers: bool) {
     let Some(gpu) = device() else { return };
-    let meshes = vec![
+    let mut meshes = vec![
         level(0.0, [4.0, 4.0], true, 0),
         Mesh::sphere("glass", dvec3(0.0, 0.5, 0.0), 0.4, 32, 1),
         Mesh::parallelogram("mirror", dvec3(-1.5, 0.0, -1.5), DVec3::X * 3.0, DVec3::Y * 1.5, 2),
-        Mesh::sphere("coat", dvec3(1.0, 0.3, 0.3), 0.3, 24, 3),
     ];
-    let layered = Material { surface: Surface::Layered, ..matt(0.6) };
-    let scene = scene_of(meshes, vec![matt(0.5), glass(1.5), mirror(0.9), layered], vec![LightKind::Sky(Arc::new(sunny(16, 40.0)))]);
+    let mut materials = vec![matt(0.5), glass(1.5), mirror(0.9)];
+    if has_layers {
+        meshes.push(Mesh::sphere("coat", dvec3(1.0, 0.3, 0.3), 0.3, 24, 3));
+        materials.push(Material { surface: Surface::Layered, ..matt(0.6) });
+    }
+    let scene = scene_of(meshes, materials, vec![LightKind::Sky(Arc::new(sunny(16, 40.0)))]);
     let camera = Camera::looking_at("eye", dvec3(0.5, 1.6, 2.8), dvec3(0.0, 0.3, 0.0), DVec3::Y, 0.8);
-    let image = Judge::new(&scene, 32).image(&camera, 12, 9, 2000, 1);
+    let image = Judge::new(&scene, 32).image(&camera, 12, 9, 2600, 1);
     // Sums over the picture, whose errors are known from runs of other seeds.
     let runs: Vec<_> = (1..=16)
         .map(|seed| {
@@ -131,6 +132,17 @@ fn every_part_of_the_light_is_what_the_path_tracer_finds() {
         family.expect_estimate(format!("{part:?}"), found, own.hypot(judged).hypot(0.005 * expected), runs.len() as u32, expected);
     }
     family.assert_tells(0.4, |_| true);
+}
+
+#[test]
+fn every_part_of_the_light_is_what_the_path_tracer_finds() {
+    every_part_is_found(false);
+}
+
+#[test]
+#[ignore = "long: kernels of layered materials, half a minute on a software device"]
+fn every_part_of_the_light_beside_layers_is_what_the_path_tracer_finds() {
+    every_part_is_found(true);
 }
 
 /// Where the sun itself shines in, rays that are aimed at the window take none from those that are aimed at the sun.
@@ -159,12 +171,13 @@ fn a_sun_that_shines_in_has_as_many_rays_as_without_openings() {
     }
 }
 
-/// A patch of sun among points that see the sky alone keeps its shadow rays, though aimed rays find the sky from all of them.
-#[test]
-fn a_patch_of_sun_keeps_its_rays_beside_an_aimed_sky() {
+/// A patch of sun among points that see the sky alone keeps its shadow rays, though aimed rays find the sky from all of them. What walls
+/// scatter is not asked for, but has its photons in the trial.
+fn a_patch_of_sun_keeps_its_rays(albedo: f32) {
     let Some(gpu) = device() else { return };
     let way = dvec3(0.25, -1.0, 0.1).normalize();
     let mut scene = room_under(LightKind::Sky(Arc::new(sky(4, 2, |_, _| Vec3::splat(300.0)))));
+    scene.materials = vec![matt(albedo)];
     scene.lights.push(lamp(LightKind::Directional { direction: way, irradiance: Vec3::splat(100.0) }));
     // Too few lie in the sun to make a region of their own.
     let along = |k: u32| -1.9 + 3.8 * (f64::from(k) + 0.5) / 9.0;
@@ -176,24 +189,45 @@ fn a_patch_of_sun_keeps_its_rays_beside_an_aimed_sky() {
     assert!(error < 0.115, "{error}");
 }
 
-/// A sky that is black, or almost, makes no number that is none.
 #[test]
-fn black_skies_and_single_texels_leave_no_odd_number() {
+fn a_patch_of_sun_keeps_its_rays_beside_an_aimed_sky() {
+    a_patch_of_sun_keeps_its_rays(0.0);
+}
+
+#[test]
+#[ignore = "long: kernels of photons for the trial, fifteen seconds on a software device"]
+fn a_patch_of_sun_in_a_grey_room_keeps_its_rays() {
+    a_patch_of_sun_keeps_its_rays(0.5);
+}
+
+/// A sky that is black, or almost, makes no number that is none, on a bare floor or one below a ball of glass.
+fn skies_leave_no_odd_number(settings: &SceneSettings, has_glass: bool) {
     let Some(gpu) = device() else { return };
     let ball = Mesh::sphere("ball", dvec3(0.0, 0.5, 0.0), 0.4, 16, 1);
     for (width, height, bright) in [(1, 1, 0), (3, 2, 9), (64, 32, 64 * 20 + 5), (512, 1, 100)] {
         let picture = sky(width, height, |i, j| if j * width + i == bright { Vec3::splat(1e12) } else { Vec3::ZERO });
         let mut scene = floor_under(picture);
-        scene.materials.push(glass(1.5));
-        scene.meshes.push(ball.clone());
-        let lit = received(
-            &gpu,
-            &scene,
-            &SceneSettings { rounds: 2, photons: 2000, caustic_photons: 2000, ..by_rounds() },
-            &[(DVec3::X, DVec3::Y)],
-        );
+        if has_glass {
+            scene.materials.push(glass(1.5));
+            scene.meshes.push(ball.clone());
+        }
+        let settings = SceneSettings { rounds: 2, photons: 2000, caustic_photons: 2000, ..settings.clone() };
+        let lit = received(&gpu, &scene, &settings, &[(DVec3::X, DVec3::Y)]);
         assert!(lit.film.mean(0).is_finite(), "{width} x {height}");
     }
+}
+
+/// By photons and by shadow rays, with the kernels of other tests here.
+#[test]
+fn black_skies_and_single_texels_leave_no_odd_number() {
+    skies_leave_no_odd_number(&settings(Illumination::Photons), false);
+    skies_leave_no_odd_number(&SceneSettings { part: Part::Direct, ..settings(Illumination::Split) }, false);
+}
+
+#[test]
+#[ignore = "long: kernels of glass, twenty seconds on a software device"]
+fn black_skies_through_glass_leave_no_odd_number() {
+    skies_leave_no_odd_number(&by_rounds(), true);
 }
 
 /// Each channel of an even sky lights a floor by what it is, whatever the ratio to the others.
@@ -252,7 +286,9 @@ fn a_sun_in_one_pixel_is_seen() {
         ("a front", vec![sheet(1.0, true, 1), sheet(-1.0, true, 0)], 0.0),
     ] {
         let scene = scene_of(meshes, materials.clone(), vec![LightKind::Sky(Arc::new(picture.clone()))]);
-        let settings = without_maps(SceneSettings { samples: 16, rounds: 32, ..by_rounds() });
+        // Sheets are black. Kernels have the effects of these sheets and no others.
+        let without = vec![Effect::Indirect, Effect::ReflectiveCaustics, Effect::RefractiveCaustics];
+        let settings = SceneSettings { samples: 16, rounds: 32, without, aim: false, ..by_rounds() };
         let lit = render(&gpu, &scene, &settings, Target::Picture(&camera, [SIZE; 2])).unwrap();
         let found = pixels.iter().map(|pixel| lit.film.mean(*pixel).x).sum::<f64>();
         let error = pixels.iter().map(|pixel| lit.film.standard_error(*pixel).x.powi(2)).sum::<f64>().sqrt();

@@ -153,12 +153,11 @@ fn a_prism_deviates_each_colour_by_its_index() {
 
 /// A ray beside the axis crosses it behind a ball of radius 1 at h / sin(2 (i - r)), sin i = h and sin r = h / n: close to the axis at
 /// the focal length n / (2 (n - 1)).
-#[test]
-fn a_ball_has_a_focal_length_for_each_colour() {
+fn a_ball_has_focal_lengths(heights: &[f64]) {
     let Some(gpu) = device() else { return };
     let at = 3.0;
     let ball = Mesh::sphere("ball", DVec3::ZERO, 1.0, 256, 0);
-    for height in [0.05, 0.4] {
+    for &height in heights {
         let rays = [DVec3::new(-9.0, height, 0.0), DVec3::new(0.0, height, 0.0)];
         let materials = vec![dispersive(Vec3::ONE), unlit()];
         let deviation = |ior: f64| 2.0 * (height.asin() - (height / ior).asin());
@@ -176,6 +175,17 @@ fn a_ball_has_a_focal_length_for_each_colour() {
             }
         }
     }
+}
+
+#[test]
+fn a_ball_has_a_focal_length_for_each_colour() {
+    a_ball_has_focal_lengths(&[0.05]);
+}
+
+#[test]
+#[ignore = "long: minutes on a software device"]
+fn a_ball_has_a_focal_length_for_each_colour_and_height() {
+    a_ball_has_focal_lengths(&[0.05, 0.4]);
 }
 
 /// Sunlight that a prism sends to a floor of its own for each colour: next to the edge's image red arrives alone, then green, too.
@@ -212,9 +222,9 @@ pub fn prism_photons(gpu: &Gpu) -> Check<Complaint> {
     Ok(())
 }
 
-/// What has no dispersion has the same bits beside what has: its kernels have more code, and no path and no photon chooses a colour.
-#[test]
-fn glass_without_dispersion_keeps_its_bits() {
+/// What has no dispersion has the same bits beside what has: its kernels have more code, and no photon chooses a colour, nor any path
+/// from the eye where one looks at it too.
+fn glass_keeps_its_bits(is_seen: bool) {
     let Some(gpu) = device() else { return };
     let clear = Material { layers: Layers { dispersion: 0.0, ..dispersive(Vec3::ONE).layers }, ..dispersive(Vec3::ONE) };
     let meshes = vec![Mesh::sphere("ball", DVec3::Y * 0.5, 0.4, 16, 0), level(0.0, [2.0; 2], true, 1)];
@@ -222,8 +232,22 @@ fn glass_without_dispersion_keeps_its_bits() {
     let camera = Camera::looking_at("eye", DVec3::new(0.0, 1.0, 3.0), DVec3::Y * 0.4, DVec3::Y, 0.6);
     let sums = [vec![], vec![Effect::Dispersion]].map(|with| {
         let settings = SceneSettings { with, ..mapped(5000, 2, 8, 0.2) };
-        seen(&gpu, &scene, &settings, &camera, [16, 16]).film.sums.clone()
+        let points = || grid(0.0, DVec3::Y, 4);
+        let lit = if is_seen { seen(&gpu, &scene, &settings, &camera, [16, 16]) } else { received(&gpu, &scene, &settings, &points()) };
+        lit.film.sums.clone()
     });
     assert!(sums[0].iter().any(|sum| *sum > 0));
     assert_eq!(sums[0], sums[1]);
+}
+
+#[test]
+#[ignore = "long: half a minute on a software device"]
+fn glass_without_dispersion_keeps_its_bits() {
+    glass_keeps_its_bits(false);
+}
+
+#[test]
+#[ignore = "long: minutes on a software device"]
+fn glass_without_dispersion_keeps_its_bits_to_the_eye() {
+    glass_keeps_its_bits(true);
 }

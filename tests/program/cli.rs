@@ -512,6 +512,7 @@ fn results_that_cannot_be_written_are_saved_elsewhere() {
 
 /// No file at all can grow, as with a full disk everywhere: what was measured is printed.
 #[test]
+#[ignore = "long: ten seconds of the paper's measurements, which the short run makes once"]
 fn a_measured_paper_run_is_not_lost_on_a_full_disk() {
     let place = Place::new();
     // Without a device it is the CPU builder's, which is the shortest.

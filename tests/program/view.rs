@@ -285,7 +285,7 @@ fn a_window_opens_resizes_hides_shows_renders_and_closes() {
     }
     let place = Place::new();
     let desktop = Desktop::new(&place);
-    let mut program = desktop.start(&place, "view open-box --size 40x30 --photons 1024 --time 1s --validate");
+    let mut program = desktop.start(&place, "view cornell --size 40x30 --photons 1024 --time 1s --validate");
     let window = desktop.window();
     wait_for("a picture", || desktop.has_picture(window).then_some(()));
     // Without the panel the window is the picture.

@@ -11,16 +11,16 @@ uint incoming_list()
     return push.list;
 }
 
-// Where photon `index` of `photon_count` has its slot. Those of a caustic map land once, and have one slot.
+// Where photon `index` of `photon_count` has its slot: one for each flight, where it may land more than once.
 uint slot_of(uint index, uint photon_count)
 {
-    return push.map.caustic_only != 0 ? index : push.list * photon_count + index;
+    return push.map.lands_once != 0 ? index : push.list * photon_count + index;
 }
 
 // Whether a slot is written though nothing is stored in it.
 bool clears_slot()
 {
-    return push.map.caustic_only == 0 || push.list == 0;
+    return push.map.lands_once == 0 || push.list == 0;
 }
 
 // Whether another bounce will read what this one hands on.

@@ -91,7 +91,7 @@ void note_shadow_rays(uint pixel, vec3 weight)
     } else {
         note_miss(pixel, HIT_SHADOW_RAY, weight * stopped_light);
     }
-    bool may_be_unseen = LIGHT_CLUSTERS != 0;
+    bool may_be_unseen = HAS_LIGHT_CLUSTERS;
     if (HAS_OPENINGS) {
         may_be_unseen = true;
     }

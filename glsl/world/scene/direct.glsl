@@ -163,7 +163,7 @@ vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uin
     uint sample_count = own.count * work.rounds_per_block;
     uint ray_count = work.shadow_rays;
     uint unseen_row = 0;
-    if (LIGHT_CLUSTERS != 0) {
+    if (HAS_LIGHT_CLUSTERS) {
         unseen_row = row_of_shares(point.position, point.ng, false);
         bool asks_unseen = ((number + mix32(words.x + words.y)) & (SAMPLES_PER_UNSEEN - 1)) == 0 && !is_empty(unseen_row);
         ray_count += uint(asks_unseen);
@@ -173,8 +173,8 @@ vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uin
         Emitter light;
         float by_power = 0.0;
         float count = 1.0;
-        if (LIGHT_CLUSTERS != 0) {
-            uint row = unseen_row - LIGHT_CLUSTERS;
+        if (HAS_LIGHT_CLUSTERS) {
+            uint row = unseen_row - cluster_count();
             if (ray == work.shadow_rays) {
                 row = unseen_row;
                 u = stratified(number, sample_count, uvec4(mix32(words.x), mix32(words.y), mix32(words.z), mix32(words.w)));

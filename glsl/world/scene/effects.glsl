@@ -80,5 +80,5 @@ layout(constant_id = 40) const bool HAS_AIMED_PHOTONS = true;
 layout(constant_id = 50) const bool HAS_OPENINGS = false;
 // Radii differ from point to point.
 layout(constant_id = 48) const bool HAS_RADIUS_CLASSES = false;
-// Clusters of lights, of which a shadow ray chooses one by what they did in a trial; 0: it chooses a light by its power.
-layout(constant_id = 49) const uint LIGHT_CLUSTERS = 0;
+// A shadow ray chooses one of several clusters of lights by what they did in a trial, and not a light by its power.
+layout(constant_id = 49) const bool HAS_LIGHT_CLUSTERS = false;

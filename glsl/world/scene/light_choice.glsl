@@ -3,8 +3,8 @@
 
 layout(set = 0, binding = 10, scalar) readonly buffer LightNodes { LightNode light_nodes[]; };
 layout(set = 0, binding = 11, scalar) readonly buffer LightRegions { LightRegion light_regions[]; };
-// Two rows of cumulative shares a region: of the clusters that the trial saw there, and of the others. Those of a row that has none
-// are all 0.
+// The number of clusters, as bits; then two rows of cumulative shares a region: of the clusters that the trial saw there, and of the
+// others. Those of a row that has none are all 0.
 layout(set = 0, binding = 12, scalar) readonly buffer LightShares { float light_shares[]; };
 
 // A light, and the probability of this choice.
@@ -12,6 +12,11 @@ struct ChosenLight {
     uint emitter;
     float probability;
 };
+
+uint cluster_count()
+{
+    return floatBitsToUint(light_shares[0]);
+}
 
 // Where a row of a place's region begins.
 uint row_of_shares(vec3 position, vec3 normal, bool is_seen)
@@ -21,12 +26,12 @@ uint row_of_shares(vec3 position, vec3 normal, bool is_seen)
         float at = region.axis < 3 ? position[region.axis] : normal[region.axis - 3];
         region = light_regions[region.next + uint(at >= region.split)];
     }
-    return (2 * region.next + uint(!is_seen)) * LIGHT_CLUSTERS;
+    return 1 + (2 * region.next + uint(!is_seen)) * cluster_count();
 }
 
 bool is_empty(uint row)
 {
-    return light_shares[row + LIGHT_CLUSTERS - 1] == 0.0;
+    return light_shares[row + cluster_count() - 1] == 0.0;
 }
 
 // No light is rarer than so at any node of the tree: what is far may be all that is in sight.
@@ -62,7 +67,7 @@ ChosenLight choose_within(uint cluster, float probability, vec3 position, uint w
 ChosenLight choose_light(uint row, vec3 position, float u, uint word)
 {
     uint low = 0;
-    uint high = LIGHT_CLUSTERS - 1;
+    uint high = cluster_count() - 1;
     while (low < high) {
         uint middle = (low + high) / 2;
         if (light_shares[row + middle] > u) {

@@ -79,7 +79,7 @@ fn what_clusters_add(gpu: &Gpu, commands: &mut Commands, round: Round, tree: &Li
         let resources = round.resources;
         let kernel =
             TryLights { scene: &resources.scene, receivers: &receivers, found: &found, nonfinite_values: &resources.nonfinite_values };
-        let push = TryLightsPush { draws, first_pair, end_pair, ray_count };
+        let push = TryLightsPush { draws, first_pair, end_pair, cluster_count: tree.cluster_count as u32, ray_count };
         commands.dispatch(kernel, &push, Extent::Items(u64::from(end_pair - first_pair)))
     })?;
     Ok((commands.read(&found, pair_count as usize)?, ray_count))

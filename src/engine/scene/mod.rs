@@ -36,6 +36,8 @@ pub mod trace;
 pub mod trial;
 mod trial_rays;
 
+use std::borrow::Cow;
+
 use glam::DVec3;
 
 pub use film::SceneFilm;
@@ -51,6 +53,7 @@ use crate::plan::scene::ScenePlan;
 use crate::plan::sensor::Sensor;
 use crate::records::Receiver;
 use crate::scene::geometry::Geometry;
+use crate::scene::sensors::with_sensors;
 use crate::scene::{Camera, Scene};
 use crate::settings::scene::SceneSettings;
 use resources::SceneResources;
@@ -125,6 +128,10 @@ pub fn receiver(geometry: &Geometry, (position, normal): (DVec3, DVec3)) -> Rece
 
 /// Lights a scene to the end of the run, with default radii from a trial round.
 pub fn render(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, target: Target) -> Result<RunResult> {
+    let scene = &match target {
+        Target::Points(points) => with_sensors(scene, points, settings),
+        Target::Picture(..) => Cow::Borrowed(scene),
+    };
     let geometry = Geometry::new(&scene.without(&settings.without))?;
     let view = View { geometry: &geometry, camera: target.camera(), phases: &target.phases(&geometry) };
     let plan = trial::plan(gpu, scene, &view, settings, target.sensor())?;

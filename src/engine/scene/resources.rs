@@ -4,6 +4,7 @@ use crate::engine::planned::{Planned, buffers};
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Gpu, kernels};
 use crate::photon::MapPhoton;
+use crate::plan::light_choice::LightChoice;
 use crate::plan::scene::ScenePlan;
 use crate::records::*;
 use crate::scene::albedo;
@@ -21,7 +22,7 @@ buffers! {
             kernels::Scene {
             nodes: planned.filled(commands, "nodes", &geometry.nodes)?,
             triangles: planned.filled(commands, "triangles", &geometry.triangles)?,
-            planes: planned.filled(commands, "planes", &geometry.planes)?,
+            planes: planned.filled(commands, "planes", &geometry.plane_words())?,
             normals: planned.filled(commands, "normals", &geometry.normals)?,
             uvs: planned.filled(commands, "texture coordinates", &geometry.uvs)?,
             colours: planned.filled(commands, "vertex colours", &geometry.colours)?,
@@ -39,7 +40,7 @@ buffers! {
             light_nodes: planned.filled(commands, "light nodes", plan.lights().map_or(&[], |lights| &lights.nodes))?,
             light_regions: planned.filled(commands, "light regions", plan.lights().map_or(&[], |lights| &lights.regions))?,
             openings: planned.filled(commands, "openings", &plan.openings())?,
-            light_shares: planned.filled(commands, "light shares", plan.lights().map_or(&[], |lights| &lights.shares))?,
+            light_shares: planned.filled(commands, "light shares", &plan.lights().map_or_else(Vec::new, LightChoice::words))?,
             }
         },
         /// Points of all phases; empty for a picture.

@@ -65,7 +65,7 @@ pub fn trace(
         let flights = map.segment_bounces.min(map.bounces - first_bounce);
         let parity = commands.scope("trace", |commands| segment(commands, round, photons, map, start, flights))?;
         first_bounce += flights;
-        let slots = has_slots(round.plan).then(|| chunk.1 * if map.caustic_only { 1 } else { flights });
+        let slots = has_slots(round.plan).then(|| chunk.1 * if map.lands_once { 1 } else { flights });
         if let Some(slots) = slots {
             commands.fill(&photons.counters, 0, 1, slots);
         }
@@ -174,6 +174,7 @@ fn store(plan: &ScenePlan, map: &MapPlan) -> PhotonStore {
         photon_capacity: map.capacity,
         stored: map.stored,
         caustic_only: u32::from(map.caustic_only),
+        lands_once: u32::from(map.lands_once),
         caustic_surfaces: plan.caustic_surfaces,
     }
 }

@@ -46,6 +46,8 @@ pub struct Geometry {
     pub triangles: Vec<Triangle>,
     /// Of triangles: unit normal n of the front, then what makes n . p + offset = 0.
     pub planes: Vec<Vec4>,
+    /// The number of the first plane that only sheets of points in the air lie in ([`super::sensors`]); such planes are the last ones.
+    pub first_sensor_plane: u32,
     /// For each triangle (mesh, triangle of the mesh).
     pub sources: Vec<(u32, u32)>,
     pub normals: Vec<TriangleNormals>,
@@ -183,6 +185,9 @@ impl Geometry {
             }
             planes.of_triangles[covered.triangle] |= HIDDEN;
         }
+        let is_seen = |(_, (mesh, _)): &(&u32, &(u32, u32))| !scene.materials[scene.meshes[*mesh as usize].material].is_not_there();
+        let of_surfaces = planes.of_triangles.iter().zip(&sources).filter(is_seen).map(|(plane, _)| plane & !HIDDEN);
+        let first_sensor_plane = of_surfaces.max().map_or(0, |last| last + 1);
         progress("building the hierarchy", 0.0);
         let Bvh { nodes, order } = Bvh::build(&corners);
         progress("preparing triangles", 0.5);
@@ -238,6 +243,7 @@ impl Geometry {
             nodes,
             triangles,
             planes: planes.planes,
+            first_sensor_plane,
             sources,
             normals,
             uvs,
@@ -266,6 +272,12 @@ impl Geometry {
     pub fn texel_parts(&self) -> [&[u32]; TEXEL_BUFFERS] {
         let mut parts = self.texels.chunks(TEXELS_PER_BUFFER as usize);
         std::array::from_fn(|_| parts.next().unwrap_or(&[]))
+    }
+
+    /// The planes as kernels have them: behind them, as bits, the number of the first one of points in the air.
+    pub fn plane_words(&self) -> Vec<Vec4> {
+        let last = Vec4::new(f32::from_bits(self.first_sensor_plane), 0.0, 0.0, 0.0);
+        [self.planes.as_slice(), &[last]].concat()
     }
 
     /// A normalised position in metres of the scene.
