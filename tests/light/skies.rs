@@ -98,22 +98,20 @@ fn every_builder_has_the_same_photons_of_a_picture() {
     assert_builders_agree(&gpu, &floor_under(sunny(64, 3000.0)), &settings(Illumination::Photons), &[(DVec3::ZERO, DVec3::Y)]);
 }
 
-/// A scene with a ball of glass and a mirror under a picture, and a ball of layers or none: each part is what the path tracer finds.
-fn every_part_is_found(has_layers: bool) {
+/// A scene with a ball of glass, a mirror and layered plates under a picture: each part is what the path tracer finds.
+#[test]
+fn every_part_of_the_light_is_what_the_path_tracer_finds() {
     let Some(gpu) = device() else { return };
-    let mut meshes = vec![
+    let meshes = vec![
         level(0.0, [4.0, 4.0], true, 0),
         Mesh::sphere("glass", dvec3(0.0, 0.5, 0.0), 0.4, 32, 1),
         Mesh::parallelogram("mirror", dvec3(-1.5, 0.0, -1.5), DVec3::X * 3.0, DVec3::Y * 1.5, 2),
+        Mesh::sphere("coat", dvec3(1.0, 0.3, 0.3), 0.3, 24, 3),
     ];
-    let mut materials = vec![matt(0.5), glass(1.5), mirror(0.9)];
-    if has_layers {
-        meshes.push(Mesh::sphere("coat", dvec3(1.0, 0.3, 0.3), 0.3, 24, 3));
-        materials.push(Material { surface: Surface::Layered, ..matt(0.6) });
-    }
-    let scene = scene_of(meshes, materials, vec![LightKind::Sky(Arc::new(sunny(16, 40.0)))]);
+    let layered = Material { surface: Surface::Layered, ..matt(0.6) };
+    let scene = scene_of(meshes, vec![matt(0.5), glass(1.5), mirror(0.9), layered], vec![LightKind::Sky(Arc::new(sunny(16, 40.0)))]);
     let camera = Camera::looking_at("eye", dvec3(0.5, 1.6, 2.8), dvec3(0.0, 0.3, 0.0), DVec3::Y, 0.8);
-    let image = Judge::new(&scene, 32).image(&camera, 12, 9, 2600, 1);
+    let image = Judge::new(&scene, 32).image(&camera, 12, 9, 2000, 1);
     // Sums over the picture, whose errors are known from runs of other seeds.
     let runs: Vec<_> = (1..=16)
         .map(|seed| {
@@ -132,17 +130,6 @@ fn every_part_is_found(has_layers: bool) {
         family.expect_estimate(format!("{part:?}"), found, own.hypot(judged).hypot(0.005 * expected), runs.len() as u32, expected);
     }
     family.assert_tells(0.4, |_| true);
-}
-
-#[test]
-fn every_part_of_the_light_is_what_the_path_tracer_finds() {
-    every_part_is_found(false);
-}
-
-#[test]
-#[ignore = "long: kernels of layered materials, half a minute on a software device"]
-fn every_part_of_the_light_beside_layers_is_what_the_path_tracer_finds() {
-    every_part_is_found(true);
 }
 
 /// Where the sun itself shines in, rays that are aimed at the window take none from those that are aimed at the sun.
