@@ -9,6 +9,7 @@ use super::values::{parse_integer, parse_percent, value_enum};
 use super::{JsonOrStdoutArg, complain, optional_file, say_beside};
 use crate::error::{Error, Result, require, within};
 use crate::output::destination::{Destination, check_distinct, check_not_read, write_all};
+use crate::output::exr_file;
 use crate::verify::compare::Comparison;
 use crate::verify::compare::false_colour::Show;
 use crate::verify::compare::pair::Pair;
@@ -39,7 +40,7 @@ pub(super) struct CompareArgs {
     #[arg(long, value_name = "FILE", help_heading = "Checks")]
     errors_b: Option<PathBuf>,
     /// Blocks of rounds that the errors come from, of the picture that has fewer; errors of few blocks are uncertain, and z-scores
-    /// then follow Student's distribution [default: so many that they follow a normal one]
+    /// then follow Student's distribution [default: as the files of errors say; else so many that they follow a normal one]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Checks")]
     error_blocks: Option<u32>,
     /// End with exit code 1 if the RMSE is above so many per cent of the reference's mean
@@ -126,14 +127,19 @@ fn read(path: &Path) -> Result<Picture> {
 fn z_scores(args: &CompareArgs, pair: &Pair) -> Result<ZScores> {
     let mut errors = [None, None];
     let mut refusal = None;
+    // Of the picture that has fewer.
+    let mut freedom: Option<u32> = None;
     for ((errors, option), path) in errors.iter_mut().zip(ERRORS).zip([&args.errors_a, &args.errors_b]) {
         let Some(path) = path else { continue };
         let refuse = |reason: String| Error::setting(option, path.display(), reason);
         let picture = Picture::read(path).map_err(refuse)?;
         z_scores::check(&picture, pair).map_err(refuse)?;
         *errors = Some(picture);
+        let own = std::fs::read(path).ok().and_then(|content| exr_file::freedom(&content)).filter(|freedom| *freedom > 0);
+        freedom = freedom.into_iter().chain(own).min();
         refusal =
             Some(refuse("has no finite error above 0, so that there is no z-score; render eight blocks of rounds or more".to_owned()));
     }
-    ZScores::of(pair, errors.each_ref().map(Option::as_ref), args.error_blocks).ok_or_else(|| refusal.expect("an option names errors"))
+    ZScores::of(pair, errors.each_ref().map(Option::as_ref), args.error_blocks.or(freedom.map(|freedom| freedom + 1)))
+        .ok_or_else(|| refusal.expect("an option names errors"))
 }

@@ -55,6 +55,15 @@ fn encode_with((width, height): (u32, u32), channels: Vec<Channel>, set: impl Fn
     file.into_inner()
 }
 
+/// From how many degrees of freedom a file says that its standard errors are; `None` where it does not say, or is no OpenEXR file.
+pub fn freedom(content: &[u8]) -> Option<u32> {
+    let meta = MetaData::read_from_buffered(Cursor::new(content), false).ok()?;
+    match meta.headers.first()?.own_attributes.other.get(&Text::from(FREEDOM))? {
+        AttributeValue::I32(freedom) => u32::try_from(*freedom).ok(),
+        _ => None,
+    }
+}
+
 /// Size and channels of a file of 32-bit floats in one part.
 pub fn decode(content: &[u8]) -> std::result::Result<((u32, u32), Vec<Channel>), String> {
     check_layers(content, MOST_PIXELS)?;
@@ -73,4 +82,18 @@ pub fn decode(content: &[u8]) -> std::result::Result<((u32, u32), Vec<Channel>),
     };
     let channels = layer.channel_data.list.into_iter().map(channel).collect::<std::result::Result<_, _>>()?;
     Ok(((layer.size.0 as u32, layer.size.1 as u32), channels))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_of_errors_say_how_many_degrees_of_freedom_they_have() {
+        let one = || channels("", ["R", "G", "B"], [glam::Vec3::ONE].into_iter());
+        let source = ErrorSource { degrees_of_freedom: 7, confidence: 0.95 };
+        assert_eq!(freedom(&encode_errors((1, 1), one(), source)), Some(7));
+        assert_eq!(freedom(&encode((1, 1), one(), None)), None);
+        assert_eq!(freedom(b"no picture"), None);
+    }
 }

@@ -60,9 +60,15 @@ fn words(line: &str) -> Vec<&str> {
     parts.flat_map(|(k, part)| if k % 2 == 1 { vec![part] } else { part.split_whitespace().collect() }).collect()
 }
 
+/// The device under test, of a command line that uses one and names none.
+pub fn device_of(line: &str) -> Option<String> {
+    let has_none = ["compare", "denoise", "devices", "info", "map export", "map info", "merge"].iter().any(|name| line.starts_with(name));
+    std::env::var("PHOTONMILL_DEVICE").ok().filter(|_| !has_none && !line.contains("--device"))
+}
+
 /// A command line on the device under test.
 pub fn on_device(line: &str) -> String {
-    std::env::var("PHOTONMILL_DEVICE").map_or(line.to_owned(), |device| format!("{line} --device '{device}'"))
+    device_of(line).map_or(line.to_owned(), |device| format!("{line} --device '{device}'"))
 }
 
 /// The same under the validation layer.

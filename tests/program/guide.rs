@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 
 use crate::common::gltf_file::{square, square_buffer};
 use crate::common::prelude::*;
-use crate::common::program::PROGRAM;
+use crate::common::program::{PROGRAM, device_of};
 use crate::common::sources::{files, read, root};
 use photonmill::measure::bench::table::scaled;
 use photonmill::measure::bench::targets::{TARGETS, Target, Wanted};
@@ -181,9 +181,8 @@ fn run(folder: &Path, command: &str) -> Check {
     })?;
     let arguments: Vec<&str> = words.collect();
     let mut run = short(&arguments);
-    match std::env::var("PHOTONMILL_DEVICE") {
-        Ok(device) if !matches!(arguments.first(), Some(&"info" | &"compare" | &"devices")) => run.extend(["--device".to_owned(), device]),
-        _ => {}
+    if let Some(device) = device_of(&run.join(" ")) {
+        run.extend(["--device".to_owned(), device]);
     }
     program(folder, &run)?;
     match outputs(&arguments).into_iter().find(|path| !folder.join(path).exists()) {
