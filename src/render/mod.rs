@@ -195,32 +195,24 @@ impl PreparedScene {
         let allowed = format!("must be from 1 to {MAX_POINTS}, the number of points");
         require((1..=MAX_POINTS).contains(&points.len()), "--points", points.len(), allowed)?;
         let settings = request.settings(None);
-        settings.validate()?;
-        if let Cow::Owned(scene) = with_sensors(&self.scene, points, &settings) {
-            let geometry = Geometry::new(&scene)?;
+        let with = match with_sensors(&self.scene, points, &settings) {
+            Cow::Borrowed(_) => None,
             // Of its sheets nothing is to be said.
-            let with = PreparedScene { scene: Arc::new(scene), geometry, path: self.path.clone(), warnings: Vec::new() };
-            return with.probe_as_it_is(gpus, points, request, settings, control);
-        }
-        self.probe_as_it_is(gpus, points, request, settings, control)
-    }
-
-    /// The same, of points that lie on a surface, or in the air where nothing tells what light is lost there.
-    fn probe_as_it_is(
-        &self,
-        gpus: &mut Vec<Gpu>,
-        points: &[(DVec3, DVec3)],
-        request: &Request,
-        settings: SceneSettings,
-        control: &mut Control,
-    ) -> Result<Run> {
-        let (own, mut warnings) = self.geometry_of(&settings)?;
-        let geometry = own.as_ref().unwrap_or(&self.geometry);
+            Cow::Owned(scene) => Some(PreparedScene {
+                geometry: Geometry::new(&scene)?,
+                scene: Arc::new(scene),
+                path: self.path.clone(),
+                warnings: Vec::new(),
+            }),
+        };
+        let this = with.as_ref().unwrap_or(self);
+        let (own, mut warnings) = this.geometry_of(&settings)?;
+        let geometry = own.as_ref().unwrap_or(&this.geometry);
         warnings.extend(geometry.place_warning("points", points.iter().map(|(position, _)| *position)));
         let target = Target::Points(points);
         let phases = target.phases(geometry);
         let looking = Looking { view: View { geometry, camera: None, phases: &phases }, sensor: target.sensor(), point: "point" };
-        self.light(gpus, &looking, settings, Free { samples: false, ..Free::of(request) }, warnings, control)
+        this.light(gpus, &looking, settings, Free { samples: false, ..Free::of(request) }, warnings, control)
     }
 
     /// Where the scene comes from.

@@ -137,7 +137,6 @@ impl Question {
                 | Finite
                 | FloorThroughSheets
                 | GlassInFurnace(..)
-                | LampBehindHole
                 | LampBetweenSheets
                 | LampInAMedium
                 | LampInBox(Illumination::Split)
@@ -145,11 +144,8 @@ impl Question {
                 | PhotonsOnAPlate
                 | PhotonsThroughASlab
                 | PrismPhotons
-                | RoomBesideHall
                 | SheetOverAFloor
                 | SkyPhotons
-                | Skylight
-                | TinyPlates
                 | Window
         )
     }

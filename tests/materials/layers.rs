@@ -3,7 +3,7 @@
 use crate::common::layered::{self, CLEAR, Mixtures, Returns, in_each_sun, inputs, layered, lobes_at, metal, plastic, row_of_texels};
 use crate::common::plates::{Place, Plates};
 use crate::common::prelude::*;
-use crate::common::{estimate_check, known, sheets};
+use crate::common::{estimate_check, known, planted, sheets};
 use crate::materials::media;
 use photonmill::engine::scene::{self, RunResult, Target};
 use photonmill::scene::material::{Coverage, Layers, Medium, NormalMap};
@@ -412,20 +412,27 @@ fn coarse_layered_glass_loses_no_light() {
 /// A photon of a caustic lands on a sheet with gaps, and again on what lies below it, whichever builder keeps it.
 #[test]
 fn caustics_are_kept_at_every_sheet_that_they_pass() {
-    let Some(gpu) = device() else { return };
+    let Some(mut gpu) = device() else { return };
     let mut meshes = media::cuboid("pane", DVec3::new(-2.0, 2.0, -2.0), DVec3::new(2.0, 2.1, 2.0), 1);
     meshes.extend([level(0.0, [4.0, 4.0], true, 0), level(0.5, [4.0, 4.0], true, 2)]);
     let sheet = Material { coverage: Coverage::Blend { alpha: 0.25 }, ..layered::dull(0.5) };
     let scene = scene_of(meshes, vec![matt(0.5), crate::common::lit::glass(1.5), sheet], vec![sun(DVec3::NEG_Y)]);
-    let found = [Builder::Persistent, Builder::Naive].map(|builder| {
+    let points = [0.5, 0.0].map(|y| (DVec3::new(0.3, y, 0.2), DVec3::Y));
+    let lit_by = |gpu: &Gpu, builder: Builder| {
         let settings = SceneSettings { builder: Some(builder), caustic_photons: 3001, part: Part::Caustic, rounds: 2, ..by_rounds() };
-        received(&gpu, &scene, &settings, &[(DVec3::new(0.3, 0.5, 0.2), DVec3::Y), (DVec3::new(0.3, 0.0, 0.2), DVec3::Y)])
-    });
-    assert_holds("the naive builder", equal_sums("light", &found[1].film.sums, &found[0].film.sums));
-    assert_eq!(found[1].fates, found[0].fates);
+        received(gpu, &scene, &settings, &points)
+    };
+    let expected = lit_by(&gpu, Builder::Persistent);
     // Of the irradiance of 1 glass lets 0.92 through, and the sheet three quarters of that.
-    for (place, expected) in [(0, 0.923), (1, 0.692)] {
-        let found = found[0].film.mean(place).x;
-        assert!((found / expected - 1.0).abs() < 0.3, "point {place}: {found}, {expected} expected");
+    for (place, right) in [(0, 0.923), (1, 0.692)] {
+        let found = expected.film.mean(place).x;
+        assert!((found / right - 1.0).abs() < 0.3, "point {place}: {found}, {right} expected");
     }
+    let naive = lit_by(&gpu, Builder::Naive);
+    assert_holds("the naive builder", equal_sums("light", &naive.film.sums, &expected.film.sums));
+    assert_eq!(naive.fates, expected.fates);
+    let one_slot = [("push.map.lands_once != 0 ? index", "push.map.caustic_only != 0 ? index")];
+    gpu.replace(planted::kernels(&["trace_scene_naive"], "world/scene/bounce.glsl", &one_slot));
+    let spoiled = lit_by(&gpu, Builder::Naive);
+    assert_complains("one slot for all landings", equal_sums("light", &spoiled.film.sums, &expected.film.sums));
 }
