@@ -208,6 +208,7 @@ impl<'a, W: World> Run<'a, W> {
             Err(Error::Interrupted) if state.rounds() > 0 => {
                 state.collect(world, recorder, true)?;
                 state.end = Some(if control.cancelled.load(Ordering::Relaxed) { End::Cancelled } else { End::Time });
+                (control.progress)(&state.progress());
             }
             Err(error) => return Err(error),
             Ok(()) if is_cut => {}
@@ -549,8 +550,9 @@ impl<'a> RunState<'a> {
     fn progress(&self) -> Progress {
         let Task { rounds_per_block, photons_per_round, counts_photons, .. } = self.task;
         let most_rounds = if self.share.of > 1 { self.share.count(self.wanted()) * rounds_per_block } else { self.task.rounds };
-        let rounds =
-            if self.is_whole() || self.is_short() { f64::from(self.rounds()) } else { self.emitted as f64 / photons_per_round as f64 };
+        // What is left of a round that was cut short at the end counts for nothing.
+        let is_between_rounds = self.is_whole() || self.is_short() || self.end.is_some();
+        let rounds = if is_between_rounds { f64::from(self.rounds()) } else { self.emitted as f64 / photons_per_round as f64 };
         let progress = self.watch.progress(rounds, most_rounds, photons_per_round, self.ledger());
         if counts_photons {
             Progress { done: self.emitted, total: photons_per_round * u64::from(most_rounds), ..progress }

@@ -1,6 +1,7 @@
 //! `photonmill view`: what it shows is what the run holds, and the window does what its user asks of it.
 
-use std::process::{Child, Command, Stdio};
+use std::cell::{Cell, RefCell};
+use std::process::{Child, Command, Output, Stdio};
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
@@ -169,12 +170,16 @@ struct Desktop {
     name: String,
     connection: RustConnection,
     root: Window,
+    program: RefCell<Option<Child>>,
+    window: Cell<Window>,
 }
 
 impl Drop for Desktop {
     fn drop(&mut self) {
-        let _ = self.server.kill();
-        let _ = self.server.wait();
+        for process in self.program.get_mut().iter_mut().chain([&mut self.server]) {
+            let _ = process.kill();
+            let _ = process.wait();
+        }
     }
 }
 
@@ -185,6 +190,10 @@ const KEY_R: u8 = 27;
 const KEY_F: u8 = 41;
 const KEY_H: u8 = 43;
 
+const POLL: Duration = Duration::from_millis(50);
+/// A key that has done nothing for so many polls is pressed again: one that comes while no window has the focus is lost.
+const POLLS_OF_A_KEY: u32 = 200;
+
 #[track_caller]
 fn wait_for<T>(what: &str, mut found: impl FnMut() -> Option<T>) -> T {
     let began = Instant::now();
@@ -193,7 +202,7 @@ fn wait_for<T>(what: &str, mut found: impl FnMut() -> Option<T>) -> T {
             return found;
         }
         assert!(began.elapsed() < PATIENCE, "{what} does not come");
-        std::thread::sleep(Duration::from_millis(50));
+        std::thread::sleep(POLL);
     }
 }
 
@@ -211,18 +220,38 @@ impl Desktop {
         let name = format!(":{}", name.trim());
         let (connection, screen) = x11rb::connect(Some(&name)).unwrap();
         let root = connection.setup().roots[screen].root;
-        Desktop { server, name, connection, root }
+        Desktop { server, name, connection, root, program: RefCell::new(None), window: Cell::new(root) }
     }
 
-    fn start(&self, place: &Place, line: &str) -> Child {
+    /// Starts the program, and waits for its window.
+    fn start(&self, place: &Place, line: &str) {
         let mut command = place.command(line);
-        command.env("DISPLAY", &self.name).env("LP_NUM_THREADS", "0");
-        command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+        command.env("DISPLAY", &self.name).env("LP_NUM_THREADS", "0").stdout(Stdio::null()).stderr(Stdio::piped());
+        *self.program.borrow_mut() = Some(command.spawn().unwrap());
+        self.find_window();
+    }
+
+    /// Waits while the program runs; where it ends before, the test fails with what it said.
+    #[track_caller]
+    fn wait_for<T>(&self, what: &str, mut found: impl FnMut() -> Option<T>) -> T {
+        wait_for(what, || {
+            let found = found();
+            let ended = found.is_none() && self.program.borrow_mut().as_mut().expect("it was started").try_wait().unwrap().is_some();
+            assert!(!ended, "the program ended before {what}: {:?}", self.output());
+            found
+        })
+    }
+
+    /// What the program has said, once it has ended.
+    #[track_caller]
+    fn output(&self) -> Output {
+        wait_for("its end", || self.program.borrow_mut().as_mut().expect("it was started").try_wait().unwrap());
+        self.program.take().expect("it was started").wait_with_output().unwrap()
     }
 
     /// The window that is on the screen.
-    fn window(&self) -> Window {
-        let window = wait_for("a window", || {
+    fn find_window(&self) {
+        let window = self.wait_for("a window", || {
             let windows = self.connection.query_tree(self.root).unwrap().reply().unwrap().children;
             windows.into_iter().find(|window| {
                 let attributes = self.connection.get_window_attributes(*window).unwrap().reply();
@@ -230,47 +259,60 @@ impl Desktop {
                 attributes.is_ok_and(|attributes| u8::from(attributes.map_state) == 2) && size.is_ok_and(|size| size.width > 100)
             })
         });
-        self.connection.set_input_focus(InputFocus::PARENT, window, x11rb::CURRENT_TIME).unwrap();
-        self.connection.flush().unwrap();
-        window
+        self.window.set(window);
     }
 
     fn press(&self, key: u8) {
+        self.connection.set_input_focus(InputFocus::PARENT, self.window.get(), x11rb::CURRENT_TIME).unwrap();
         for kind in [KEY_PRESS_EVENT, KEY_RELEASE_EVENT] {
             self.connection.xtest_fake_input(kind, key, x11rb::CURRENT_TIME, self.root, 0, 0, 0).unwrap();
             self.connection.flush().unwrap();
-            std::thread::sleep(Duration::from_millis(60));
+            std::thread::sleep(POLL);
         }
     }
 
-    /// Colours on the screen, row by row.
-    fn colours(&self, window: Window) -> Vec<[u8; 3]> {
-        let size = self.connection.get_geometry(window).unwrap().reply().unwrap();
-        let image = self.connection.get_image(ImageFormat::Z_PIXMAP, window, 0, 0, size.width, size.height, !0).unwrap().reply().unwrap();
-        image.data.chunks_exact(4).map(|pixel| [pixel[2], pixel[1], pixel[0]]).collect()
+    /// Presses a key, again where it was lost, until there is what it asks for.
+    #[track_caller]
+    fn press_for<T>(&self, key: u8, what: &str, found: impl Fn() -> Option<T>) -> T {
+        let mut polls = 0..;
+        self.wait_for(what, || {
+            if polls.next()? % POLLS_OF_A_KEY == 0 {
+                self.press(key);
+            }
+            found()
+        })
     }
 
-    /// More than the dark window of a run that is being prepared.
-    fn has_picture(&self, window: Window) -> bool {
-        let colours = self.colours(window);
-        6 * colours.iter().filter(|colour| colour.iter().any(|code| *code > 60)).count() > colours.len()
+    /// Colours on the screen, row by row; none while the window is away or takes another size.
+    fn colours(&self) -> Vec<[u8; 3]> {
+        let read = || {
+            let window = self.window.get();
+            let size = self.connection.get_geometry(window).ok()?.reply().ok()?;
+            self.connection.get_image(ImageFormat::Z_PIXMAP, window, 0, 0, size.width, size.height, !0).ok()?.reply().ok()
+        };
+        read().map_or(Vec::new(), |image| image.data.chunks_exact(4).map(|pixel| [pixel[2], pixel[1], pixel[0]]).collect())
     }
-}
 
-/// Screenshots one after another until one is as wanted: how many there are now, its size and its codes.
-#[track_caller]
-fn screenshot(desktop: &Desktop, place: &Place, what: &str, is_wanted: impl Fn([u32; 2], &[u8]) -> bool) -> (u32, Vec<u8>) {
-    let numbers = (1u32..).find(|number| !place.at(&format!("photonmill-{number}.png")).exists()).unwrap()..;
-    let mut next = numbers.map(|number| {
-        desktop.press(KEY_F);
-        let path = place.at(&format!("photonmill-{number}.png"));
-        let read = || image::load_from_memory(&std::fs::read(&path).ok()?).ok();
-        (number, wait_for("a screenshot", read).into_rgb8())
-    });
-    wait_for(what, || {
-        let (number, image) = next.next()?;
-        is_wanted([image.width(), image.height()], image.as_raw()).then(|| (number, image.into_raw()))
-    })
+    /// Waits for more than the dark window of a run that is being prepared.
+    #[track_caller]
+    fn wait_for_picture(&self) {
+        self.wait_for("a picture", || {
+            let colours = self.colours();
+            let is_bright = |colour: &&[u8; 3]| colour.iter().any(|code| *code > 60);
+            (6 * colours.iter().filter(is_bright).count() > colours.len()).then_some(())
+        });
+    }
+
+    /// Screenshots one after another until one is as wanted: its codes.
+    #[track_caller]
+    fn screenshot(&self, place: &Place, what: &str, is_wanted: impl Fn([u32; 2], &[u8]) -> bool) -> Vec<u8> {
+        self.wait_for(what, || {
+            let path = (1u32..).map(|number| place.at(&format!("photonmill-{number}.png"))).find(|path| !path.exists())?;
+            let read = || image::load_from_memory(&std::fs::read(&path).ok()?).ok();
+            let image = self.press_for(KEY_F, "a screenshot", read).into_rgb8();
+            is_wanted([image.width(), image.height()], image.as_raw()).then(|| image.into_raw())
+        })
+    }
 }
 
 fn mean_difference(a: &[u8], b: &[u8]) -> f64 {
@@ -285,44 +327,45 @@ fn a_window_opens_resizes_hides_shows_renders_and_closes() {
     }
     let place = Place::new();
     let desktop = Desktop::new(&place);
-    let mut program = desktop.start(&place, "view cornell --size 40x30 --photons 1024 --time 1s --validate");
-    let window = desktop.window();
-    wait_for("a picture", || desktop.has_picture(window).then_some(()));
+    desktop.start(&place, "view cornell --size 40x30 --photons 1024 --time 1s --validate");
+    desktop.wait_for_picture();
     // Without the panel the window is the picture.
     desktop.press(KEY_H);
-    let (_, light) = screenshot(&desktop, &place, "the picture alone", |size, _| size == [760, 570]);
-    wait_for("the picture of the file on the screen", || {
-        let colours = desktop.colours(window);
+    let light = desktop.screenshot(&place, "the picture alone", |size, _| size == [760, 570]);
+    desktop.wait_for("the picture of the file on the screen", || {
+        let colours = desktop.colours();
         (3 * colours.len() == light.len() && mean_difference(&light, colours.as_flattened()) < 8.0).then_some(())
     });
 
-    desktop.press(KEY_6);
-    screenshot(&desktop, &place, "the error", |_, errors| mean_difference(&light, errors) > 20.0);
+    let is_another = |codes: &[u8]| codes.len() == light.len() && mean_difference(&light, codes) > 20.0;
+    desktop.press_for(KEY_6, "the error on the screen", || is_another(desktop.colours().as_flattened()).then_some(()));
+    desktop.screenshot(&place, "the error", |_, codes| is_another(codes));
 
     // Another size of the window.
+    let window = desktop.window.get();
     desktop.connection.configure_window(window, &ConfigureWindowAux::new().width(210).height(170)).unwrap();
     desktop.connection.flush().unwrap();
-    screenshot(&desktop, &place, "the new size", |size, _| size == [210, 170]);
+    desktop.screenshot(&place, "the new size", |size, _| size == [210, 170]);
 
     // Away and back.
     desktop.connection.unmap_window(window).unwrap();
     desktop.connection.flush().unwrap();
     let is_shown = || u8::from(desktop.connection.get_window_attributes(window).unwrap().reply().unwrap().map_state) == 2;
-    wait_for("the window to go", || (!is_shown()).then_some(()));
+    desktop.wait_for("the window to go", || (!is_shown()).then_some(()));
     // Some frames of it are asked for meanwhile.
     std::thread::sleep(Duration::from_millis(500));
     desktop.connection.map_window(window).unwrap();
     desktop.connection.flush().unwrap();
-    let window = desktop.window();
-    wait_for("the picture again", || desktop.has_picture(window).then_some(()));
-    let (number, _) = screenshot(&desktop, &place, "its size again", |size, _| size == [210, 170]);
+    desktop.find_window();
+    desktop.wait_for_picture();
+    desktop.screenshot(&place, "its size again", |size, _| size == [210, 170]);
 
-    // The picture as it is seen, by the command that the window names.
-    desktop.press(KEY_R);
-    let rendered = place.at(&format!("photonmill-{}.png", number + 1));
-    // Pictures on the way do not say how they were made.
-    let says = |content: &Vec<u8>| content.windows(6).any(|text| text == b"--eye ");
-    let content = wait_for("a rendered picture", || std::fs::read(&rendered).ok().filter(says));
+    // The picture as it is seen, by the command that the window names. Pictures on the way and screenshots do not say how they were made.
+    let content = desktop.press_for(KEY_R, "a rendered picture", || {
+        let files = std::fs::read_dir(place.path()).unwrap().map(|file| file.unwrap().path());
+        let pictures = files.filter(|path| path.extension().is_some_and(|ending| ending == "png"));
+        pictures.filter_map(|path| std::fs::read(path).ok()).find(|content| content.windows(6).any(|text| text == b"--eye "))
+    });
     let image = image::load_from_memory(&content).unwrap();
     assert_eq!((image.width(), image.height()), (40, 30));
 
@@ -332,9 +375,8 @@ fn a_window_opens_resizes_hides_shows_renders_and_closes() {
     let event = ClientMessageEvent::new(32, window, atom("WM_PROTOCOLS"), close);
     desktop.connection.send_event(false, window, EventMask::NO_EVENT, event).unwrap();
     desktop.connection.flush().unwrap();
-    let status = wait_for("the end", || program.try_wait().unwrap());
-    let output = program.wait_with_output().unwrap();
-    assert!(status.success(), "{}", text(&output.stderr));
+    let output = desktop.output();
+    assert!(output.status.success(), "{output:?}");
 }
 
 #[test]
@@ -344,15 +386,13 @@ fn the_box_is_viewed_and_escape_closes_its_window() {
     }
     let place = Place::new();
     let desktop = Desktop::new(&place);
-    let mut program = desktop.start(&place, "view box --photons 500 --size 60x40 --validate");
-    let window = desktop.window();
+    desktop.start(&place, "view box --photons 500 --size 60x40 --validate");
     // A key before the first picture waits for it.
-    desktop.press(KEY_6);
     let is_coloured = |colour: [u8; 3]| colour[0].abs_diff(colour[1]) > 60;
-    wait_for("the error in false colours", || desktop.colours(window).into_iter().any(is_coloured).then_some(()));
+    desktop.press_for(KEY_6, "the error in false colours", || desktop.colours().into_iter().any(is_coloured).then_some(()));
     desktop.press(ESCAPE);
-    let status = wait_for("the end", || program.try_wait().unwrap());
-    assert!(status.success(), "{}", text(&program.wait_with_output().unwrap().stderr));
+    let output = desktop.output();
+    assert!(output.status.success(), "{output:?}");
 }
 
 #[test]
