@@ -75,8 +75,9 @@ pub fn usual() -> SceneSettings {
     SceneSettings { with: vec![Effect::Bvh, Effect::TwoSided], paranoid: true, ..by_rounds() }
 }
 
+/// No photons, for which a trial would make kernels.
 fn direct(rounds: u32) -> SceneSettings {
-    SceneSettings { rounds, part: Part::Direct, ..usual() }
+    SceneSettings { rounds, without: vec![Effect::Indirect], ..usual() }
 }
 
 /// Whether the first points of a run have the light of another run within both errors, and no more than so many times its variance,

@@ -54,7 +54,7 @@ pub struct Device {
 /// it runs.
 static IDLE: Mutex<Vec<Gpu>> = Mutex::new(Vec::new());
 /// A device that has made more is not used again: lavapipe holds some nine megabytes of each.
-const MOST_PIPELINES: usize = 100;
+const MOST_PIPELINES: usize = 90;
 
 impl Deref for Device {
     type Target = Gpu;

@@ -50,12 +50,14 @@ fn few() -> SceneSettings {
     SceneSettings { photons: 1 << 13, caustic_photons: 1 << 13, stop, ..SceneSettings::default() }
 }
 
-/// Within a factor: rare light is met by chance, and even samples vary less the more there are.
-fn rounds_vary_as_the_pilot_expects(gpu: &Gpu, spheres: &Spheres) {
+/// Within a factor: rare light is met by chance, and even samples vary less the more there are. `all`: before the pilot has chosen, too,
+/// and of more rounds.
+fn rounds_vary_as_the_pilot_expects(gpu: &Gpu, spheres: &Spheres, all: bool) {
     let found = spheres.chosen(gpu, &few(), Free { photons: false, caustic_photons: false, ..Free::ALL }).unwrap();
-    for division in [found.before, found.chosen] {
+    let rounds = if all { 32 } else { 16 };
+    for division in [found.chosen].into_iter().chain(all.then_some(found.before)) {
         // The squared noise of a round, relative to the mean.
-        let lit = spheres.lit(gpu, &SceneSettings { rounds: 32, alpha: 1.0, seed: 5, stop: Stop::default(), ..division.set(&few()) });
+        let lit = spheres.lit(gpu, &SceneSettings { rounds, alpha: 1.0, seed: 5, stop: Stop::default(), ..division.set(&few()) });
         let measured = lit.film.relative_error().powi(2) * f64::from(lit.film.rounds);
         let variance = &found.rounds.variance;
         let of_paths = variance.of_paths_in_round(division);
@@ -102,8 +104,8 @@ fn what_a_pilot_chooses_is_less_work_and_takes_about_the_rounds_that_it_expects(
     assert!((0.3..3.0).contains(&(rounds / expected)), "{rounds} rounds, {expected} expected");
 }
 
-/// Nodes that rays visit: more shadow rays more of them, each path about as many, and whatever is dispatched at once.
-fn what_paths_meet_is_counted(gpu: &Gpu, spheres: &Spheres) {
+/// Nodes that rays visit, whatever is dispatched at once; `all`: more shadow rays visit more of them, and each path about as many.
+fn what_paths_meet_is_counted(gpu: &Gpu, spheres: &Spheres, all: bool) {
     let counted = |samples: u32, shadow_rays: u32, is_split: bool| {
         let settings = SceneSettings { samples, shadow_rays, rounds: 1, block: Some(1), stop: Stop::default(), ..few() };
         let mut plan = spheres.plan(gpu, &settings);
@@ -117,6 +119,9 @@ fn what_paths_meet_is_counted(gpu: &Gpu, spheres: &Spheres) {
     let (one, triangles) = counted(1, 1, false);
     assert!(one > 2.0 && triangles > 0, "{one} nodes a path, {triangles} triangles");
     assert_eq!(counted(1, 1, true), (one, triangles));
+    if !all {
+        return;
+    }
     let (more_paths, more_rays) = (counted(4, 1, false).0, counted(1, 4, false).0);
     assert!((more_paths / one - 1.0).abs() < 0.1 && more_rays > 1.2 * one, "{one}, {more_paths}, {more_rays}");
 }
@@ -158,11 +163,20 @@ fn tiles_with_more_samples_change_no_mean(gpu: &Gpu, spheres: &Spheres, final_ga
 fn a_pilot_expects_what_rounds_are_like_and_chooses_the_same_twice() {
     let Some(gpu) = device() else { return };
     let spheres = Spheres::new();
-    rounds_vary_as_the_pilot_expects(&gpu, &spheres);
+    rounds_vary_as_the_pilot_expects(&gpu, &spheres, false);
     what_is_set_stays_and_the_rest_is_chosen_alike_each_time(&gpu, &spheres);
-    what_a_pilot_chooses_is_less_work_and_takes_about_the_rounds_that_it_expects(&gpu, &spheres);
-    what_paths_meet_is_counted(&gpu, &spheres);
+    what_paths_meet_is_counted(&gpu, &spheres, false);
     tiles_with_more_samples_change_no_mean(&gpu, &spheres, false);
+}
+
+#[test]
+#[ignore = "long: runs until an error, and more rounds and samples"]
+fn a_pilot_expects_what_all_rounds_are_like_and_chooses_less_work() {
+    let Some(gpu) = device() else { return };
+    let spheres = Spheres::new();
+    rounds_vary_as_the_pilot_expects(&gpu, &spheres, true);
+    what_a_pilot_chooses_is_less_work_and_takes_about_the_rounds_that_it_expects(&gpu, &spheres);
+    what_paths_meet_is_counted(&gpu, &spheres, true);
 }
 
 #[test]

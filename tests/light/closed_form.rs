@@ -97,7 +97,7 @@ fn families_tell_chance_from_error() {
 
 fn settings() -> SceneSettings {
     // Without aim skies have the kernels of other lights.
-    kept(SceneSettings { photons: 1000, rounds: 2, shadow_rays: 32, aim: false, ..by_rounds() })
+    kept(SceneSettings { part: Part::Direct, rounds: 2, shadow_rays: 32, aim: false, ..by_rounds() })
 }
 
 #[test]

@@ -223,8 +223,7 @@ fn diffuse_light_crosses_glass_by_every_way_of_lighting() {
 /// A spot light between two mirrors of reflectance 0.8, 1 m before the end of their corridor: the end is lit by all
 /// images, sum of 0.8^|n| I cos / d^2 over those whose ray leaves the lamp within its cone. Photons tell the mean over
 /// a disc, here by a raster whose error is below 1e-4; shadow rays add the lamp's own part at the middle.
-#[test]
-fn images_light_the_end_of_a_corridor() {
+fn images_light_a_corridor(illuminations: &[Illumination]) {
     let Some(gpu) = device() else { return };
     let (z, off, angle) = (1.0, 0.1, 1.0f64);
     let (side, length) = (1.0, 3.0);
@@ -260,7 +259,7 @@ fn images_light_the_end_of_a_corridor() {
     };
     let reflected = over_disc(&|x, y| (-9..=9).filter(|n| *n != 0).map(|n| image(n, x, y)).sum());
     let mut family = Family::default();
-    for illumination in BOTH {
+    for &illumination in illuminations {
         let settings = SceneSettings { caustic_photons: 40_000, ..fixed_radius(illumination, 20_000, 24, 8, radius) };
         let points = [(DVec3::ZERO, DVec3::Z)];
         let lit = received(&gpu, &scene, &optics(settings), &points);
@@ -269,6 +268,11 @@ fn images_light_the_end_of_a_corridor() {
         family.expect_estimate(format!("corridor, {illumination:?}"), mean, error, 24, own + reflected);
     }
     family.assert_tells(0.02, |_| true);
+}
+
+#[test]
+fn images_light_the_end_of_a_corridor() {
+    images_light_a_corridor(&[Illumination::Photons]);
 }
 
 const FOCUS: f64 = 0.5;
@@ -308,8 +312,7 @@ fn caustics(illumination: Illumination, radius: f64) -> SceneSettings {
 /// any distance: what leaves at the angle a to the axis arrives at r = 2 f tan(a / 2), hence
 /// I / f^2 / (1 + r^2 / 4 f^2)^2, and as the mean over a disc of radius h, which photons tell,
 /// I / f^2 / (1 + h^2 / 4 f^2).
-#[test]
-fn light_from_a_focus_leaves_in_parallel() {
+fn light_leaves_a_focus_in_parallel(illuminations: &[Illumination]) {
     let Some(gpu) = device() else { return };
     let mut family = Family::default();
     let h: f64 = 0.4;
@@ -317,13 +320,26 @@ fn light_from_a_focus_leaves_in_parallel() {
     for distance in [1.0, 4.0] {
         let lamp = cone(DVec3::Y * FOCUS, DVec3::NEG_Y, 1.0);
         let scene = scene_of(vec![paraboloid(0), level(distance, [2.0; 2], false, 1)], vec![mirror(0.9), matt(0.0)], vec![lamp]);
-        for illumination in BOTH {
+        for &illumination in illuminations {
             let lit = received(&gpu, &scene, &caustics(illumination, h), &[(DVec3::Y * distance, DVec3::NEG_Y)]);
             let (mean, error) = red(&lit, 0);
             family.expect_estimate(format!("{distance} m off, {illumination:?}"), mean, error, 24, expected);
         }
     }
     family.assert_tells(0.02, |_| true);
+}
+
+/// In either way sunlight meets in the focus.
+#[test]
+fn light_from_a_focus_leaves_in_parallel() {
+    light_leaves_a_focus_in_parallel(&[Illumination::Photons]);
+}
+
+#[test]
+#[ignore = "long: kernels of shadow rays and a caustic map too"]
+fn corridors_and_foci_have_the_same_light_in_either_way() {
+    images_light_a_corridor(&BOTH);
+    light_leaves_a_focus_in_parallel(&BOTH);
 }
 
 /// All sunlight that enters a paraboloid along its axis passes its focus: through a disc of 1 cm there goes what the

@@ -48,6 +48,11 @@ fn settings(illumination: Illumination) -> SceneSettings {
     SceneSettings { photons: 40_000, rounds: 32, illumination, ..by_rounds() }
 }
 
+/// Direct light of a sky by shadow rays alone. Where there is no opening rays are aimed at none, and kernels are made sooner.
+fn by_shadow_rays() -> SceneSettings {
+    SceneSettings { part: Part::Direct, aim: false, ..settings(Illumination::Split) }
+}
+
 /// Colours of the irradiance on surfaces that face all ways, beside a small floor.
 pub fn facing_all_ways(gpu: &Gpu) -> Check<Complaint> {
     // Light that is wrong somewhere says more than noise.
@@ -133,9 +138,7 @@ fn every_part_of_the_light_is_what_the_path_tracer_finds() {
 }
 
 /// Where the sun itself shines in, rays that are aimed at the window take none from those that are aimed at the sun.
-#[test]
-fn a_sun_that_shines_in_has_as_many_rays_as_without_openings() {
-    let Some(gpu) = device() else { return };
+pub fn a_sun_that_shines_in_has_as_many_rays_as_without_openings(gpu: &Gpu, albedo: f32) {
     // 11 degrees from the vertical, so that its light falls on the floor half a metre beside the middle.
     let (i_sun, j_sun) = (160, 8);
     let picture = sky(256, 128, |i, j| if (i, j) == (i_sun, j_sun) { Vec3::splat(20_000.0) } else { Vec3::ONE });
@@ -143,10 +146,10 @@ fn a_sun_that_shines_in_has_as_many_rays_as_without_openings() {
     let middle = -3.0 * angle.tan() * dvec3(turn.cos(), 0.0, turn.sin());
     let near = |x: i32| (-2..=2).map(move |z| (middle + 0.1 * dvec3(f64::from(x), 0.0, f64::from(z)), DVec3::Y));
     let points: Vec<_> = (-2..=2).flat_map(near).collect();
-    let scene = room_under(LightKind::Sky(Arc::new(picture)));
+    let scene = room_under(albedo, LightKind::Sky(Arc::new(picture)));
     let [aimed, other] = [true, false].map(|aim| {
         let settings = SceneSettings { rounds: 64, ..direct(aim) };
-        render(&gpu, &scene, &settings, Target::Points(&points)).unwrap()
+        render(gpu, &scene, &settings, Target::Points(&points)).unwrap()
     });
     assert!(aimed.plan.trial.as_ref().is_some_and(|trial| !trial.openings.is_empty()));
     let [little, much] = [&aimed, &other].map(|lit| lit.film.relative_error());
@@ -160,31 +163,18 @@ fn a_sun_that_shines_in_has_as_many_rays_as_without_openings() {
 
 /// A patch of sun among points that see the sky alone keeps its shadow rays, though aimed rays find the sky from all of them. What walls
 /// scatter is not asked for, but has its photons in the trial.
-fn a_patch_of_sun_keeps_its_rays(albedo: f32) {
-    let Some(gpu) = device() else { return };
+pub fn a_patch_of_sun_keeps_its_rays(gpu: &Gpu, albedo: f32) {
     let way = dvec3(0.25, -1.0, 0.1).normalize();
-    let mut scene = room_under(LightKind::Sky(Arc::new(sky(4, 2, |_, _| Vec3::splat(300.0)))));
-    scene.materials = vec![matt(albedo)];
+    let mut scene = room_under(albedo, LightKind::Sky(Arc::new(sky(4, 2, |_, _| Vec3::splat(300.0)))));
     scene.lights.push(lamp(LightKind::Directional { direction: way, irradiance: Vec3::splat(100.0) }));
     // Too few lie in the sun to make a region of their own.
     let along = |k: u32| -1.9 + 3.8 * (f64::from(k) + 0.5) / 9.0;
     let points: Vec<_> = (0..9 * 9).map(|k| (dvec3(along(k % 9), 0.0, along(k / 9)), DVec3::Y)).collect();
-    let lit = render(&gpu, &scene, &direct(true), Target::Points(&points)).unwrap();
+    let lit = render(gpu, &scene, &direct(true), Target::Points(&points)).unwrap();
     let error = lit.film.relative_error();
     println!("{:.2} %", 100.0 * error);
     // 1.8 times as much where all points count alike in the choice of lights.
     assert!(error < 0.115, "{error}");
-}
-
-#[test]
-fn a_patch_of_sun_keeps_its_rays_beside_an_aimed_sky() {
-    a_patch_of_sun_keeps_its_rays(0.0);
-}
-
-#[test]
-#[ignore = "long: kernels of photons for the trial, fifteen seconds on a software device"]
-fn a_patch_of_sun_in_a_grey_room_keeps_its_rays() {
-    a_patch_of_sun_keeps_its_rays(0.5);
 }
 
 /// A sky that is black, or almost, makes no number that is none, on a bare floor or one below a ball of glass.
@@ -208,13 +198,14 @@ fn skies_leave_no_odd_number(settings: &SceneSettings, has_glass: bool) {
 #[test]
 fn black_skies_and_single_texels_leave_no_odd_number() {
     skies_leave_no_odd_number(&settings(Illumination::Photons), false);
-    skies_leave_no_odd_number(&SceneSettings { part: Part::Direct, ..settings(Illumination::Split) }, false);
+    skies_leave_no_odd_number(&by_shadow_rays(), false);
 }
 
 #[test]
 #[ignore = "long: kernels of glass, twenty seconds on a software device"]
 fn black_skies_through_glass_leave_no_odd_number() {
     skies_leave_no_odd_number(&by_rounds(), true);
+    skies_leave_no_odd_number(&SceneSettings { aim: true, ..by_shadow_rays() }, false);
 }
 
 /// Each channel of an even sky lights a floor by what it is, whatever the ratio to the others.
@@ -222,7 +213,7 @@ fn black_skies_through_glass_leave_no_odd_number() {
 fn weak_channels_of_a_sky_keep_their_light() {
     let Some(gpu) = device() else { return };
     for colour in [Vec3::new(1000.0, 1.0, 0.3), Vec3::new(10.0, 2.0, 0.3), Vec3::new(1.0, 0.25, 0.002), Vec3::new(1.0, 1e-4, 1e-4)] {
-        let settings = SceneSettings { rounds: 1, part: Part::Direct, ..settings(Illumination::Split) };
+        let settings = SceneSettings { rounds: 1, ..by_shadow_rays() };
         let lit = received(&gpu, &floor_under(sky(4, 2, |_, _| colour)), &settings, &[(DVec3::ZERO, DVec3::Y)]);
         let share = lit.film.mean(0) / (PI * colour.as_dvec3());
         println!("{colour}: {share}");

@@ -436,7 +436,7 @@ const CASES: &[Case] = &[
 ];
 
 /// Cases of the long run alone: each costs seconds, and others of its family or another test show the like.
-const LONG: [&str; 15] = [
+const LONG: [&str; 21] = [
     "two lamps face to face 1e-3 m apart",
     "indirect light at the foot of a block on an uncut floor",
     "a floor of 2000 needles about one corner",
@@ -448,10 +448,16 @@ const LONG: [&str; 15] = [
     "a sheet lit and emitting on both sides in a cavity",
     "a single triangle under a point light",
     "the sun a thousandth of a degree above the horizon",
+    "a sky above and below a single floor",
+    "a single bounce",
+    "two bounces off grey walls",
+    "seven bounces off white walls",
     "200 rounds of 100 photons",
-    "a picture of one pixel",
-    "1024 paths in each of four pixels",
     "the largest seed",
+    "a picture of one pixel",
+    "a picture of 4096 x 1 pixels",
+    "1024 paths in each of four pixels",
+    "a view of a millionth of a degree",
 ];
 
 fn eye(view: f64, aspect: f64) -> Camera {

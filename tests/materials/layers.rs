@@ -349,14 +349,16 @@ fn alphas_of_vertices_are_looked_up_without_colours() {
 #[test]
 fn sheets_let_their_share_pass() {
     let Some(gpu) = device() else { return };
-    assert_holds("the sun", sheets::sun_through_sheets(&gpu, Illumination::Split));
+    assert_holds("a lamp", sheets::lamp_between_sheets(&gpu));
 }
 
 #[test]
 #[ignore = "long: minutes on a software device"]
-fn sheets_let_their_share_of_photons_pass() {
+fn all_sheets_let_their_share_pass() {
     let Some(gpu) = device() else { return };
-    assert_holds("the sun", sheets::sun_through_sheets(&gpu, Illumination::Photons));
+    for illumination in BOTH {
+        assert_holds("the sun", sheets::sun_through_sheets(&gpu, illumination));
+    }
 }
 
 /// Roughness, strength, degrees between the stretch and the plane of the eye, and what a white metal of these sends back of an even sky
@@ -395,7 +397,9 @@ fn plates_return_what_the_sky_sends() {
     assert_holds("the sky", layered::furnace(&gpu, &materials, true));
 }
 
+/// In the short run `tests/engine/planted_faults.rs` has paper in half a dome.
 #[test]
+#[ignore = "long: kernels of their own"]
 fn white_paper_is_not_seen_in_a_furnace() {
     let Some(gpu) = device() else { return };
     assert_holds("paper", layered::clear_furnace(&gpu, false));

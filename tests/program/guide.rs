@@ -84,14 +84,19 @@ const PARSED: [(&str, &str); 8] = [
 ];
 
 /// Commands that the long run alone runs, and what stands for them in the short one, where their options are checked.
-const LONG: [(&str, &str); 15] = [
+const LONG: [(&str, &str); 20] = [
     ("photonmill --preset naive", "`--variant atomic` runs"),
     ("photonmill --preset phong ", "`--preset rounds` runs"),
+    ("photonmill --variant auto ", "`tests/program/cli.rs` runs one"),
     ("photonmill --photons 250000 --gather kdtree ", "`--variant ballot --photons` runs"),
     ("photonmill --irradiance out --json ", "`tests/program/cli.rs` runs one with more files"),
     ("photonmill --error 5% --bias", "`tests/program/cli.rs` runs one with more options"),
     ("photonmill bake scene.glb -o baked --time ", "one without the ends of a run runs"),
-    ("photonmill render cornell -o a.exr --error 2% --confidence ", "one with --error-image runs"),
+    ("photonmill render cornell -o a.exr --error 2% --confidence ", "`tests/engine/pilot.rs` runs one that ends at an error"),
+    ("photonmill render scene.glb -o picture.exr --error 2% --error-image ", "one with an error image and rounds runs"),
+    ("photonmill render scene.glb -o picture.exr --time 30s", "one with snapshots runs"),
+    ("photonmill render scene.glb -o picture.png --size 320 --rounds ", "one without the size runs"),
+    ("photonmill probe scene.glb --points points.txt -o -", "one into a file runs"),
     ("photonmill render cornell-spheres -o a.exr --judge", "one into another file runs"),
     ("photonmill render scene.glb -o a.exr --paranoid", "`tests/program/render_and_probe.rs` runs one"),
     ("photonmill render scene.glb -o picture.exr --rounds 4096 --checkpoint picture.pms", "one into another file runs"),

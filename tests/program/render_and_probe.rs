@@ -205,13 +205,13 @@ fn a_probe_writes_a_row_a_point() {
 #[test]
 fn an_exr_is_linear_and_a_png_obeys_its_exposure() {
     let Some(place) = place_with_device() else { return };
-    let linear = exr(&place, "cornell");
+    let linear = exr(&place, "cornell --without indirect");
     let exr = place.picture("a.exr");
     assert!(matches!(exr, image::DynamicImage::ImageRgb32F(_)), "{:?}", exr.color());
     // The lamp's own radiance stands in it, far above what a screen shows.
     assert!(linear.iter().any(|value| *value > 1.0) && linear.iter().all(|value| value.is_finite() && *value >= 0.0));
     let png = |options: &str| {
-        let (stdout, _) = place.succeed(&format!("render cornell {TINY} -o a.png {options}"));
+        let (stdout, _) = place.succeed(&format!("render cornell --without indirect {TINY} -o a.png {options}"));
         assert!(stdout.contains("wrote a.png at ") && stdout.contains("stops"), "{stdout}");
         place.picture("a.png").into_rgb8().into_raw()
     };
@@ -242,14 +242,14 @@ fn a_file_is_seen_as_its_options_say() {
         (v["bufferViews"][3]["byteLength"], v["accessors"][3]["count"]) = (json!(18), json!(9));
     });
     place.write("flat.gltf", with_flat_triangle);
-    let (_, stderr) = place.succeed(&format!("render flat.gltf {TINY} -o flat.exr --radiometric --quiet"));
+    let (_, stderr) = place.succeed(&format!("render flat.gltf --without indirect {TINY} -o flat.exr --radiometric --quiet"));
     assert!(stderr.contains("warning: 1 triangle without area left out") && stderr.lines().count() == 1, "{stderr}");
-    let lumens = exr(&place, "scene.gltf --camera eye");
+    let lumens = exr(&place, "scene.gltf --camera eye --without indirect");
     assert!(lumens.iter().any(|value| *value > 0.1));
     for (watt, lumen) in pairs(&place.pixels("flat.exr"), &lumens) {
         assert!((watt - 683.0 * lumen).abs() <= 1e-4 * watt, "{watt} W, {lumen} lm");
     }
-    assert_ne!(exr(&place, "scene.gltf --camera side"), lumens);
+    assert_ne!(exr(&place, "scene.gltf --camera side --without indirect"), lumens);
     // 1 W/sr from 1 m on a white wall, seen in the middle: 1 / pi, and 3 % less within a pixel of it.
     let middle = lumens[3 * (8 * 4 + 4)];
     assert!((middle * std::f32::consts::PI - 0.97).abs() < 0.06, "{middle}");
@@ -436,15 +436,30 @@ fn forced_effects_of_other_kernels_change_no_picture() {
 /// A white wall under an even sky is as bright as the sky. The camera is twice as wide as high, and so is its picture.
 #[test]
 fn a_scene_without_light_has_a_sky_and_a_line_says_so() {
+    see_skies(&[("--without indirect", [1.0; 3]), ("--without indirect --environment 2,1,0.5", [2.0, 1.0, 0.5])]);
+}
+
+#[test]
+#[ignore = "long: kernels of photons, and of a black sky"]
+fn a_scene_without_light_has_every_sky() {
+    see_skies(&[("", [1.0; 3]), ("--environment 2,1,0.5", [2.0, 1.0, 0.5]), ("--environment 0", [0.0; 3])]);
+}
+
+/// By these options, with what they shine.
+fn see_skies(skies: &[(&str, [f32; 3])]) {
     let Some(place) = place_with_device() else { return };
     let dark = square(|v| {
         v["scenes"][0]["nodes"] = json!([0, 1]);
         v["cameras"][0]["perspective"]["aspectRatio"] = json!(2);
     });
     place.write("dark.gltf", dark);
-    for (options, sky) in [("", [1.0; 3]), ("--environment 2,1,0.5", [2.0, 1.0, 0.5]), ("--environment 0", [0.0; 3])] {
+    for (options, sky) in skies {
         let (_, stderr) = place.succeed(&format!("render dark.gltf --size 16 --photons 500 --rounds 2 -o a.exr {options}"));
-        assert_eq!(stderr.matches("nothing in this scene emits light").count(), usize::from(options.is_empty()), "{stderr}");
+        assert_eq!(
+            stderr.matches("nothing in this scene emits light").count(),
+            usize::from(!options.contains("--environment")),
+            "{stderr}"
+        );
         let picture = place.picture("a.exr").into_rgb32f();
         assert_eq!(picture.dimensions(), (16, 8));
         for (channel, sky) in sky.iter().enumerate() {
@@ -523,7 +538,7 @@ fn without_vulkan_a_scene_is_planned_but_not_rendered() {
 /// The mean of a picture of a square wall without lamps.
 fn mean_of_dark(place: &Place, options: &str) -> [f32; 3] {
     place.write("dark.gltf", square(|v| v["scenes"][0]["nodes"] = json!([0, 1])));
-    place.succeed(&format!("render dark.gltf {TINY} -o a.exr {options}"));
+    place.succeed(&format!("render dark.gltf --without indirect {TINY} -o a.exr {options}"));
     let pixels = place.pixels("a.exr");
     [0, 1, 2].map(|channel| pixels.iter().skip(channel).step_by(3).sum::<f32>() / 64.0)
 }

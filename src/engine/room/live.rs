@@ -85,7 +85,7 @@ impl<'a> LiveRoom<'a> {
     /// The error over the mean, as far as it is known, and the mean of the illumination.
     pub fn look(&mut self) -> Result<(f64, f64)> {
         let found = self.film()?;
-        let noise = self.run.world.error(&found).noise;
+        let noise = self.run.world.error(&found).stated().noise;
         let walls = estimate_walls(&found, self.scene, self.plan);
         let values: Vec<f64> = walls.iter().flat_map(|wall| wall.illumination.iter().copied()).collect();
         Ok((noise, values.iter().sum::<f64>() / values.len().max(1) as f64))
