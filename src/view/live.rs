@@ -129,7 +129,6 @@ impl<'a> Live<'a> {
         match self {
             Live::Scene(live) => {
                 let (film, error) = live.look()?;
-                let error = error.stated();
                 let pixels: Vec<Vec3> = film.means().map(DVec3::as_vec3).collect();
                 let mean = film.surface_means().map(|mean| mean.element_sum() / 3.0).sum::<f64>() / pixels.len().max(1) as f64;
                 let picture = ColourPicture { width: pixels.len() as u32, height: 1, pixels };

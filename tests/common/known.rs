@@ -12,6 +12,11 @@ use crate::engine::unseen_light::room_without_floor;
 use photonmill::engine::scene::{RunResult, Target, View, render, trial};
 use photonmill::verify::selfcheck::Estimate;
 
+/// Settings of which rooms of many triangles and few, with sheets of two sides and without, have one set of kernels.
+pub fn of_any_room(settings: SceneSettings) -> SceneSettings {
+    SceneSettings { with: vec![Effect::Bvh, Effect::TwoSided], ..settings }
+}
+
 /// Settings that keep every kind of light and what many scenes need, also where a scene lacks it, which changes no bit
 /// (`tests/light/transport.rs`): so scenes share kernels, and a software device compiles them once.
 pub fn kept(settings: SceneSettings) -> SceneSettings {

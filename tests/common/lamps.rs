@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use glam::dvec3;
 
+use super::known::of_any_room;
 use super::prelude::*;
 use crate::engine::unseen_light::room_without_floor;
 use photonmill::engine::scene::{self, RunResult, Target, View, trial};
@@ -70,9 +71,8 @@ pub fn lit(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, points: &[(DVec3,
     lit_as(gpu, planned(gpu, scene, settings, points, by_sight), points)
 }
 
-/// Rooms with and without a screen, and of few triangles or many, have one set of kernels.
 pub fn usual() -> SceneSettings {
-    SceneSettings { with: vec![Effect::Bvh, Effect::TwoSided], paranoid: true, ..by_rounds() }
+    of_any_room(SceneSettings { paranoid: true, ..by_rounds() })
 }
 
 /// No photons, for which a trial would make kernels.

@@ -121,7 +121,7 @@ use Question::*;
 impl Question {
     /// Whether another test asks it of a device without a fault.
     fn has_a_test_of_its_own(self) -> bool {
-        matches!(self, Bits(_) | AimedLight(_) | BrightSpot | DimRoom(_) | HiddenLamp | ManyLamps(_) | ClearBalls | MetalsUnderTheSky)
+        matches!(self, Bits(_) | AimedLight(_) | BrightSpot | DimRoom(_) | HiddenLamp | ManyLamps(_) | ClearBalls)
     }
 
     /// Whether it takes kernels of its own that are long in the making: the long run asks it, of a device without a fault, too.
@@ -140,6 +140,7 @@ impl Question {
                 | LampBetweenSheets
                 | LampInAMedium
                 | LampInBox(Illumination::Split)
+                | MetalsUnderTheSky
                 | MissedLamp
                 | OneCorner
                 | PhotonsOffAPane
@@ -213,7 +214,7 @@ struct Fault {
 
 #[rustfmt::skip]
 const FAULTS: [Fault; 141] = [
-    // First of their subjects, in the short run: their questions share most of their kernels with others.
+    // The first of their subjects, which the short run plants, are kept here: their questions share most of their kernels with others.
     Fault { what: "8-bit codes of textures are taken for linear values",
         file: "material/textures.glsl", from: "return uintBitsToFloat(texels[code & 255]);", to: "return float(code & 255) * (1.0 / 255.0);",
         kernels: &["view"], noticed_by: &[(Texture([Wrap::Repeat; 2]), WrongTexel)] },
@@ -847,7 +848,7 @@ fn faults_of(subject: Subject) -> impl Iterator<Item = &'static Fault> {
 }
 
 /// How many faults are planted: each is a kernel that the device compiles anew. In the short run every kernel of the room gets one,
-/// and each other subject its first; none is asked for what is dear.
+/// and each other subject its first; only questions that are not dear are asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Size {
     Short,

@@ -1,5 +1,6 @@
 //! What nothing has reached has an unknown error and an upper bound, and no run ends on it.
 
+use crate::common::known::of_any_room;
 use crate::common::prelude::*;
 use glam::dvec3;
 use photonmill::engine::End;
@@ -202,8 +203,7 @@ pub fn hidden_lamp(gpu: &Gpu) -> Check<Complaint> {
     // A black floor needs no photons in the trial.
     let scene = scene_of(meshes, vec![matt(0.0), shining(1.0), shining(1000.0), Material { two_sided: true, ..matt(0.0) }], vec![]);
     let points: Vec<_> = (0..16).map(|k| (DVec3::new(f64::from(k % 4), 0.0, f64::from(k / 4)) * 0.1, DVec3::Y)).collect();
-    // With and without a sheet by the same kernels.
-    let settings = SceneSettings { with: vec![Effect::Bvh, Effect::TwoSided], ..by_rounds() };
+    let settings = of_any_room(by_rounds());
     let lit = render(gpu, &scene, &settings, Target::Points(&points)).unwrap();
     let unknown = lit.film.unknown(0.95);
     // Of the hole below the lamp's middle: radiance times its area over the squared distance, both seen straight.

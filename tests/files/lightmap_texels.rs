@@ -1,6 +1,7 @@
 //! Lightmaps without their light: coordinates that do not overlap, texels that lie on their triangles,
 //! filled gutters, files that hold what they were given and open again.
 
+use crate::common::known::of_any_room;
 use crate::common::lit::light;
 use crate::common::prelude::*;
 use crate::common::program::entries;
@@ -1101,9 +1102,7 @@ fn look_at_the_foot(blocks: &[(f64, bool)]) {
         scene.materials[0] = Material { two_sided: is_turned, ..matt(0.0) };
         scene.lights.push(down.clone());
         let layout = Layout::new(&scene, 16.0).unwrap();
-        // Both blocks by the same kernels.
-        let with = vec![Effect::Bvh, Effect::TwoSided];
-        let settings = SceneSettings { photons: 500, rounds: 8, part: Part::Direct, with, ..by_rounds() };
+        let settings = of_any_room(SceneSettings { photons: 500, rounds: 8, part: Part::Direct, ..by_rounds() });
         let sensor = Sensor::Receivers { count: layout.texel_count() as u32 };
         let (geometry, plan) = scene_plan(&gpu, &scene, &settings, sensor).unwrap();
         let phases = layout.receivers(settings.rounds, &geometry);

@@ -289,7 +289,7 @@ fn pictures_are_made_again_to_the_bit() {
     make_pictures_again(false);
 }
 
-/// With tiles that a pilot chose, another filter, and light from a file.
+/// With tiles that a pilot chose, another filter, photons in a run of limited time, and a photon map from a file.
 #[test]
 #[ignore = "long: a run that is long enough for a pilot's tiles"]
 fn pictures_of_long_runs_are_made_again_to_the_bit() {
@@ -314,8 +314,8 @@ fn make_pictures_again(all: bool) {
     assert!(tiles.is_some());
     place.write("a scene.gltf", square_file());
     // As many rounds as there is time for.
-    let of_file =
-        format!("render 'a scene.gltf' -o file.png --time 0.2s --environment 0.5 --without indirect --tone linear --exposure 1 {SMALL}");
+    let without = if all { "" } else { "--without indirect" };
+    let of_file = format!("render 'a scene.gltf' -o file.png --time 0.2s --environment 0.5 {without} --tone linear --exposure 1 {SMALL}");
     place.succeed(&of_file);
     place.succeed(&format!("render cornell -o half.exr --rounds 8 {filter} --checkpoint half.pms {SMALL}"));
     // The last three are less than a block.

@@ -304,7 +304,7 @@ fn glowing_pane() -> Scene {
 }
 
 /// What transmits has two sides, also where it shines: photons carry as much from its back, to a floor, as from its front, to a ceiling.
-/// By quadrature over the pane and the radius.
+/// The number is by quadrature over the pane and the radius.
 #[test]
 fn glowing_panes_shine_both_ways() {
     let Some(gpu) = device() else { return };
@@ -318,7 +318,7 @@ fn glowing_panes_shine_both_ways() {
     }
 }
 
-/// As rays see it there.
+/// A camera sees what photons carry, by both illuminations.
 #[test]
 #[ignore = "long: a picture, and kernels of shadow rays too"]
 fn glowing_panes_look_as_they_shine() {

@@ -706,7 +706,7 @@ fn walls_light_what_touches_them(textured: bool) {
     let distances = [0.0, 1e-8, 1e-7, 1e-6, 3e-6, 1e-5, 1e-4];
     let mut family = Family::default();
     let mut check = |what: &str, scene: &Scene, points: &[(DVec3, DVec3)], expected: &dyn Fn(DVec3) -> f64| {
-        // One set of kernels for both scenes.
+        // With textures, one set of kernels for both scenes.
         let with = if textured { vec![Effect::Textures] } else { vec![] };
         let settings = kept(SceneSettings { rounds: 16, shadow_rays: 64, part: Part::Direct, with, ..by_rounds() });
         let lit = received(&gpu, scene, &settings, points);

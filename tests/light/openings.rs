@@ -56,11 +56,10 @@ fn indirect(aim: bool) -> SceneSettings {
     settings(Part::Indirect, aim)
 }
 
-/// The light is what a path tracer finds, and its variance less than a tenth of that of rays and photons that are not aimed: under an
-/// even sky, and under a picture with a sun. Each part of the light has kernels of its own, and another set without aim. Black rooms need
-/// no photons in the trial, and what else is asked of their direct light has the same kernels.
+/// Direct light in black rooms, which need no photons in the trial: through a small window it is what a path tracer finds, and its variance
+/// less than a tenth of that of rays that are not aimed. All of it has the same kernels.
 #[test]
-fn a_small_window_lights_a_room_in_a_tenth_of_the_time() {
+fn light_through_openings_is_found() {
     let Some(gpu) = device() else { return };
     lights_through_a_window(&gpu, "even", 0.0, sky(4, 2, |_, _| Vec3::ONE), &[Part::Direct]);
     an_open_scene_has_no_openings_and_the_same_bits(&gpu);

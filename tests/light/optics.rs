@@ -329,7 +329,7 @@ fn light_leaves_a_focus_in_parallel(illuminations: &[Illumination]) {
     family.assert_tells(0.02, |_| true);
 }
 
-/// In either way sunlight meets in the focus.
+/// The reverse, sunlight that meets in the focus, is tested by both illuminations.
 #[test]
 fn light_from_a_focus_leaves_in_parallel() {
     light_leaves_a_focus_in_parallel(&[Illumination::Photons]);

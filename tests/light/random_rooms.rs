@@ -8,6 +8,7 @@
 use std::fmt::Write;
 use std::sync::atomic::AtomicBool;
 
+use crate::common::known::of_any_room;
 use crate::common::lit::light;
 use crate::common::prelude::*;
 use crate::common::rectangles::{Radiosity, Rectangle};
@@ -307,9 +308,7 @@ const PHOTONS: u32 = 1 << 14;
 fn lit_rooms(gpu: &Gpu, seed: u64, with_bias: bool) -> Vec<Found> {
     let rooms = rooms(seed);
     let (scene, points) = scene_of_rooms(&rooms, seed);
-    // Rooms with and without partitions share kernels.
-    let with = vec![Effect::Bvh, Effect::TwoSided];
-    let settings = SceneSettings { photons: PHOTONS, rounds: ROUNDS, seed, with, ..by_rounds() };
+    let settings = of_any_room(SceneSettings { photons: PHOTONS, rounds: ROUNDS, seed, ..by_rounds() });
     let (geometry, target) = (Geometry::new(&scene).unwrap(), Target::Points(&points));
     let view = View { geometry: &geometry, camera: None, phases: &target.phases(&geometry) };
     let lit = light(gpu, &view, trial::plan(gpu, &scene, &view, &settings, target.sensor()).unwrap());
@@ -447,7 +446,7 @@ fn seven_random_rooms_are_right_within_their_errors() {
 }
 
 /// A point of a box of 1 mm, which two or three photons have found that have almost no blue: its right blue, 40 times what they have,
-/// lies within what is stated, and 70 times further off than their spread. Its other points stand for all rooms in the short run.
+/// lies within what is stated, and 70 times further off than their spread. Its other points are judged too.
 #[test]
 fn few_hits_say_little_of_colours_that_they_lack() {
     let Some(gpu) = device() else { return };

@@ -161,8 +161,8 @@ pub fn a_sun_that_shines_in_has_as_many_rays_as_without_openings(gpu: &Gpu, albe
     }
 }
 
-/// A patch of sun among points that see the sky alone keeps its shadow rays, though aimed rays find the sky from all of them. What walls
-/// scatter is not asked for, but has its photons in the trial.
+/// A patch of sun among points that see the sky alone keeps its shadow rays, though aimed rays find the sky from all of them. What grey
+/// walls scatter is not asked for, but has its photons in the trial.
 pub fn a_patch_of_sun_keeps_its_rays(gpu: &Gpu, albedo: f32) {
     let way = dvec3(0.25, -1.0, 0.1).normalize();
     let mut scene = room_under(albedo, LightKind::Sky(Arc::new(sky(4, 2, |_, _| Vec3::splat(300.0)))));
@@ -205,15 +205,26 @@ fn black_skies_and_single_texels_leave_no_odd_number() {
 #[ignore = "long: kernels of glass, twenty seconds on a software device"]
 fn black_skies_through_glass_leave_no_odd_number() {
     skies_leave_no_odd_number(&by_rounds(), true);
-    skies_leave_no_odd_number(&SceneSettings { aim: true, ..by_shadow_rays() }, false);
+}
+
+#[test]
+#[ignore = "long: kernels of aimed rays"]
+fn skies_that_rays_are_aimed_at_are_black_or_keep_their_channels() {
+    let aimed = SceneSettings { aim: true, ..by_shadow_rays() };
+    skies_leave_no_odd_number(&aimed, false);
+    channels_keep_their_light(&aimed);
+}
+
+#[test]
+fn weak_channels_of_a_sky_keep_their_light() {
+    channels_keep_their_light(&by_shadow_rays());
 }
 
 /// Each channel of an even sky lights a floor by what it is, whatever the ratio to the others.
-#[test]
-fn weak_channels_of_a_sky_keep_their_light() {
+fn channels_keep_their_light(settings: &SceneSettings) {
     let Some(gpu) = device() else { return };
     for colour in [Vec3::new(1000.0, 1.0, 0.3), Vec3::new(10.0, 2.0, 0.3), Vec3::new(1.0, 0.25, 0.002), Vec3::new(1.0, 1e-4, 1e-4)] {
-        let settings = SceneSettings { rounds: 1, ..by_shadow_rays() };
+        let settings = SceneSettings { rounds: 1, ..settings.clone() };
         let lit = received(&gpu, &floor_under(sky(4, 2, |_, _| colour)), &settings, &[(DVec3::ZERO, DVec3::Y)]);
         let share = lit.film.mean(0) / (PI * colour.as_dvec3());
         println!("{colour}: {share}");

@@ -497,7 +497,7 @@ fn samples_of_a_pixel_leave_little_noise() {
     assert!(2.0 * even < by_chance, "{even} and {by_chance}");
 }
 
-fn a_furnace_is_bright(edge_correction: bool) {
+fn furnace_by(edge_correction: bool) {
     let Some(gpu) = device() else { return };
     let points = [
         (DVec3::new(0.5, 0.0, 0.5), DVec3::Y),
@@ -522,13 +522,13 @@ fn a_furnace_is_bright(edge_correction: bool) {
 
 #[test]
 fn a_furnace_is_equally_bright_everywhere() {
-    a_furnace_is_bright(true);
+    furnace_by(true);
 }
 
 #[test]
 #[ignore = "long: kernels that correct no edges"]
 fn an_edge_without_correction_is_dark_in_a_furnace() {
-    a_furnace_is_bright(false);
+    furnace_by(false);
 }
 
 /// L = rho E / pi on one wall, by camera and by receiver.
@@ -627,7 +627,7 @@ fn agrees_with_the_judge(gpu: &Gpu, scene: &Scene, [photons, rounds]: [u32; 2], 
     assert!(!verdict(1.3).agrees(), "{}, a third brighter, is not noticed", scene.name);
 }
 
-/// In the short run `tests/engine/strict.rs` has the bits of the spheres.
+/// In the short run `tests/light/skies.rs` compares points with the path tracer.
 #[test]
 #[ignore = "long: half a minute on a software device"]
 fn pictures_agree_with_the_judge() {

@@ -153,7 +153,8 @@ fn a_prism_deviates_each_colour_by_its_index() {
 
 /// A ray beside the axis crosses it behind a ball of radius 1 at h / sin(2 (i - r)), sin i = h and sin r = h / n: close to the axis at
 /// the focal length n / (2 (n - 1)).
-/// In the short run a prism has an index for each colour.
+///
+/// In the short run `a_prism_deviates_each_colour_by_its_index` has an index for each colour.
 #[test]
 #[ignore = "long: minutes on a software device"]
 fn a_ball_has_a_focal_length_for_each_colour_and_height() {

@@ -92,7 +92,7 @@ const LONG: [(&str, &str); 20] = [
     ("photonmill --irradiance out --json ", "`tests/program/cli.rs` runs one with more files"),
     ("photonmill --error 5% --bias", "`tests/program/cli.rs` runs one with more options"),
     ("photonmill bake scene.glb -o baked --time ", "one without the ends of a run runs"),
-    ("photonmill render cornell -o a.exr --error 2% --confidence ", "`tests/engine/pilot.rs` runs one that ends at an error"),
+    ("photonmill render cornell -o a.exr --error 2% --confidence ", "`tests/engine/stop.rs` ends runs at an error"),
     ("photonmill render scene.glb -o picture.exr --error 2% --error-image ", "one with an error image and rounds runs"),
     ("photonmill render scene.glb -o picture.exr --time 30s", "one with snapshots runs"),
     ("photonmill render scene.glb -o picture.png --size 320 --rounds ", "one without the size runs"),

@@ -11,6 +11,7 @@ use photonmill::engine::room::live::LiveRoom;
 use photonmill::engine::scene::live::LiveScene;
 use photonmill::engine::scene::{View, trial};
 use photonmill::output::colour::{ColourPicture, Format, Tone, png_codes};
+use photonmill::settings::stop::LEAST_BLOCKS;
 use photonmill::view::picture::{Exposure, Picture};
 use x11rb::connection::Connection;
 use x11rb::protocol::xproto::{
@@ -83,7 +84,8 @@ fn the_window_has_the_values_of_the_film_and_the_codes_of_its_file() {
     // Before a block is whole, and after several.
     for rounds in [1, 12] {
         (live.rounds()..rounds).for_each(|_| live.round().unwrap());
-        let film = live.look().unwrap().0;
+        let (film, error) = live.look().unwrap();
+        assert_eq!(error.noise.is_finite(), film.blocks >= LEAST_BLOCKS, "{} blocks", film.blocks);
         let mut shown = |shows: u32| {
             live.show(shows, 2.0, &picture.shown).unwrap();
             live.commands().read(&picture.shown, pixels).unwrap()
@@ -361,12 +363,12 @@ fn a_window_opens_resizes_hides_shows_renders_and_closes() {
     desktop.screenshot(&place, "its size again", |size, _| size == [210, 170]);
 
     // The picture as it is seen, by the command that the window names. Pictures on the way and screenshots do not say how they were made.
-    let content = desktop.press_for(KEY_R, "a rendered picture", || {
+    let image = desktop.press_for(KEY_R, "a rendered picture", || {
         let files = std::fs::read_dir(place.path()).unwrap().map(|file| file.unwrap().path());
         let pictures = files.filter(|path| path.extension().is_some_and(|ending| ending == "png"));
-        pictures.filter_map(|path| std::fs::read(path).ok()).find(|content| content.windows(6).any(|text| text == b"--eye "))
+        let mut contents = pictures.filter_map(|path| std::fs::read(path).ok());
+        contents.find(|content| content.windows(6).any(|text| text == b"--eye ")).and_then(|content| image::load_from_memory(&content).ok())
     });
-    let image = image::load_from_memory(&content).unwrap();
     assert_eq!((image.width(), image.height()), (40, 30));
 
     // As the desktop closes windows.
@@ -388,8 +390,9 @@ fn the_box_is_viewed_and_escape_closes_its_window() {
     let desktop = Desktop::new(&place);
     desktop.start(&place, "view box --photons 500 --size 60x40 --validate");
     // A key before the first picture waits for it.
+    desktop.press(KEY_6);
     let is_coloured = |colour: [u8; 3]| colour[0].abs_diff(colour[1]) > 60;
-    desktop.press_for(KEY_6, "the error in false colours", || desktop.colours().into_iter().any(is_coloured).then_some(()));
+    desktop.wait_for("the error in false colours", || desktop.colours().into_iter().any(is_coloured).then_some(()));
     desktop.press(ESCAPE);
     let output = desktop.output();
     assert!(output.status.success(), "{output:?}");

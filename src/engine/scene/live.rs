@@ -108,10 +108,10 @@ impl<'a> LiveScene<'a> {
         std::mem::take(self.run.recorder.timings())
     }
 
-    /// The film as far as blocks are whole, and its error.
+    /// The film as far as blocks are whole, and its error as users are told of it.
     pub fn look(&mut self) -> Result<(SceneFilm, FilmError)> {
         let film = self.run.film()?;
-        let error = self.run.world.error(&film);
+        let error = self.run.world.error(&film).stated();
         Ok((film, error))
     }
 
