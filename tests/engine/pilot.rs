@@ -81,10 +81,11 @@ fn what_is_set_stays_and_the_rest_is_chosen_alike_each_time(gpu: &Gpu, spheres: 
     let of_others = spheres.chosen(gpu, &three, Free { shadow_rays: false, ..Free::ALL }).unwrap();
     assert!(of_others.chosen.shadow_rays == 3 && of_others.chosen != of_others.before, "{of_others:?}");
     assert_eq!(spheres.chosen(gpu, &usual, Free::default()), None);
-    // A small error takes more of it.
+    // A small error takes more of it; a GPU, on which a round costs more than its paths, saves little by a large one.
+    let most = if gpu.facts().kind == "cpu" { 0.5 } else { 1.0 };
     let rough = spheres.chosen(gpu, &coarse, Free::ALL).unwrap();
     let [rough, good] = [(&rough, 0.4), (&found, 0.1)].map(|(pilot, error)| pilot.rounds.until(pilot.chosen, error));
-    assert!(rough.0 >= 16.0 && rough.1 < 0.5 * good.1, "{rough:?} {good:?}");
+    assert!(rough.0 >= 16.0 && rough.1 < most * good.1, "{rough:?} {good:?}");
 }
 
 /// The work until an error, by what the pilot says of a round and the rounds that runs took.
