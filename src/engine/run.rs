@@ -551,8 +551,8 @@ impl<'a> RunState<'a> {
         let Task { rounds_per_block, photons_per_round, counts_photons, .. } = self.task;
         let most_rounds = if self.share.of > 1 { self.share.count(self.wanted()) * rounds_per_block } else { self.task.rounds };
         // What is left of a round that was cut short at the end counts for nothing.
-        let is_between_rounds = self.is_whole() || self.is_short() || self.end.is_some();
-        let rounds = if is_between_rounds { f64::from(self.rounds()) } else { self.emitted as f64 / photons_per_round as f64 };
+        let counts_whole = self.is_whole() || self.is_short() || self.end.is_some();
+        let rounds = if counts_whole { f64::from(self.rounds()) } else { self.emitted as f64 / photons_per_round as f64 };
         let progress = self.watch.progress(rounds, most_rounds, photons_per_round, self.ledger());
         if counts_photons {
             Progress { done: self.emitted, total: photons_per_round * u64::from(most_rounds), ..progress }

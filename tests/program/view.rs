@@ -142,6 +142,8 @@ fn the_box_is_seen_with_the_illumination_of_its_walls() {
     let plan = LiveRoom::plan(&gpu, &room, &settings).unwrap();
     let mut live = LiveRoom::new(&gpu, &room, &plan, &NEVER).unwrap();
     (0..5).for_each(|_| live.round().unwrap());
+    // Of fewer than eight blocks.
+    assert!(live.look().unwrap().0.is_infinite());
     let film = live.film().unwrap();
     let middle = 0.5 * (room.min_corner + room.max_corner);
     for (place, (face, _)) in room.walls().enumerate() {
