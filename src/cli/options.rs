@@ -160,10 +160,15 @@ impl DevicesOfRunArgs {
             numbers.iter().try_for_each(|number| require(*number < count, "--devices", number, absent(number)))?;
         }
         let options = |number: &usize| Options { device: Some(number.to_string()), ..self.one.options() };
-        let opened: Vec<Result<Gpu>> = std::thread::scope(|scope| {
-            let threads: Vec<_> = numbers.iter().map(|number| scope.spawn(move || Gpu::open(&options(number)))).collect();
-            threads.into_iter().map(|thread| thread.join().expect("opening a device does not panic")).collect()
-        });
+        // The validation layer's table of devices has no lock (1.3.239): with it they are opened one after another.
+        let opened: Vec<Result<Gpu>> = if self.one.chosen.validate {
+            numbers.iter().map(|number| Gpu::open(&options(number))).collect()
+        } else {
+            std::thread::scope(|scope| {
+                let threads: Vec<_> = numbers.iter().map(|number| scope.spawn(move || Gpu::open(&options(number)))).collect();
+                threads.into_iter().map(|thread| thread.join().expect("opening a device does not panic")).collect()
+            })
+        };
         let gpus = opened.into_iter().collect::<Result<Vec<Gpu>>>()?;
         gpus.iter().for_each(|gpu| reporter.device(Some(gpu)));
         require(!gpus.is_empty(), "--devices", "all", "names no device: there is none; see `photonmill devices`")?;
