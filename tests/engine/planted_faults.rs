@@ -70,6 +70,7 @@ enum Question {
     RoomBesideHall,
     BehindWall,
     BesideBox,
+    FloorBesideMirror,
     /// With so many samples a pixel, and with a final gather or not.
     GlassInFurnace(u32, bool),
     // The checks of `common::lamps`: a room beside one whose lamp is so many times as strong, a lamp in so many squares a side.
@@ -121,7 +122,7 @@ use Question::*;
 impl Question {
     /// Whether another test asks it of a device without a fault.
     fn has_a_test_of_its_own(self) -> bool {
-        matches!(self, Bits(_) | AimedLight(_) | BrightSpot | DimRoom(_) | HiddenLamp | ManyLamps(_) | ClearBalls)
+        matches!(self, Bits(_) | AimedLight(_) | BrightSpot | DimRoom(_) | HiddenLamp | ManyLamps(_) | ClearBalls | FloorBesideMirror)
     }
 
     /// Whether it takes kernels of its own that are long in the making: the long run asks it, of a device without a fault, too.
@@ -213,7 +214,7 @@ struct Fault {
 }
 
 #[rustfmt::skip]
-const FAULTS: [Fault; 141] = [
+const FAULTS: [Fault; 142] = [
     // The first of their subjects, which the short run plants, are kept here: their questions share most of their kernels with others.
     Fault { what: "8-bit codes of textures are taken for linear values",
         file: "material/textures.glsl", from: "return uintBitsToFloat(texels[code & 255]);", to: "return float(code & 255) * (1.0 / 255.0);",
@@ -471,6 +472,9 @@ const FAULTS: [Fault; 141] = [
     Fault { what: "the floor behind a wall is taken for floor before it",
         file: "gather/cover.glsl", from: "if (line.w < cuts.reach) {", to: "if (false) {",
         kernels: &["flux_to_radiance"], noticed_by: &[(BesideBox, TooDark)] },
+    Fault { what: "what keeps no photons counts as area that they lie on",
+        file: "gather/cover.glsl", from: "|| !keeps_photons(triangle.material)", to: "",
+        kernels: &["flux_to_radiance"], noticed_by: &[(FloorBesideMirror, TooDark)] },
     Fault { what: "smooth normals alone reflect totally in glass for ever",
         file: "material/scatter.glsl", from: "&& depth >= SMOOTH_TOTAL_REFLECTIONS", to: "&& false",
         kernels: &["view", "go_on"],
@@ -797,6 +801,7 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         RoomBesideHall => known::room_beside_a_hall(gpu, true),
         BehindWall => known::behind_a_wall(gpu, known::sheet(), Some(0.1)),
         BesideBox => known::beside_a_box(gpu, Some(0.1)),
+        FloorBesideMirror => crate::light::overlap::floor_beside(gpu, "mirror", mirror(1.0)),
         BrightSpot => lamps::bright_spot(gpu, Wrap::Repeat, Illumination::Split),
         DimRoom(ratio) => lamps::dim_room(gpu, ratio, true),
         HiddenLamp => lamps::hidden_lamp(gpu, 1e4, true),

@@ -1,5 +1,6 @@
 //! Surfaces that lie in one plane, or next to it: their light is that of one, and of each.
 
+use crate::common::estimate_check;
 use crate::common::known::{kept, of_any_room};
 use crate::common::layered::{dull, without_maps};
 use crate::common::prelude::*;
@@ -362,32 +363,32 @@ fn without_photons() -> SceneSettings {
 }
 
 /// What keeps no photons is no area that they are counted over: a floor is lit to its edge, whatever of these lies beside it.
-fn a_floor_is_lit_to_its_edge(beside: Vec<(&str, Material)>) {
-    let Some(gpu) = device() else { return };
+pub fn floor_beside(gpu: &Gpu, what: &str, other: Material) -> Check<Complaint> {
     let half = |x: f64, material: usize| Mesh::parallelogram("half", DVec3::new(x, 0.0, 0.0), DVec3::Z, DVec3::X * 0.5, material);
     let points = [(DVec3::new(0.499, 0.0, 0.5), DVec3::Y), (DVec3::new(0.25, 0.0, 0.5), DVec3::Y)];
-    for (what, other) in beside {
-        let scene =
-            scene_of(vec![half(0.0, 0), half(0.5, 1)], vec![matt(0.5), other], vec![LightKind::Environment { radiance: Vec3::ONE }]);
-        let lit = received(&gpu, &scene, &mapped(20_000, 16, 2, 0.1), &points);
-        for place in 0..2 {
-            let (found, error) = red(&lit, place);
-            println!("beside {what}: {found} +- {error}");
-            assert!(error < 0.05 * PI, "{what}: {error}");
-            assert_holds(what, z_check(what, found, PI, error));
-        }
-    }
+    let scene = scene_of(vec![half(0.0, 0), half(0.5, 1)], vec![matt(0.5), other], vec![LightKind::Environment { radiance: Vec3::ONE }]);
+    let lit = received(gpu, &scene, &mapped(20_000, 16, 2, 0.1), &points);
+    (0..2).try_for_each(|place| {
+        let (found, error) = red(&lit, place);
+        println!("beside {what}: {found} +- {error}");
+        assert!(error < 0.05 * PI, "{what}: {error}");
+        estimate_check(&format!("a floor beside {what}"), found, PI, error)
+    })
 }
 
 #[test]
 fn a_floor_beside_what_keeps_no_photons_is_lit_to_its_edge() {
-    a_floor_is_lit_to_its_edge(vec![("mirror", mirror(1.0))]);
+    let Some(gpu) = device() else { return };
+    assert_holds("beside a mirror", floor_beside(&gpu, "mirror", mirror(1.0)));
 }
 
 #[test]
 #[ignore = "long: kernels of three materials"]
 fn a_floor_beside_all_that_keeps_no_photons_is_lit_to_its_edge() {
-    a_floor_is_lit_to_its_edge(vec![("metal", smooth_metal()), ("mirror", mirror(1.0)), ("glass", clear_solid(1.5))]);
+    let Some(gpu) = device() else { return };
+    for (what, other) in [("metal", smooth_metal()), ("mirror", mirror(1.0)), ("glass", clear_solid(1.5))] {
+        assert_holds(what, floor_beside(&gpu, what, other));
+    }
 }
 
 /// A floor below a block of glass that stands on it is lit as below one that is sunk into it by a millimetre. (What the floor emits
@@ -691,16 +692,30 @@ fn every_two_surfaces_in_one_plane_keep_the_light_of_a_furnace() {
     keep_the_light_of_a_furnace(&MADE);
 }
 
-/// And each shows what it does where they are a millimetre apart.
+/// And each shows what it does where they are a millimetre apart: under a sky, and before a lamp aside.
 #[test]
-#[ignore = "long: two pictures of 162 pairs"]
+#[ignore = "long: four pictures of 162 pairs"]
 fn surfaces_in_one_plane_show_what_they_do_a_millimetre_apart() {
     let Some(gpu) = device() else { return };
-    let [touching, apart] = [0.0, 1e-3].map(|lift| seen_of_table(&gpu, &table(&MADE, lift, [0.3, 0.8]), MADE.len(), 1.0));
     let mut complaints = Vec::new();
-    for (place, ((one, error), (other, other_error))) in touching.iter().zip(&apart).enumerate() {
-        if (one - other).abs() > f64::max(0.05, 5.0 * error.hypot(*other_error)) {
-            complaints.push(format!("{:?}: {one} +- {error} touching, {other} +- {other_error} apart", pair(&MADE, place)));
+    for is_before_a_lamp in [false, true] {
+        let [touching, apart] = [0.0, 1e-3].map(|lift| {
+            let mut scene = table(&MADE, lift, [0.3, 0.8]);
+            if is_before_a_lamp {
+                let (towards, along) = (DVec3::new(-1.0, -1.0, 0.0), DVec3::new(-7.0, 7.0, 0.0));
+                let lamp = Mesh::parallelogram("lamp", towards * -12.0, DVec3::Z * 10.0, along, scene.materials.len());
+                scene.materials.push(Material { emission: Vec3::splat(15.0), two_sided: true, ..matt(0.0) });
+                scene.meshes.push(lamp);
+                scene.lights.clear();
+            }
+            seen_of_table(&gpu, &scene, MADE.len(), 1.0)
+        });
+        assert!(touching.iter().filter(|(mean, _)| *mean > 0.2).count() > touching.len() / 2, "{touching:?}");
+        for (place, ((one, error), (other, other_error))) in touching.iter().zip(&apart).enumerate() {
+            if (one - other).abs() > f64::max(0.05, 5.0 * error.hypot(*other_error)) {
+                let pair = pair(&MADE, place);
+                complaints.push(format!("{is_before_a_lamp}: {pair:?}: {one} +- {error} touching, {other} +- {other_error} apart"));
+            }
         }
     }
     assert!(complaints.is_empty(), "{}", complaints.join("\n"));
