@@ -1,9 +1,25 @@
-// What a path runs through: a stack of media, the one entered last lowest; 0: none. Of nested solids the one entered last counts.
+// What a path runs through: a stack of media, the one that counts lowest; 0: none. It is the one entered last, or that of the smallest solid.
 // A scene in which more of them lie in one another than there is room for is refused (src/scene/geometry/mod.rs).
 
 // Of one medium: eight, or fewer where many solids lie in one another.
 layout(constant_id = 75) const uint MEDIUM_BITS = 8;
 const uint MEDIUM_MASK = (1u << MEDIUM_BITS) - 1u;
+
+// Where solids lie partly in one another, the medium must not depend on the way there: what light gets in by is what it gets out by.
+// Then media are numbered by size, and the highest number counts.
+layout(constant_id = 76) const bool HAS_MEDIA_BY_SIZE = false;
+
+uint medium_added(uint media, uint medium)
+{
+    uint place = 0;
+    if (HAS_MEDIA_BY_SIZE) {
+        while (place + 2 * MEDIUM_BITS <= 32 && ((media >> place) & MEDIUM_MASK) > medium) {
+            place += MEDIUM_BITS;
+        }
+    }
+    uint below = (1u << place) - 1;
+    return ((media & ~below) << MEDIUM_BITS) | (medium << place) | (media & below);
+}
 
 uint medium_removed(uint media, uint medium)
 {
@@ -41,7 +57,7 @@ float index_in(uint media, uint channel)
 uint media_beyond(Surface surface, uint media)
 {
     uint medium = surface.layers.medium;
-    return surface.front ? (media << MEDIUM_BITS) | medium : medium_removed(media, medium);
+    return surface.front ? medium_added(media, medium) : medium_removed(media, medium);
 }
 
 float spread_in(uint media)
@@ -142,7 +158,7 @@ uint media_at(vec3 position, vec3 way)
                     entered = without;
                 } else {
                     // The first that it leaves is the innermost.
-                    media |= medium << count;
+                    media = HAS_MEDIA_BY_SIZE ? medium_added(media, medium) : media | medium << count;
                     count += MEDIUM_BITS;
                 }
             }

@@ -332,6 +332,7 @@ fn constants(
         ("HAS_PANES", u32::from(keeps(Effect::Transmission) && facts.has_kind(|kinds| kinds.pane))),
         ("HAS_MEDIA", flag(Effect::Media)),
         ("MEDIUM_BITS", geometry.medium_bits),
+        ("HAS_MEDIA_BY_SIZE", u32::from(keeps(Effect::Media) && geometry.has_media_by_size)),
         ("HAS_DIFFUSE_TRANSMISSION", flag(Effect::DiffuseTransmission)),
         ("HAS_IRIDESCENCE", flag(Effect::Iridescence)),
         ("HAS_ANISOTROPY", flag(Effect::Anisotropy)),

@@ -56,6 +56,9 @@ const MIN_AREA_SHARE: f64 = 1.0 / (1u128 << 80) as f64;
 /// Triangles that are not worth sharing among threads.
 const MIN_PIECE: usize = 4096;
 
+/// Corners of a seam that are this share of a mesh's extent apart are one: half a unit of single precision.
+const SEAM_SHARE: f64 = 1.0 / (1 << 24) as f64;
+
 impl Mesh {
     /// Corners of a triangle.
     pub fn corners(&self, triangle: usize) -> [DVec3; 3] {
@@ -91,10 +94,15 @@ impl Mesh {
     }
 
     /// Whether the triangles of meshes bound a volume together: as many have an edge in one direction as in the other. Corners at one
-    /// place are one corner.
-    pub fn are_closed<'m>(meshes: impl IntoIterator<Item = &'m Mesh>) -> bool {
-        // The sum turns -0 into 0.
-        let place = |corner: DVec3| (corner + DVec3::ZERO).to_array().map(f64::to_bits);
+    /// place are one corner, also where a sine of a whole turn has put them 1e-16 apart.
+    pub fn are_closed<'m>(meshes: impl IntoIterator<Item = &'m Mesh> + Clone) -> bool {
+        let (min, max) = meshes
+            .clone()
+            .into_iter()
+            .flat_map(|mesh| &mesh.positions)
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), at| (min.min(*at), max.max(*at)));
+        let cell = (max - min).max_element() * SEAM_SHARE;
+        let place = |corner: DVec3| ((corner - min) / cell).to_array().map(|cells| cells.round() as u64);
         let mut surplus: HashMap<_, i64> = HashMap::new();
         for mesh in meshes {
             for [a, b, c] in (0..mesh.triangles.len()).map(|triangle| mesh.corners(triangle).map(place)) {
@@ -197,6 +205,11 @@ mod tests {
         };
         seams.positions[0] = -DVec3::ZERO;
         assert!(Mesh::are_closed([&seams]));
+        // The sine of a whole turn.
+        seams.positions[0] = DVec3::new(-2.4e-16, 0.0, 2.4e-16);
+        assert!(Mesh::are_closed([&seams]));
+        seams.positions[0] = DVec3::new(-1e-6, 0.0, 0.0);
+        assert!(!Mesh::are_closed([&seams]));
         // A triangle without area between others.
         let mut halved = tetrahedron();
         halved.positions.push(DVec3::new(0.5, 0.5, 0.0));

@@ -18,8 +18,9 @@ struct Shell {
 /// Along no axis and no diagonal.
 const DIRECTION: DVec3 = DVec3::new(0.290_380_3, 0.829_658_1, 0.476_861_2);
 
-/// Triangles of a shell just inside of which one looks for the solids around.
+/// Triangles of a shell just inside of which one looks for the solids around, and for one that it lies partly in.
 const PLACES: usize = 8;
+const PLACES_OF_A_PAIR: usize = 64;
 
 impl Shell {
     /// Positive where faces look outwards; whatever the origin, of a closed shell.
@@ -52,6 +53,25 @@ impl Shell {
     fn middle(&self, triangle: usize) -> DVec3 {
         let [a, b, c] = self.corners[triangle];
         (a + b + c) / 3.0
+    }
+
+    /// About so many places just inside of it, each with its triangle.
+    fn places_inside(&self, count: usize) -> impl Iterator<Item = (usize, DVec3)> {
+        (0..self.corners.len()).step_by(self.corners.len().div_ceil(count)).map(|triangle| {
+            let [a, b, c] = self.corners[triangle];
+            (triangle, self.middle(triangle) - (b - a).cross(c - a).normalize_or_zero() * (1e-6 * (self.max - self.min).length()))
+        })
+    }
+
+    fn meets(&self, other: &Shell) -> bool {
+        self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
+    }
+
+    /// Whether it lies partly within another, as far as places just inside of it tell.
+    fn is_partly_in(&self, other: &Shell) -> bool {
+        let mut is_inside = self.places_inside(PLACES_OF_A_PAIR).map(|(_, place)| other.winding(place) != 0);
+        let first = is_inside.next();
+        is_inside.any(|is_inside| Some(is_inside) != first)
     }
 }
 
@@ -159,21 +179,17 @@ pub fn turn_outwards(scene: &mut Scene) -> BTreeSet<String> {
 /// a mesh that has so many around it.
 pub fn most_nested(scene: &Scene, few: usize, corners_of: impl Fn(u32, u32) -> [DVec3; 3]) -> Option<(usize, u32)> {
     let shells: Vec<Shell> = shells(scene, corners_of).into_values().flatten().collect();
-    let meet = |a: &Shell, b: &Shell| a.min.cmple(b.max).all() && b.min.cmple(a.max).all();
     let mut order: Vec<&Shell> = shells.iter().collect();
     order.sort_by(|a, b| a.min.x.total_cmp(&b.min.x));
     let mut most: Option<(usize, u32)> = None;
     for (place, shell) in order.iter().enumerate() {
         // Along one axis, those that begin before this one does and those that begin before it ends.
         let after = order[place + 1..].iter().take_while(|other| other.min.x <= shell.max.x);
-        let near: Vec<&Shell> = order[..place].iter().chain(after).copied().filter(|other| meet(shell, other)).collect();
+        let near: Vec<&Shell> = order[..place].iter().chain(after).copied().filter(|other| shell.meets(other)).collect();
         if near.len() < few {
             continue;
         }
-        let step = shell.corners.len().div_ceil(PLACES);
-        for triangle in (0..shell.corners.len()).step_by(step) {
-            let [a, b, c] = shell.corners[triangle];
-            let inside = shell.middle(triangle) - (b - a).cross(c - a).normalize_or_zero() * (1e-6 * (shell.max - shell.min).length());
+        for (triangle, inside) in shell.places_inside(PLACES) {
             // Its own side is known, whatever rounding says.
             let depth = 1 + near.iter().map(|other| other.winding(inside)).sum::<i32>().max(0) as usize;
             if depth > few && most.is_none_or(|(known, _)| depth > known) {
@@ -182,4 +198,31 @@ pub fn most_nested(scene: &Scene, few: usize, corners_of: impl Fn(u32, u32) -> [
         }
     }
     most
+}
+
+/// Materials of solids from the largest to the smallest, each by its smallest, if solids of different media lie partly in one another
+/// anywhere, as far as places just inside of their shells tell: neither holds the other, and who is in both may have entered either last.
+pub fn by_size_if_overlapping(scene: &Scene) -> Option<Vec<usize>> {
+    let medium = |material: usize| {
+        let of = &scene.materials[material];
+        of.enclosed_medium().map(|medium| (of.layers.ior, of.layers.ior_spread(), medium))
+    };
+    let mut media = scene.meshes.iter().filter_map(|mesh| medium(mesh.material));
+    let first = media.next()?;
+    if media.all(|other| other == first) {
+        return None;
+    }
+    let by_material = shells(scene, |mesh, triangle| scene.meshes[mesh as usize].corners(triangle as usize));
+    let all: Vec<(usize, &Shell)> =
+        by_material.iter().flat_map(|(material, shells)| shells.iter().map(|shell| (*material, shell))).collect();
+    let overlap = |(one, a): (usize, &Shell), (other, b): (usize, &Shell)| {
+        a.meets(b) && medium(one) != medium(other) && (a.is_partly_in(b) || b.is_partly_in(a))
+    };
+    let is_any = (0..all.len()).any(|place| all[..place].iter().any(|other| overlap(*other, all[place])));
+    let least = |material: &usize| by_material[material].iter().map(Shell::volume).filter(|of| *of > 0.0).fold(f64::INFINITY, f64::min);
+    is_any.then(|| {
+        let mut order: Vec<usize> = by_material.keys().copied().collect();
+        order.sort_by(|a, b| least(b).total_cmp(&least(a)));
+        order
+    })
 }

@@ -460,6 +460,30 @@ fn a_liquid_that_fills_any_vessel_is_lit_as_one_that_is_sunk_into_it() {
 }
 
 /// A decal with gaps of alpha in a wall's plane is seen where it is, and the wall where it is not; light arrives at both.
+/// A block that stands out of the water in a closed white room: who comes to the water's face within the block has nothing to meet there,
+/// whether light goes up or down, so that no light is caught in its dry end.
+#[test]
+#[ignore = "long: kernels of solids in one another"]
+fn a_block_that_stands_out_of_water_catches_no_light() {
+    let Some(gpu) = device() else { return };
+    let walls = faces_inwards(cuboid("walls", DVec3::ZERO, DVec3::ONE, 0));
+    let ceiling = level(1.0, [1.0; 2], false, 3);
+    let ceiling = Mesh { positions: ceiling.positions.iter().map(|at| at + DVec3::new(0.5, 0.0, 0.5)).collect(), ..ceiling };
+    let water = cuboid("water", DVec3::ZERO, DVec3::new(1.0, 0.25, 1.0), 1);
+    let block = cuboid("block", DVec3::new(0.3, 0.05, 0.35), DVec3::new(0.7, 0.4, 0.65), 2);
+    let shining = Material { emission: Vec3::splat(0.5), ..matt(0.5) };
+    let scene = scene_of(vec![walls, ceiling, water, block], vec![matt(1.0), clear_solid(1.33), clear_solid(1.6), shining], vec![]);
+    let camera = Camera::looking_at("eye", DVec3::new(0.5, 0.9, 0.95), DVec3::new(0.5, 0.3, 0.5), DVec3::Y, 0.8);
+    let lit = seen(&gpu, &scene, &SceneSettings { samples: 16, rounds: 32, ..brief() }, &camera, [8, 8]);
+    let found: Vec<(f64, f64)> = (0..64).map(|pixel| red(&lit, pixel)).collect();
+    let mean = found.iter().map(|(mean, _)| mean).sum::<f64>() / 64.0;
+    println!("a block in water: {mean}, {found:?}");
+    assert!((mean - 1.0).abs() < 0.02, "{mean}");
+    for (mean, error) in found {
+        assert!((mean - 1.0).abs() < f64::max(0.05, 5.0 * error), "{mean} +- {error}");
+    }
+}
+
 #[test]
 fn a_decal_in_the_plane_of_a_wall_is_seen_where_its_alpha_is() {
     let Some(gpu) = device() else { return };

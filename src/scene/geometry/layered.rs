@@ -13,12 +13,14 @@ use crate::scene::{Material, Mesh, Scene, Texture};
 /// Most media: a path keeps their numbers in eight bits each.
 const MAX_MEDIA: usize = 255;
 
-/// A record for each material; an error says how many media there are, if these are too many.
-pub(super) fn records(scene: &Scene, unit: f64) -> Result<Vec<LayeredMaterial>, usize> {
+/// A record for each material; an error says how many media there are, if these are too many. They are numbered in an order of materials.
+pub(super) fn records(scene: &Scene, unit: f64, order: Option<&[usize]>) -> Result<Vec<LayeredMaterial>, usize> {
     let mut records: Vec<LayeredMaterial> = scene.materials.iter().zip(scene.lobe_kinds()).map(record).collect();
     // Solids of equal media share a number.
     let mut media: Vec<(f32, f32, Medium)> = Vec::new();
-    for (material, record) in scene.materials.iter().zip(&mut records) {
+    let order = order.map_or_else(|| (0..scene.materials.len()).collect(), <[usize]>::to_vec);
+    for place in order {
+        let (material, record) = (&scene.materials[place], &mut records[place]);
         if let Some(medium) = material.enclosed_medium() {
             let own = (material.layers.ior, material.layers.ior_spread(), medium);
             let known = media.iter().position(|of| *of == own).unwrap_or_else(|| {

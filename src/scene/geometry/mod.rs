@@ -78,6 +78,8 @@ pub struct Geometry {
     pub crowded: usize,
     /// Bits that a path keeps the number of a medium in, in a word for all solids that it is in.
     pub medium_bits: u32,
+    /// Solids of different media lie partly in one another: media are numbered by size, and the smallest solid counts.
+    pub has_media_by_size: bool,
     /// Pieces of textured lamps that have spots much smaller and brighter than they are.
     pub coarse_pieces: usize,
 }
@@ -214,7 +216,8 @@ impl Geometry {
             true => vec![TriangleColours { a: Vec3::ONE, b: Vec3::ONE, c: Vec3::ONE, alphas: Vec3::ONE }],
             false => order.par_iter().zip(&sources).map(colours_of).collect(),
         };
-        let mut layered_materials = layered::records(scene, unit)
+        let by_size = solids::by_size_if_overlapping(scene);
+        let mut layered_materials = layered::records(scene, unit, by_size.as_deref())
             .map_err(|count| refuse(scene, "the scene", format!("has solids of {count} different media; at most 255 can be told apart")))?;
         let layer_turns: Vec<_> = scene.materials.iter().map(|material| layered::turns(material, &scene.textures)).collect();
         let medium_bits = medium_bits(scene, &layered_materials, &offsets)?;
@@ -261,6 +264,7 @@ impl Geometry {
             overlaps: overlaps.into_iter().collect(),
             crowded,
             medium_bits,
+            has_media_by_size: by_size.is_some(),
             coarse_pieces: 0,
         };
         progress("collecting lights", 0.0);

@@ -1,16 +1,30 @@
 //! Which solids a path is inside of.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
 use super::geometry::{Geometry, Ray};
-use crate::scene::{Material, Surface};
+use crate::scene::{Material, Scene, Surface, solids};
 
 /// Towards what a point looks for the solids around it: no axis of a scene.
 const OUTWARDS: DVec3 = DVec3::new(0.290_380_3, 0.829_658_1, 0.476_861_2);
 
-/// The solids around a point, the one entered last at the end: it fills the place.
+/// The solids around a point, the one that fills the place at the end: the one entered last, or the smallest where solids lie partly in
+/// one another.
 #[derive(Clone, Default)]
-pub struct Media<'a>(Vec<&'a Material>);
+pub struct Media<'a> {
+    solids: Vec<&'a Material>,
+    by_size: Option<BySize<'a>>,
+}
+
+/// Materials of solids, the largest first.
+pub type BySize<'a> = Arc<[&'a Material]>;
+
+/// Those of a scene in which solids of different media lie partly in one another.
+pub fn by_size(scene: &Scene) -> Option<BySize<'_>> {
+    Some(solids::by_size_if_overlapping(scene)?.into_iter().map(|material| &scene.materials[material]).collect())
+}
 
 /// Whether a material encloses a medium.
 pub fn is_solid(material: &Material) -> bool {
@@ -39,22 +53,22 @@ fn is_dispersive(solid: &Material) -> bool {
 impl<'a> Media<'a> {
     /// Index of refraction.
     pub fn index(&self, channel: Option<usize>) -> f64 {
-        self.0.last().map_or(1.0, |solid| index_of(solid, channel))
+        self.solids.last().map_or(1.0, |solid| index_of(solid, channel))
     }
 
     /// Whether colours have different ones.
     pub fn is_dispersive(&self) -> bool {
-        self.0.last().is_some_and(|solid| is_dispersive(solid))
+        self.solids.last().is_some_and(|solid| is_dispersive(solid))
     }
 
     /// Share of light that is left after a way.
     pub fn transmittance(&self, metres: f64) -> DVec3 {
-        let medium = self.0.last().and_then(|solid| solid.layers.medium);
+        let medium = self.solids.last().and_then(|solid| solid.layers.medium);
         medium.map_or(DVec3::ONE, |medium| medium.transmittance.as_dvec3().map(|share| share.powf(metres / f64::from(medium.metres))))
     }
 
     fn place(&self, solid: &Material) -> Option<usize> {
-        self.0.iter().rposition(|known| std::ptr::eq(*known, solid))
+        self.solids.iter().rposition(|known| std::ptr::eq(*known, solid))
     }
 
     /// On the side from which a solid's surface is seen: whoever sees its back is inside.
@@ -71,17 +85,21 @@ impl<'a> Media<'a> {
         if is_front {
             media.enter(solid);
         } else if let Some(place) = media.place(solid) {
-            media.0.remove(place);
+            media.solids.remove(place);
         }
         media
     }
 
     fn enter(&mut self, solid: &'a Material) {
-        self.0.push(solid);
+        let place = self.by_size.as_ref().and_then(|order| {
+            let size = |of: &Material| order.iter().position(|known| std::ptr::eq(*known, of));
+            self.solids.iter().position(|known| size(known) > size(solid))
+        });
+        self.solids.insert(place.unwrap_or(self.solids.len()), solid);
     }
 
     /// Around a point: the solids that a ray from there leaves without having entered them.
-    pub fn around(geometry: &Geometry<'a>, position: DVec3) -> Media<'a> {
+    pub fn around(geometry: &Geometry<'a>, by_size: Option<BySize<'a>>, position: DVec3) -> Media<'a> {
         let (mut entered, mut left) = (Media::default(), Vec::new());
         let mut ray = Ray { origin: position, direction: OUTWARDS.normalize() };
         while let Some(hit) = geometry.closest_hit(&ray, f64::INFINITY) {
@@ -98,6 +116,8 @@ impl<'a> Media<'a> {
         }
         // The one left first is the innermost.
         left.reverse();
-        Media(left)
+        let mut media = Media { solids: Vec::new(), by_size };
+        left.into_iter().for_each(|solid| media.enter(solid));
+        media
     }
 }

@@ -37,7 +37,7 @@ pub use first_surface::{FirstSurface, first_surfaces};
 use geometry::Geometry;
 use light::Emitters;
 pub use material::fresnel;
-use media::is_solid;
+use media::{BySize, is_solid};
 pub use verdict::Verdict;
 
 /// Radiance (W/m2/sr) or irradiance (W/m2) by [`Part`], linear RGB. Irradiance has no specular part.
@@ -80,6 +80,7 @@ pub struct Judge<'a> {
     emitters: Emitters<'a>,
     /// Some material encloses a medium.
     has_solids: bool,
+    by_size: Option<BySize<'a>>,
     max_bounces: u32,
 }
 
@@ -116,7 +117,8 @@ impl<'a> Judge<'a> {
         let geometry = Geometry::new(scene);
         let emitters = Emitters::new(scene, &geometry);
         let has_solids = scene.materials.iter().any(is_solid);
-        Judge { geometry, emitters, has_solids, max_bounces }
+        let by_size = media::by_size(scene);
+        Judge { geometry, emitters, has_solids, by_size, max_bounces }
     }
 
     /// A picture. Samples are spread evenly over each pixel's square.

@@ -97,7 +97,7 @@ impl<'a> Judge<'a> {
     }
 
     fn start(&self, position: DVec3, last: Scattering, matt_count: u32) -> Prefix<'a> {
-        let media = if self.has_solids { Media::around(&self.geometry, position) } else { Media::default() };
+        let media = if self.has_solids { Media::around(&self.geometry, self.by_size.clone(), position) } else { Media::default() };
         Prefix { beta: DVec3::ONE, saw_sharp: false, is_caustic: false, matt_count, was_spread: matt_count > 0, last, media, channel: None }
     }
 
