@@ -200,29 +200,63 @@ pub fn most_nested(scene: &Scene, few: usize, corners_of: impl Fn(u32, u32) -> [
     most
 }
 
-/// Materials of solids from the largest to the smallest, each by its smallest, if solids of different media lie partly in one another
-/// anywhere, as far as places just inside of their shells tell: neither holds the other, and who is in both may have entered either last.
-pub fn by_size_if_overlapping(scene: &Scene) -> Option<Vec<usize>> {
+/// Which of the solids that a place is in counts there.
+pub enum Order {
+    /// The one entered last: each holds the other or lies outside of it, or their media are the same.
+    Entry,
+    /// Solids lie partly in one another, and who is in both may have entered either last: the smaller one counts. Materials, the largest
+    /// first, each as large as the smallest solid of its medium.
+    Size(Vec<usize>),
+    /// By size it would be wrong in this mesh: smaller solids of the medium around it lie elsewhere.
+    Unclear(u32),
+}
+
+/// As far as places just inside of their shells tell.
+pub fn order(scene: &Scene) -> Order {
     let medium = |material: usize| {
         let of = &scene.materials[material];
         of.enclosed_medium().map(|medium| (of.layers.ior, of.layers.ior_spread(), medium))
     };
     let mut media = scene.meshes.iter().filter_map(|mesh| medium(mesh.material));
-    let first = media.next()?;
+    let Some(first) = media.next() else { return Order::Entry };
     if media.all(|other| other == first) {
-        return None;
+        return Order::Entry;
     }
     let by_material = shells(scene, |mesh, triangle| scene.meshes[mesh as usize].corners(triangle as usize));
-    let all: Vec<(usize, &Shell)> =
+    let mut shells: Vec<(usize, &Shell)> =
         by_material.iter().flat_map(|(material, shells)| shells.iter().map(|shell| (*material, shell))).collect();
-    let overlap = |(one, a): (usize, &Shell), (other, b): (usize, &Shell)| {
-        a.meets(b) && medium(one) != medium(other) && (a.is_partly_in(b) || b.is_partly_in(a))
+    shells.sort_by(|a, b| a.1.min.x.total_cmp(&b.1.min.x));
+    let are_alike = |a: usize, b: usize| medium(a) == medium(b);
+    let mut partly: BTreeSet<(usize, usize)> = BTreeSet::new();
+    let mut near: Vec<(usize, usize)> = Vec::new();
+    for (place, (one, a)) in shells.iter().enumerate() {
+        let after = shells.iter().enumerate().skip(place + 1).take_while(|(_, (_, b))| b.min.x <= a.max.x);
+        for (other_place, (_, b)) in after.filter(|(_, (other, b))| a.meets(b) && !are_alike(*one, *other)) {
+            near.extend([(place, other_place), (other_place, place)]);
+            if a.is_partly_in(b) || b.is_partly_in(a) {
+                partly.extend([(place, other_place), (other_place, place)]);
+            }
+        }
+    }
+    if partly.is_empty() {
+        return Order::Entry;
+    }
+    let least = |material: &usize| {
+        let of_medium = by_material.iter().filter(|(other, _)| are_alike(**other, *material)).flat_map(|(_, shells)| shells);
+        of_medium.map(Shell::volume).filter(|volume| *volume > 0.0).fold(f64::INFINITY, f64::min)
     };
-    let is_any = (0..all.len()).any(|place| all[..place].iter().any(|other| overlap(*other, all[place])));
-    let least = |material: &usize| by_material[material].iter().map(Shell::volume).filter(|of| *of > 0.0).fold(f64::INFINITY, f64::min);
-    is_any.then(|| {
-        let mut order: Vec<usize> = by_material.keys().copied().collect();
-        order.sort_by(|a, b| least(b).total_cmp(&least(a)));
-        order
-    })
+    let mut order: Vec<(f64, usize)> = by_material.keys().map(|material| (least(material), *material)).collect();
+    order.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let size = |material: usize| order.iter().find(|(_, known)| *known == material).map_or(0.0, |(size, _)| *size);
+    // What lies wholly in another, around whose own place no hollow of that is, must count there.
+    let is_hidden = |&(place, around): &(usize, usize)| {
+        let ((own, shell), (other, _)) = (shells[place], shells[around]);
+        let (_, inside) = shell.places_inside(1).next().expect("a shell has a triangle");
+        let times_around = || by_material[&other].iter().map(|shell| shell.winding(inside)).sum::<i32>();
+        shell.volume() > 0.0 && size(other) < size(own) && !partly.contains(&(place, around)) && times_around() > 0
+    };
+    match near.iter().find(|pair| is_hidden(pair)) {
+        Some((place, _)) => Order::Unclear(shells[*place].1.triangles[0].0),
+        None => Order::Size(order.into_iter().map(|(_, material)| material).collect()),
+    }
 }

@@ -460,6 +460,32 @@ fn a_liquid_that_fills_any_vessel_is_lit_as_one_that_is_sunk_into_it() {
 }
 
 /// A decal with gaps of alpha in a wall's plane is seen where it is, and the wall where it is not; light arrives at both.
+/// A tank full of water around smaller things of the tank's glass: by size the water would not count within the tank.
+#[test]
+fn a_solid_that_would_be_hidden_by_size_is_named() {
+    let block = |name: &str, half: f64, height: f64| {
+        cuboid(name, DVec3::new(-half, height - half, -half), DVec3::new(half, height + half, half), usize::from(name == "water"))
+    };
+    let order_of = |meshes: Vec<Mesh>| {
+        let scene = scene_of(meshes, vec![clear_solid(1.5), clear_solid(1.33)], vec![point(DVec3::Y * 9.0)]);
+        let geometry = Geometry::new(&scene).unwrap();
+        let named = geometry.hidden_solid.map(|mesh| scene.meshes[mesh as usize].name.clone());
+        assert_eq!(named.is_some(), geometry.warnings(&scene).iter().any(|line| line.contains("partly in one another")), "{named:?}");
+        (geometry.has_media_by_size, named)
+    };
+    let (tank, water, inside, across) =
+        (block("tank", 2.0, 0.0), block("water", 1.0, 0.0), block("ball", 0.2, 0.0), block("stick", 0.2, 1.0));
+    for (what, meshes, expected) in [
+        ("nested", vec![tank.clone(), water.clone(), inside.clone()], (false, None)),
+        ("standing out", vec![water.clone(), inside, across.clone()], (true, None)),
+        ("flush", vec![water.clone(), block("stick", 0.2, 0.8)], (false, None)),
+        ("on top", vec![water.clone(), block("stick", 0.2, 1.2)], (false, None)),
+        ("hidden", vec![tank, water, across], (false, Some("water".to_owned()))),
+    ] {
+        assert_eq!(order_of(meshes), expected, "{what}");
+    }
+}
+
 /// A block that stands out of the water in a closed white room: who comes to the water's face within the block has nothing to meet there,
 /// whether light goes up or down, so that no light is caught in its dry end.
 #[test]

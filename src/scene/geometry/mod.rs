@@ -80,6 +80,8 @@ pub struct Geometry {
     pub medium_bits: u32,
     /// Solids of different media lie partly in one another: media are numbered by size, and the smallest solid counts.
     pub has_media_by_size: bool,
+    /// Some do, and by size this mesh would not count where it lies within another.
+    pub hidden_solid: Option<u32>,
     /// Pieces of textured lamps that have spots much smaller and brighter than they are.
     pub coarse_pieces: usize,
 }
@@ -216,7 +218,11 @@ impl Geometry {
             true => vec![TriangleColours { a: Vec3::ONE, b: Vec3::ONE, c: Vec3::ONE, alphas: Vec3::ONE }],
             false => order.par_iter().zip(&sources).map(colours_of).collect(),
         };
-        let by_size = solids::by_size_if_overlapping(scene);
+        let (by_size, hidden_solid) = match solids::order(scene) {
+            solids::Order::Entry => (None, None),
+            solids::Order::Size(order) => (Some(order), None),
+            solids::Order::Unclear(mesh) => (None, Some(mesh)),
+        };
         let mut layered_materials = layered::records(scene, unit, by_size.as_deref())
             .map_err(|count| refuse(scene, "the scene", format!("has solids of {count} different media; at most 255 can be told apart")))?;
         let layer_turns: Vec<_> = scene.materials.iter().map(|material| layered::turns(material, &scene.textures)).collect();
@@ -265,6 +271,7 @@ impl Geometry {
             crowded,
             medium_bits,
             has_media_by_size: by_size.is_some(),
+            hidden_solid,
             coarse_pieces: 0,
         };
         progress("collecting lights", 0.0);
@@ -334,6 +341,13 @@ impl Geometry {
         if self.left_out > 0 {
             let count = counted(self.left_out, "triangle");
             lines.push(format!("{count} without area in single precision, or on others, left out"));
+        }
+        if let Some(mesh) = self.hidden_solid {
+            lines.push(format!(
+                "solids lie partly in one another, and light that gets in there may not get out: give the solid around mesh {} another index \
+                 of refraction than smaller ones that stand out of others, by a thousandth",
+                name(mesh)
+            ));
         }
         let (rounded, most) = self.rounded_meshes(scene);
         if !rounded.is_empty() {

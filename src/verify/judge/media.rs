@@ -5,7 +5,8 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::geometry::{Geometry, Ray};
-use crate::scene::{Material, Scene, Surface, solids};
+use crate::scene::solids::{self, Order};
+use crate::scene::{Material, Scene, Surface};
 
 /// Towards what a point looks for the solids around it: no axis of a scene.
 const OUTWARDS: DVec3 = DVec3::new(0.290_380_3, 0.829_658_1, 0.476_861_2);
@@ -23,7 +24,10 @@ pub type BySize<'a> = Arc<[&'a Material]>;
 
 /// Those of a scene in which solids of different media lie partly in one another.
 pub fn by_size(scene: &Scene) -> Option<BySize<'_>> {
-    Some(solids::by_size_if_overlapping(scene)?.into_iter().map(|material| &scene.materials[material]).collect())
+    match solids::order(scene) {
+        Order::Size(order) => Some(order.into_iter().map(|material| &scene.materials[material]).collect()),
+        Order::Entry | Order::Unclear(_) => None,
+    }
 }
 
 /// Whether a material encloses a medium.
