@@ -92,10 +92,12 @@ pub fn nested_slabs(gpu: &Gpu) -> Check<Complaint> {
     slab_check(gpu, two_media(), [slab(9.0, -1.0, 0.0, 0), slab(8.0, -0.7, -0.3, 1)].concat(), 0.0, [left; 2])
 }
 
-/// Where solids lie partly in one another, the smaller one counts, the dark one here, whether one comes from above or from below.
+/// Where solids lie partly in one another, the smaller one counts, whichever light enters last: from above that is the dark one.
 pub fn overlapping_slabs(gpu: &Gpu) -> Check<Complaint> {
     let left = |pale: f64, dark: f64| 0.5f64.powf(pale) * 0.1f64.powf(dark);
-    slab_check(gpu, two_media(), [slab(9.0, -1.0, 0.0, 0), slab(8.0, -1.5, -0.5, 1)].concat(), 0.0, [left(0.5, 1.0); 2])
+    let overlapping = |pale: f64, dark: f64| [slab(pale, -1.0, 0.0, 0), slab(dark, -1.5, -0.5, 1)].concat();
+    slab_check(gpu, two_media(), overlapping(9.0, 8.0), 0.0, [left(0.5, 1.0); 2])?;
+    slab_check(gpu, two_media(), overlapping(8.0, 9.0), 0.0, [left(1.0, 0.5); 2])
 }
 
 /// Under a sky of 1, radiance in clear glass is the square of its index wherever one looks: refraction compresses it.
