@@ -214,7 +214,7 @@ struct Fault {
 }
 
 #[rustfmt::skip]
-const FAULTS: [Fault; 142] = [
+const FAULTS: [Fault; 143] = [
     // The first of their subjects, which the short run plants, are kept here: their questions share most of their kernels with others.
     Fault { what: "8-bit codes of textures are taken for linear values",
         file: "material/textures.glsl", from: "return uintBitsToFloat(texels[code & 255]);", to: "return float(code & 255) * (1.0 / 255.0);",
@@ -624,6 +624,9 @@ const FAULTS: [Fault; 142] = [
     Fault { what: "who leaves a solid leaves the one entered last",
         file: "material/media.glsl", from: "if (((media >> place) & MEDIUM_MASK) == medium) {", to: "if (((media >> place) & MEDIUM_MASK) != 0) {",
         kernels: &["view"], noticed_by: &[(OverlappingSlabs, TooBright)] },
+    Fault { what: "of solids partly in one another the one entered last counts",
+        file: "material/media.glsl", from: "if (HAS_MEDIA_BY_SIZE) {", to: "if (false) {",
+        kernels: &["view"], noticed_by: &[(OverlappingSlabs, TooDark)] },
     Fault { what: "mirrored normal maps are not mirrored",
         file: "material/surface.glsl",
         from: "at.is_turned ? cross(tangent, normal) : cross(normal, tangent),",
@@ -693,7 +696,7 @@ const FAULTS: [Fault; 142] = [
         file: "world/scene/direct.glsl", from: "left = t_max == 1.0 ? transmittance(media, norm(way)) : left;", to: "",
         kernels: &["receive"], noticed_by: &[(LampInAMedium, TooBright)] },
     Fault { what: "of the solids around a point the outermost counts",
-        file: "material/media.glsl", from: "media |= medium << count;", to: "media = (media << MEDIUM_BITS) | medium;",
+        file: "material/media.glsl", from: ": media | medium << count;", to: ": (media << MEDIUM_BITS) | medium;",
         kernels: &["receive"], noticed_by: &[(LampInAMedium, TooBright)] },
     Fault { what: "shadow rays through sheets end beyond their lamp",
         file: "world/scene/direct.glsl", from: "way = start + way - next;", to: "",
