@@ -5,8 +5,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// What all tests together may ask for, on Mesa's lavapipe: a fifth to a half more than they did in November 2026 on two threads; more
-/// threads make more pipelines, each its own. A thousand pipelines are some ten minutes of compiling on one core.
+/// What all tests together may ask for, on Mesa's lavapipe: a seventh to a half more than they did in November 2026. A thousand
+/// pipelines are some ten minutes of compiling on one core.
 const BUDGET: [(&str, u64); 5] =
     [("pipelines", 2_600), ("dispatches", 750_000), ("invocations", 550_000_000), ("paths", 2_000_000), ("programs", 800)];
 

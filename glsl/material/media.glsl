@@ -1,12 +1,13 @@
-// What a path runs through: a stack of media, the one that counts lowest; 0: none. It is the one entered last, or that of the smallest solid.
+// What a path runs through: a stack of media, in its lowest bits the one that fills the place; 0: none. That is the medium entered last,
+// or that of the smallest solid.
 // A scene in which more of them lie in one another than there is room for is refused (src/scene/geometry/mod.rs).
 
 // Of one medium: eight, or fewer where many solids lie in one another.
 layout(constant_id = 75) const uint MEDIUM_BITS = 8;
 const uint MEDIUM_MASK = (1u << MEDIUM_BITS) - 1u;
 
-// Where solids lie partly in one another, the medium must not depend on the way there: what light gets in by is what it gets out by.
-// Then media are numbered by size, and the highest number counts.
+// Some solids lie partly in one another (src/scene/solids.rs). Then media are numbered by size, and the highest number fills the place,
+// whatever the path entered last: else light that comes in along a path could not go back along it.
 layout(constant_id = 76) const bool HAS_MEDIA_BY_SIZE = false;
 
 uint medium_added(uint media, uint medium)

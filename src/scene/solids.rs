@@ -1,4 +1,4 @@
-//! Solids that light enters, as closed shells of triangles: which way they face, and how many lie in one another.
+//! Solids that light enters, as closed shells of triangles: which way they face, how many lie in one another, and which of these counts.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -207,7 +207,7 @@ pub enum Order {
     /// Solids lie partly in one another, and who is in both may have entered either last: the smaller one counts. Materials, the largest
     /// first, each as large as the smallest solid of its medium.
     Size(Vec<usize>),
-    /// By size it would be wrong in this mesh: smaller solids of the medium around it lie elsewhere.
+    /// They do, but size would hide this mesh in the solid around it, as smaller solids of that medium lie elsewhere.
     Unclear(u32),
 }
 
@@ -248,7 +248,7 @@ pub fn order(scene: &Scene) -> Order {
     let mut order: Vec<(f64, usize)> = by_material.keys().map(|material| (least(material), *material)).collect();
     order.sort_by(|a, b| b.0.total_cmp(&a.0));
     let size = |material: usize| order.iter().find(|(_, known)| *known == material).map_or(0.0, |(size, _)| *size);
-    // What lies wholly in another, around whose own place no hollow of that is, must count there.
+    // What lies wholly in another solid, and not in a hollow of it, must count there.
     let is_hidden = |&(place, around): &(usize, usize)| {
         let ((own, shell), (other, _)) = (shells[place], shells[around]);
         let (_, inside) = shell.places_inside(1).next().expect("a shell has a triangle");

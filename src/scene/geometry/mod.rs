@@ -344,8 +344,8 @@ impl Geometry {
         }
         if let Some(mesh) = self.hidden_solid {
             lines.push(format!(
-                "solids lie partly in one another, and light that gets in there may not get out: give the solid around mesh {} another index \
-                 of refraction than smaller ones that stand out of others, by a thousandth",
+                "solids lie partly in one another, and light may be lost there: what is around mesh {} shares its material with smaller solids; \
+                 give these a material of their own whose index of refraction differs by 0.001",
                 name(mesh)
             ));
         }
