@@ -496,10 +496,10 @@ fn a_block_that_stands_out_of_water_catches_no_light() {
     let ceiling = level(1.0, [1.0; 2], false, 3);
     let ceiling = Mesh { positions: ceiling.positions.iter().map(|at| at + DVec3::new(0.5, 0.0, 0.5)).collect(), ..ceiling };
     let water = cuboid("water", DVec3::ZERO, DVec3::new(1.0, 0.25, 1.0), 1);
-    let block = cuboid("block", DVec3::new(0.3, 0.05, 0.35), DVec3::new(0.7, 0.4, 0.65), 2);
+    let block = cuboid("block", DVec3::new(0.15, 0.025, 0.15), DVec3::new(0.45, 0.4, 0.45), 2);
     let shining = Material { emission: Vec3::splat(0.5), ..matt(0.5) };
     let scene = scene_of(vec![walls, ceiling, water, block], vec![matt(1.0), clear_solid(1.33), clear_solid(1.6), shining], vec![]);
-    let camera = Camera::looking_at("eye", DVec3::new(0.5, 0.9, 0.95), DVec3::new(0.5, 0.3, 0.5), DVec3::Y, 0.8);
+    let camera = Camera::looking_at("eye", DVec3::new(0.9, 0.85, 0.9), DVec3::splat(0.3), DVec3::Y, 1.22);
     let lit = seen(&gpu, &scene, &SceneSettings { samples: 16, rounds: 32, ..brief() }, &camera, [8, 8]);
     let found: Vec<(f64, f64)> = (0..64).map(|pixel| red(&lit, pixel)).collect();
     let mean = found.iter().map(|(mean, _)| mean).sum::<f64>() / 64.0;
