@@ -295,7 +295,7 @@ fn radiosity_to_one_per_cent_by_every_builder_and_law() {
     the_film_is_radiositys(1 << 18, 0.01, true);
     let Some(gpu) = device() else { return };
     for way in WAYS {
-        the_box_of_triangles_is_radiositys(&gpu, way, 100_000, 0.01);
+        the_box_of_triangles_is_radiositys(&gpu, way, 200_000, 0.01);
     }
 }
 
