@@ -276,5 +276,6 @@ fn settings_in_a_file_are_used_by_shards() {
 #[ignore = "half a minute on a software device"]
 fn tiles_are_kept_in_a_file() {
     let Some(gpu) = device() else { return };
-    settings_are_kept(24, if gpu.facts().kind == "cpu" { ["15%", "14%"] } else { ["3%", "2%"] }, true, true);
+    let (size, errors) = if gpu.facts().kind == "cpu" { (24, ["15%", "14%"]) } else { (64, ["6%", "5%"]) };
+    settings_are_kept(size, errors, true, true);
 }

@@ -213,10 +213,10 @@ fn study_the_open_box(end: &str) -> Option<(Study, String)> {
 }
 
 /// A picture's study, checked, with its page; interrupted where it says a word that ends so.
-fn study_a_picture(scene: &str, rounds: u32, end: &str) -> Option<(Study, String)> {
+fn study_a_picture(scene: &str, end: &str) -> Option<(Study, String)> {
     let gpu = device()?;
     let folder = Place::new();
-    let request = || request(scene, rounds);
+    let request = || request(scene, 4);
     let mut study = run(&gpu, folder.path(), request(), end).unwrap();
     let subject = subject(&gpu, &request());
     if study.parts[0].strip.is_none() {
@@ -245,7 +245,7 @@ fn study_a_picture(scene: &str, rounds: u32, end: &str) -> Option<(Study, String
 #[test]
 #[ignore = "long: a study of each kind, where the short run has the open box"]
 fn a_picture_is_studied_against_path_tracing() {
-    let Some((study, page)) = study_a_picture("cornell", 4, ": photons per round") else { return };
+    let Some((study, page)) = study_a_picture("cornell", ": photons per round") else { return };
     let [builder, photons] = &study.parts[0].comparisons[..] else { panic!("{:?}", study.parts[0].comparisons) };
     assert!(builder.curves.iter().all(|curve| !curve.points.is_empty()) && photons.curves.iter().all(|curve| curve.points.is_empty()));
     assert!(!study.complete && page.contains("Incomplete"));
@@ -254,8 +254,8 @@ fn a_picture_is_studied_against_path_tracing() {
 #[test]
 #[ignore = "long: every choice in two scenes, minutes of compiling"]
 fn whole_pictures_are_studied_against_path_tracing() {
-    for (scene, rounds) in [("cornell", 4), ("cornell-spheres", 2)] {
-        let Some((study, _)) = study_a_picture(scene, rounds, NEVER) else { return };
+    for scene in ["cornell", "cornell-spheres"] {
+        let Some((study, _)) = study_a_picture(scene, NEVER) else { return };
         let sentences = study.parts[0].sentences().join("\n");
         assert!(study.complete && sentences.contains("the bounce limit ends"), "{sentences}");
         assert!(scene != "cornell" || sentences.contains("with a bias of"), "{sentences}");
