@@ -114,6 +114,14 @@ impl SavedRun {
         matches!(&self.film, SavedFilm::Scene(film) if film.parts.is_some())
     }
 
+    /// Whether it holds as much as a run with these fates, sums of its film, and values kept of a block.
+    pub fn has_lengths(&self, fates: &[Fates], sums: usize, kept: usize) -> bool {
+        let bounces = |fates: &Fates| fates.bounces.len();
+        self.fates.iter().map(bounces).eq(fates.iter().map(bounces))
+            && self.film.blocks().sums.len() == sums
+            && self.film.latest().iter().all(|block| block.values.len() == kept)
+    }
+
     /// Photons of its blocks, of all maps.
     pub fn emitted(&self) -> u64 {
         self.fates.iter().map(|fates| fates.emitted).sum()

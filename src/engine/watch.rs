@@ -111,6 +111,13 @@ impl Keep<'_> {
         }
         Ok(Some(identity))
     }
+
+    /// Fails where the file that the run is to go on with holds other values than its own identity asks for.
+    pub fn check_resumed(&self, holds: impl FnOnce(&SavedRun) -> bool) -> Result<()> {
+        let Some((path, saved)) = &self.resume else { return Ok(()) };
+        let allowed = "contradicts itself: its settings ask for other values than it holds; begin anew without it";
+        require(holds(saved), "--resume", path.display(), allowed)
+    }
 }
 
 /// Lets a run go on to its end.

@@ -6,10 +6,12 @@ use std::time::Duration;
 use crate::common::prelude::*;
 use photonmill::engine::End;
 use photonmill::engine::blocks::Share;
+use photonmill::engine::film::{KeptBlock, LatestBlocks};
 use photonmill::engine::room;
 use photonmill::engine::saved::{SavedFilm, SavedRun};
 use photonmill::engine::scene::{self, RunResult, View, trial};
 use photonmill::engine::watch::{Keep, SaveRun};
+use photonmill::error::Result;
 use photonmill::settings::stop::Stop;
 
 /// Keeps the latest of what is saved.
@@ -17,7 +19,7 @@ use photonmill::settings::stop::Stop;
 struct Latest(Option<SavedRun>);
 
 impl SaveRun for Latest {
-    fn save(&mut self, run: &std::sync::Arc<SavedRun>, _: bool) -> Result<(), Error> {
+    fn save(&mut self, run: &std::sync::Arc<SavedRun>, _: bool) -> Result<()> {
         self.0 = Some(SavedRun::clone(run));
         Ok(())
     }
@@ -43,6 +45,11 @@ fn kept(gpu: &Gpu, settings: &SceneSettings, part: Part) -> (RunResult, SavedRun
 
 /// The same where not a block may be done.
 fn lit(gpu: &Gpu, settings: &SceneSettings, part: Part) -> (RunResult, Option<SavedRun>) {
+    let (lit, saved) = try_lit(gpu, settings, part);
+    (lit.unwrap(), saved)
+}
+
+fn try_lit(gpu: &Gpu, settings: &SceneSettings, part: Part) -> (Result<RunResult>, Option<SavedRun>) {
     let scene = scene(SCENE);
     let geometry = Geometry::new(&scene).unwrap();
     let view = View { geometry: &geometry, camera: Some(&scene.first_camera()), phases: &[] };
@@ -55,7 +62,7 @@ fn lit(gpu: &Gpu, settings: &SceneSettings, part: Part) -> (RunResult, Option<Sa
     };
     let resume = part.resume.map(|run| (PathBuf::from("a file"), run));
     let keep = Keep { scene: SCENE, share: part.share, resume, every: Duration::ZERO, save: Some(&mut latest), dealt: None };
-    let lit = scene::light(gpu, &view, plan, &mut Control { cancelled: &cancelled, progress: &mut watch, keep }).unwrap();
+    let lit = scene::light(gpu, &view, plan, &mut Control { cancelled: &cancelled, progress: &mut watch, keep });
     (lit, latest.0)
 }
 
@@ -127,26 +134,85 @@ fn shared(settings: SceneSettings) -> SceneSettings {
     SceneSettings { with, aim: false, ..settings }
 }
 
+/// What a file may hold that is in order by itself, and that no run of its settings has saved.
+fn forged(saved: &SavedRun) -> Vec<(&'static str, SavedRun)> {
+    let with = |forge: &dyn Fn(&mut SavedRun)| {
+        let mut forged = saved.clone();
+        forge(&mut forged);
+        SavedRun::from_bytes(&forged.to_bytes()).expect("it is in order by itself")
+    };
+    vec![
+        ("no fates", with(&|saved| saved.fates.clear())),
+        ("fates of fewer bounces", with(&|saved| saved.fates[0].bounces.truncate(1))),
+        ("fates of more maps", with(&|saved| saved.fates.push(saved.fates[0].clone()))),
+        (
+            "kept blocks of fewer values",
+            with(&|saved| match &mut saved.film {
+                SavedFilm::Room(film) => film.latest = shorter(&film.latest),
+                SavedFilm::Scene(film) => film.latest = shorter(&film.latest),
+            }),
+        ),
+        (
+            "another film",
+            with(&|saved| match &mut saved.film {
+                SavedFilm::Room(film) => {
+                    film.of_blocks.sums.truncate(film.channel_count as usize);
+                    film.of_blocks.squares.truncate(film.channel_count as usize);
+                }
+                SavedFilm::Scene(film) => film.part_totals.truncate(1),
+            }),
+        ),
+    ]
+}
+
+fn shorter(latest: &LatestBlocks) -> LatestBlocks {
+    let mut shorter = LatestBlocks::default();
+    for block in latest.iter() {
+        shorter.push(KeptBlock { values: block.values[1..].to_vec(), ..block.clone() });
+    }
+    shorter
+}
+
+#[track_caller]
+fn assert_refused<T>(what: &str, ran: Result<T>) {
+    let Err(error) = ran else { panic!("a run went on with {what}") };
+    let line = error.to_string();
+    assert!(line.starts_with("--resume a file: contradicts itself") && !line.contains('\n'), "{what}: {line}");
+}
+
+#[test]
+fn a_run_goes_on_with_nothing_that_its_settings_do_not_ask_for() {
+    let Some(gpu) = device() else { return };
+    let (_, saved) = kept(&gpu, &small(1, 4), Part::default());
+    for (what, run) in forged(&saved) {
+        assert_refused(what, try_lit(&gpu, &small(1, 8), Part { resume: Some(run), ..Part::default() }).0);
+    }
+}
+
 #[test]
 fn parts_of_the_box_come_to_the_bits_of_one() {
     let gpu = device();
     let settings =
         RoomSettings { photons: 501, rounds: 9, mesh: 8, rng: Rng::Philox, shininess: [Some(2.0); 5], ..RoomSettings::default() };
-    let run = |gpu: Option<&Gpu>, rounds, share, resume| {
+    let try_run = |gpu: Option<&Gpu>, rounds, share, resume| -> Result<SavedRun> {
         let (never, mut latest) = (AtomicBool::new(false), Latest::default());
         let resume = Option::map(resume, |run| (PathBuf::from("a file"), run));
         let keep = Keep { scene: "open-box", share, resume, every: Duration::ZERO, save: Some(&mut latest), dealt: None };
         let mut control = Control { cancelled: &never, progress: &mut |_| {}, keep };
         let settings = RoomSettings { rounds, ..settings.clone() };
-        room::run(gpu, &open_box(&settings), &settings, &mut control).unwrap();
-        latest.0.unwrap()
+        room::run(gpu, &open_box(&settings), &settings, &mut control)?;
+        Ok(latest.0.unwrap())
     };
+    let run = |gpu, rounds, share, resume| try_run(gpu, rounds, share, resume).unwrap();
     for gpu in [None, gpu.as_deref()] {
         let whole = run(gpu, 9, Share::default(), None);
         let mut merged = run(gpu, 9, Share { number: 2, of: 3 }, None);
         (0..2).for_each(|number| merged.merge(&run(gpu, 9, Share { number, of: 3 }, None)).unwrap());
         assert!(merged == whole && merged.to_bytes() == whole.to_bytes());
         let half = SavedRun::from_bytes(&run(gpu, 4, Share::default(), None).to_bytes()).unwrap();
+        for (what, run) in forged(&half) {
+            assert_refused(what, try_run(gpu, 9, Share::default(), Some(run)));
+        }
         assert!(run(gpu, 9, Share::default(), Some(half)) == whole);
     }
 }

@@ -24,11 +24,13 @@ use crate::engine::error_bound::FilmError;
 use crate::engine::identity::{Hash, Identity};
 use crate::engine::room::film::{RoomFilm, irradiance_weights};
 use crate::engine::run::{self, Task};
+use crate::engine::saved::SavedFilm;
 use crate::engine::watch::Keep;
 use crate::error::{Result, require};
 use crate::gpu::{DeviceFacts, Gpu};
 use crate::ledger::{Fates, Losses};
 use crate::plan::RoomPlan;
+use crate::plan::latest_blocks::kept_count;
 use crate::scene::room::RoomScene;
 use crate::settings::{Builder, RoomSettings, Sums};
 
@@ -59,8 +61,12 @@ fn task<'a>(plan: &RoomPlan, device: Option<(&'a Gpu, usize)>, identity: Option<
         parts_per_round: plan.chunks_per_round,
         photons_per_part: plan.path_capacity.into(),
         counts_photons: true,
-        fates: vec![Fates::new(plan.settings.bounces)],
+        fates: fates(plan),
     }
+}
+
+fn fates(plan: &RoomPlan) -> Vec<Fates> {
+    vec![Fates::new(plan.settings.bounces)]
 }
 
 /// What a run of the box computes, where it is kept.
@@ -75,6 +81,11 @@ fn identity(keep: &mut Keep, scene: &RoomScene, plan: &RoomPlan, device: Option<
     let is_kept = identity.is_some() || keep.share.of > 1;
     let allowed = "must be integer with --checkpoint, --resume and --shard, whose sums are the same to the bit in any order";
     require(!is_kept || settings.sums == Sums::Integer, "--sums", format!("{:?}", settings.sums).to_lowercase(), allowed)?;
+    let (places, channels) = (plan.points.len(), plan.channel_count);
+    keep.check_resumed(|saved| {
+        matches!(&saved.film, SavedFilm::Room(film) if film.channel_count == channels)
+            && saved.has_lengths(&fates(plan), places * channels as usize, kept_count(places))
+    })?;
     Ok(identity)
 }
 

@@ -19,7 +19,7 @@ use crate::engine::error_bound::FilmError;
 use crate::engine::film::{BlockSums, KeptBlock, LatestBlocks, halves, wide};
 use crate::engine::nonfinite_values::NonfiniteValues;
 use crate::engine::run::{self, RunState, Task, World};
-use crate::engine::saved::SavedFilm;
+use crate::engine::saved::{SavedFilm, SavedRun};
 use crate::engine::watch::Later;
 use crate::engine::{Control, tallies, totals};
 use crate::error::Result;
@@ -28,7 +28,7 @@ use crate::gpu::{Commands, Constants, DeviceFacts, Gpu, Interrupt, Kernel, Modul
 use crate::ledger::{Fates, Losses};
 use crate::plan::buffers::{ANOMALY_WORDS, PART_VALUES};
 use crate::plan::differences::difference_count;
-use crate::plan::film::BiasPlan;
+use crate::plan::film::{BiasPlan, FilmPlan};
 use crate::plan::latest_blocks::kept_count;
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
@@ -124,6 +124,7 @@ pub fn light_from(gpu: &Gpu, view: &View, plan: ScenePlan, map: Option<&MapFile>
     commands.submit()?;
     let identity = control.keep.identity(|name| identity(name, view, &plan, map.map(|map| map.hash.as_str()), gpu.facts()))?;
     let task = Task { identity, ..task(&plan, (gpu, pipelines_before)) };
+    control.keep.check_resumed(|saved| can_go_on(saved, &plan, &task))?;
     let none = || [Fates::of_scene(plan.settings.bounces), Fates::of_scene(plan.settings.bounces)];
     let stored = map.map(|file| StoredPhotons { file, open: none(), open_of_blocks: none() });
     let mut world = SceneOnGpu { stored, ..SceneOnGpu::new(view.geometry, view.camera.cloned(), &plan, resources, control.cancelled) };
@@ -135,6 +136,17 @@ pub fn light_from(gpu: &Gpu, view: &View, plan: ScenePlan, map: Option<&MapFile>
         world.restore(&mut commands, film)?;
     }
     run::run(world, commands, &plan, task, control)
+}
+
+/// Whether the buffers of a plan take what was saved.
+fn can_go_on(saved: &SavedRun, plan: &ScenePlan, task: &Task) -> bool {
+    let SavedFilm::Scene(film) = &saved.film else { return false };
+    let read_alike = |film: &FilmPlan| (film.bias, film.sees_light, film.rounds_per_block);
+    let pixels = plan.sensor.pixels() as usize;
+    saved.has_lengths(&task.fates, 3 * pixels, PART_VALUES as usize * kept_count(pixels))
+        && read_alike(&film.plan) == read_alike(&plan.film)
+        && film.parts.is_some() == plan.keeps_parts()
+        && film.part_totals.len() == PART_COUNT as usize
 }
 
 /// What a run of a plan is to do, on a device with its pipelines before the run.
