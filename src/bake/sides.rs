@@ -19,6 +19,8 @@ const BOUNCES: u32 = 4;
 const SEED: u64 = 0x51de;
 /// A side is dark that receives less of the other's light.
 const DARK: f64 = 0.02;
+/// Six times the volume beside area^(3/2).
+const NEARLY_FLAT: f64 = 1e-4;
 /// A mesh of more connected parts is looked at as a whole.
 const MOST_PARTS: usize = 256;
 
@@ -27,7 +29,7 @@ const MOST_PARTS: usize = 256;
 pub struct Sides {
     /// Triangles whose back is baked; empty where none is.
     pub turned: Vec<bool>,
-    /// Whether a closed part of one-sided faces looks inwards, where no light comes.
+    /// Whether a part of one-sided faces looks inwards, where no light comes.
     pub is_inside_out: bool,
 }
 
@@ -71,7 +73,7 @@ fn is_turned_away(scene: &Scene, points: &[(DVec3, DVec3)]) -> bool {
     !scene.cameras.is_empty() && scene.cameras.iter().all(|camera| is_behind(camera.eye))
 }
 
-/// Parts of which the back may be what is seen: two-sided ones, and closed ones whose faces look inwards.
+/// Parts of which the back may be what is seen: two-sided ones, and those whose faces look inwards.
 fn parts_in_question(scene: &Scene, number: usize) -> Vec<Part> {
     let mesh = &scene.meshes[number];
     let material = &scene.materials[mesh.material];
@@ -81,7 +83,7 @@ fn parts_in_question(scene: &Scene, number: usize) -> Vec<Part> {
     }
     let mut parts: Vec<Part> = Vec::new();
     for triangles in connected(mesh) {
-        let is_in_question = material.two_sided || (volume(mesh, &triangles) < 0.0 && is_closed(mesh, &triangles));
+        let is_in_question = material.two_sided || looks_inwards(mesh, &triangles);
         let points = if is_in_question { points(mesh, &triangles) } else { Vec::new() };
         if !points.is_empty() {
             parts.push(Part { mesh: number, triangles, points });
@@ -98,6 +100,12 @@ fn volume(mesh: &Mesh, triangles: &[usize]) -> f64 {
         a.dot(b.cross(c))
     };
     triangles.iter().map(of_triangle).sum()
+}
+
+/// Whether the faces of a shell look inwards, which may be open; not those of a sheet that is nearly flat.
+fn looks_inwards(mesh: &Mesh, triangles: &[usize]) -> bool {
+    let area: f64 = triangles.iter().map(|triangle| mesh.area(*triangle)).sum();
+    volume(mesh, triangles) < -NEARLY_FLAT * area.powf(1.5)
 }
 
 fn is_closed(mesh: &Mesh, triangles: &[usize]) -> bool {

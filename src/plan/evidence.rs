@@ -131,7 +131,7 @@ impl<'a> Facts<'a> {
         };
         match effect {
             Effect::Direct if !lit => (false, "no light source".into()),
-            Effect::Direct if !receives => (false, "no diffuse or glossy surface".into()),
+            Effect::Direct if !receives && !self.has_kind(|kinds| kinds.has_width) => (false, "no diffuse or glossy surface".into()),
             Effect::Direct if self.part == Part::Caustic => (false, "only caustics were asked for".into()),
             Effect::Direct if self.part == Part::Indirect && !self.gathers => (false, "only indirect light was asked for".into()),
             Effect::Direct if self.part == Part::Indirect => (true, "final-gather rays need direct light where they end".into()),

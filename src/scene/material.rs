@@ -257,6 +257,8 @@ pub struct LobeKinds {
     /// Rays follow these.
     pub sharp_reflection: bool,
     pub sharp_transmission: bool,
+    /// One of these is no delta: rays towards lights count for it.
+    pub has_width: bool,
     /// Light goes straight on as if nothing were there: through gaps of alpha or a thin smooth wall.
     pub passing: bool,
     /// It is such a wall.
@@ -317,11 +319,13 @@ impl LobeKinds {
             || (of.coat > 0.0 && coat_alpha.1 >= map_alpha);
         // A surface without a lobe is black; light still arrives there.
         let is_black = !matt && !reflects && !transmits && !is_beyond && of.coat == 0.0;
+        let has_width = |alpha: (f32, f32)| alpha.1 >= delta_alpha;
         LobeKinds {
             matt: matt || is_black,
             sharp_reflection: (reflects && (alpha.0 < map_alpha || is_stretched || (transmits && !is_pane)))
                 || (of.coat > 0.0 && coat_alpha.0 < map_alpha),
             sharp_transmission: is_beyond || (transmits && !(is_pane && alpha.1 < delta_alpha)),
+            has_width: is_beyond || ((reflects || transmits) && has_width(alpha)) || (of.coat > 0.0 && has_width(coat_alpha)),
             passing: !is_covered || (transmits && is_pane && alpha.0 < delta_alpha),
             pane: transmits && is_pane && alpha.0 < delta_alpha,
         }

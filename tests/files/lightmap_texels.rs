@@ -991,6 +991,10 @@ fn the_side_that_is_seen_is_baked() {
         "{warnings:?}"
     );
     assert_eq!(side_of(&with(&turned, false, &point(DVec3::ZERO))), (1.0, vec![]));
+    // Without one of its sides, too.
+    let open = Mesh { triangles: turned.triangles[2..].to_vec(), ..turned.clone() };
+    let (_, warnings) = side_of(&with(&open, false, &above));
+    assert!(warnings.len() == 1 && warnings[0].contains("dark of 'cube'"), "{warnings:?}");
     assert_eq!(side_of(&with(&sheet, true, &above)).0, -1.0);
     // Both sides are lit, and the cameras are above the back.
     let mut seen = with(&sheet, true, &sky);

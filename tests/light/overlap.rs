@@ -529,12 +529,13 @@ fn a_decal_in_the_plane_of_a_wall_is_seen_where_its_alpha_is() {
         let decal = Material { two_sided: !faces_up, ..decal.clone() };
         let mut mesh = Mesh { name: "decal".into(), ..level(0.0, [1.0; 2], faces_up, 1) };
         mesh.uvs[0] = mesh.positions.iter().map(|at| DVec2::new(at.x + 0.5, 0.5)).collect();
+        let materials = vec![Material { two_sided: false, ..wall.clone() }, decal];
+        // A copy of the wall's own triangles is a decal, too.
+        let copy = Mesh { name: "wall".into(), material: 0, ..mesh.clone() };
+        let twice = Scene { textures: vec![halves.clone()], ..scene_of(vec![copy, mesh.clone()], materials.clone(), vec![]) };
+        assert_eq!(Geometry::new(&twice).unwrap().left_out, 0);
         let meshes = vec![level(0.0, [4.0; 2], true, 0), mesh];
-        let mut scene = scene_of(
-            meshes,
-            vec![Material { two_sided: false, ..wall.clone() }, decal],
-            vec![LightKind::Environment { radiance: Vec3::ONE }],
-        );
+        let mut scene = scene_of(meshes, materials, vec![LightKind::Environment { radiance: Vec3::ONE }]);
         scene.textures = vec![halves.clone()];
         let camera = Camera::looking_at("above", DVec3::Y * 10.0, DVec3::ZERO, DVec3::NEG_Z, 0.08);
         let lit = seen(&gpu, &scene, &without_photons(), &camera, [4, 4]);

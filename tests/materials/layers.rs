@@ -252,6 +252,41 @@ fn pictures_of_each_lobe_agree_with_the_judge() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+/// A plate alone under one lamp or an even sky, seen along the reflection of light from above.
+fn seen_alone(gpu: &Gpu, material: Material, light: LightKind) -> RunResult {
+    let scene = scene_of(vec![level(0.0, [1.0; 2], true, 0)], vec![material], vec![light]);
+    let camera = Camera::looking_at("above", DVec3::Y * 3.0, DVec3::ZERO, DVec3::NEG_Z, 0.01);
+    let settings = SceneSettings { photons: 1000, caustic_photons: 1000, rounds: 8, block: Some(1), ..SceneSettings::default() };
+    seen(gpu, &scene, &settings, &camera, [4, 4])
+}
+
+/// Rays towards lamps count for each lobe that has a width, also where no surface keeps photons.
+#[test]
+fn a_sharp_metal_alone_has_highlights() {
+    let Some(gpu) = device() else { return };
+    let sun = LightKind::Directional { direction: DVec3::NEG_Y, irradiance: Vec3::ONE };
+    let seen = |roughness| mean_red(&seen_alone(&gpu, layered(Vec3::ONE, &metal(roughness)), sun.clone()));
+    // GGX along the normal is 1 / (4 pi alpha^2), at a roughness of .4 (Walter et al. 2007).
+    let expected = 1.0 / (4.0 * PI * 0.16f64.powi(2));
+    assert!((seen(0.4) / expected - 1.0).abs() < 0.02, "{}, {expected}", seen(0.4));
+    assert_eq!(seen(0.0), 0.0);
+}
+
+/// What normal maps clamp of photons that meet nothing afterwards is next to nothing.
+#[test]
+fn light_that_is_clamped_at_a_plate_alone_is_little() {
+    let Some(gpu) = device() else { return };
+    let normal_map = Some(layered::map_of(0, 1.0));
+    let plate = Material { normal_map, ..layered(Vec3::ONE, &plastic(0.6)) };
+    let mut scene = scene_of(vec![level(0.0, [1.0; 2], true, 0)], vec![plate], vec![LightKind::Environment { radiance: Vec3::ONE }]);
+    scene.textures = vec![row_of_texels(&[layered::LEANS[1]], Filter::Nearest)];
+    scene.meshes[0].tangents = vec![[DVec3::X.extend(1.0); 3]; 2];
+    let camera = Camera::looking_at("aside", DVec3::new(3.0, 1.0, 0.0), DVec3::ZERO, DVec3::Y, 0.1);
+    let settings = SceneSettings { photons: 4000, caustic_photons: 1000, rounds: 8, block: Some(1), ..SceneSettings::default() };
+    let lit = seen(&gpu, &scene, &settings, &camera, [4, 4]);
+    assert!(lit.losses.clamped > 0.0 && lit.losses.relative < 1e-3, "{:?}", lit.losses);
+}
+
 /// A direction in red and green, and a strength in blue.
 const TEXELS: [[u8; 4]; 2] = [[255, 128, 255, 255], [60, 220, 180, 255]];
 

@@ -9,6 +9,13 @@ use crate::ledger::{Fates, FluxUnits, Losses};
 use crate::plan::scene::ScenePlan;
 use crate::scene::geometry::Geometry;
 
+/// Where none of many was seen, the mean is at most so many with 95 % confidence (the rule of three).
+const UNSEEN: f64 = 3.0;
+
+fn share_of(missed: f64, light: f64) -> f64 {
+    missed / (light + missed).max(f64::MIN_POSITIVE)
+}
+
 /// Of a run so far, from what its kernels counted.
 pub fn losses(geometry: &Geometry, plan: &ScenePlan, fates: &[Fates], film: &SceneFilm) -> Losses {
     let SceneFilm { anomalies, part_totals, .. } = film;
@@ -31,16 +38,24 @@ pub fn losses(geometry: &Geometry, plan: &ScenePlan, fates: &[Fates], film: &Sce
         if missed == 0.0 {
             continue;
         }
+        let per_photon = emitted / map.flux_gain / of_map.emitted as f64;
+        if totals.stored == 0 && cut_off == 0.0 {
+            // No photon that went on has reached a place where the map keeps it: so many times less of what is missed would have.
+            let (went_on, first) = (of_map.went_on(), of_map.bounces[0]);
+            let light = per_photon * (first.stored + first.absorbed) as f64;
+            losses.relative += Losses::SAFETY * share_of(missed * (UNSEEN / went_on.max(1) as f64).min(1.0), light);
+            continue;
+        }
         // Landings so far that the map holds: what is missed belongs to the same part of the result.
-        let landed = (emitted / map.flux_gain * totals.stored as f64 / of_map.emitted as f64).max(f64::MIN_POSITIVE);
-        let share = missed / (landed + missed);
+        let landed = per_photon * totals.stored as f64;
+        let share = share_of(missed, landed);
         let part = if map.stored & ARRIVED_DIRECT != 0 {
             all
         } else {
             part_totals[if map.caustic_only { 2 } else { PART_COUNT as usize - 1 }] as f64 + part_totals[1] as f64
         };
         // Of a part that is missed altogether nothing is known but its watts.
-        let of_part = if totals.stored > 0 && all > 0.0 { part / (1.0 - share) / (all + part * share / (1.0 - share)) } else { 1.0 };
+        let of_part = if share < 1.0 && all > 0.0 { part / (1.0 - share) / (all + part * share / (1.0 - share)) } else { 1.0 };
         losses.relative += Losses::SAFETY * share * of_part;
     }
     let paths = f64::from(plan.paths()) * f64::from(film.rounds.max(1));
