@@ -327,7 +327,7 @@ impl SavedRun {
         if !done.is_valid() || share.of == 0 || share.number >= share.of || most > MOST_ROUNDS {
             return wrong("its blocks or its share");
         }
-        if !fates.iter().all(|fates| fates.is_sound(MOST_COUNTED)) {
+        if !fates.iter().all(|fates| fates.is_sound(MOST_COUNTED) && fates.ledger().closes()) {
             return wrong("the fates of its photons");
         }
         // It is printed.

@@ -12,6 +12,7 @@ use photonmill::engine::saved::{SavedFilm, SavedRun};
 use photonmill::engine::scene::{self, RunResult, View, trial};
 use photonmill::engine::watch::{Keep, SaveRun};
 use photonmill::error::Result;
+use photonmill::ledger::BounceFates;
 use photonmill::settings::stop::Stop;
 
 /// Keeps the latest of what is saved.
@@ -143,7 +144,7 @@ fn forged(saved: &SavedRun) -> Vec<(&'static str, SavedRun)> {
     };
     vec![
         ("no fates", with(&|saved| saved.fates.clear())),
-        ("fates of fewer bounces", with(&|saved| saved.fates[0].bounces.truncate(1))),
+        ("fates of more bounces", with(&|saved| saved.fates[0].bounces.insert(0, BounceFates::default()))),
         ("fates of more maps", with(&|saved| saved.fates.push(saved.fates[0].clone()))),
         (
             "kept blocks of fewer values",
@@ -334,7 +335,8 @@ fn damaged_files_are_refused() {
     // Files whose checksum is right, and whose header lies.
     let SavedFilm::Scene(film) = &saved.film else { panic!("a scene's film") };
     type Lie = fn(&mut SavedRun);
-    let lies: [Lie; 4] = [
+    let lies: [Lie; 5] = [
+        |run| run.fates[0].emitted += 1,
         |run| run.sensor = Some(square_picture(3)),
         |run| run.share = Share { number: 4, of: 3 },
         |run| run.done.insert(17),
