@@ -218,11 +218,6 @@ impl Losses {
 }
 
 impl Fates {
-    /// Times that photons survived a bounce.
-    pub fn went_on(&self) -> u64 {
-        self.bounces.iter().map(|bounce| bounce.stored).sum()
-    }
-
     /// Landings that a photon which was cut off would still have had, from the chance with which photons survived their latest
     /// bounces.
     pub fn further_landings(&self) -> f64 {

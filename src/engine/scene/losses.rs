@@ -40,10 +40,10 @@ pub fn losses(geometry: &Geometry, plan: &ScenePlan, fates: &[Fates], film: &Sce
         }
         let per_photon = emitted / map.flux_gain / of_map.emitted as f64;
         if totals.stored == 0 && cut_off == 0.0 {
-            // No photon that went on has reached a place where the map keeps it: so many times less of what is missed would have.
-            let (went_on, first) = (of_map.went_on(), of_map.bounces[0]);
+            // No photon that was clamped has reached a place where the map keeps it, so that at most a small share of what is missed would have.
+            let first = of_map.bounces[0];
             let light = per_photon * (first.stored + first.absorbed) as f64;
-            losses.relative += Losses::SAFETY * share_of(missed * (UNSEEN / went_on.max(1) as f64).min(1.0), light);
+            losses.relative += Losses::SAFETY * share_of(missed * (UNSEEN / totals.clamped.max(1) as f64).min(1.0), light);
             continue;
         }
         // Landings so far that the map holds: what is missed belongs to the same part of the result.
