@@ -20,6 +20,8 @@ layout(set = 1, binding = 2, scalar) writeonly buffer Clearances { float clearan
 const float COSINES[8] = float[](1.0, 0.70710678, 0.0, -0.70710678, -1.0, -0.70710678, 0.0, 0.70710678);
 // Of a ray's rise above the surface: low steps and a mesh's facets do not count as walls.
 const float RISE = 0.1;
+// What lies no higher above a surface touches it (src/scene/contact_offsets.rs): a sheet on it is no wall.
+const float TOUCHING = 1.0 / 16384.0;
 
 void main()
 {
@@ -29,15 +31,13 @@ void main()
     }
     VisiblePoint point = visible_points[index];
     vec3 normal = plane_normal(point.plane);
-    vec3 size = abs(point.position);
-    float error = max(size.x, max(size.y, size.z)) * (1.0 / 1048576.0);
     // Ascending.
     float distances[8];
     for (uint k = 0; k < 8; k++) {
         vec3 direction = normalize(to_frame(vec3(COSINES[k], COSINES[(k + 6) % 8], RISE), normal));
         float distance = 0.0;
         if (point.arrivals != 0) {
-            distance = closest_hit(offset_origin(point.position, error, normal, direction), direction).t;
+            distance = closest_hit(offset_origin(point.position, TOUCHING, normal, direction), direction).t;
         }
         uint place = k;
         while (place > 0 && distances[place - 1] > distance) {

@@ -494,7 +494,7 @@ impl<'a> RunState<'a> {
             let mut film = world.film(recorder, self)?;
             if looks {
                 let made = film();
-                self.watch.look(&world.error(&made), world.losses(&made, self.fates()).relative);
+                self.watch.look(&world.error(&made), &world.losses(&made, self.fates()));
                 self.watch.check_error(self.task.bounces)?;
                 film = Box::new(|| made);
             }

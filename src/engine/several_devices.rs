@@ -284,7 +284,7 @@ impl<Plan: Send, Film: Clone + Send> Together<'_, Plan, Film> {
             let blocks = run.done.count();
             if attempt.watch.is_due(blocks) {
                 let film = (self.work.film)(&run.film);
-                attempt.watch.look(&(self.work.error)(film), (self.work.losses)(film, &run.fates).relative);
+                attempt.watch.look(&(self.work.error)(film), &(self.work.losses)(film, &run.fates));
                 attempt.watch.check_error(self.work.bounces)?;
                 attempt.end = attempt.watch.end(blocks, 0);
             }

@@ -11,7 +11,7 @@ use super::error_bound::{FilmError, bound_of_both, error_bound};
 use super::identity::Identity;
 use super::saved::SavedRun;
 use crate::error::{Error, Result, require};
-use crate::ledger::Ledger;
+use crate::ledger::{Ledger, Losses};
 use crate::plan::radius::mean_squared_radius;
 use crate::settings::stop::{FIRST_LOOK, Stop};
 use serde::Serialize;
@@ -199,8 +199,10 @@ struct Look {
     unseen: f64,
     /// As far as the film tells it.
     bias: Option<Bias>,
-    /// What limits have kept from the result ([`crate::ledger::Losses`]).
+    /// What limits have kept from the result.
     lost: f64,
+    /// Whether the number of bounces kept most of it.
+    is_lost_by_bounces: bool,
 }
 
 impl Watch {
@@ -231,13 +233,15 @@ impl Watch {
         self.stop.seconds.map(|seconds| self.started + Duration::from_secs_f64(seconds))
     }
 
-    /// Takes what a film tells, and what limits kept from it, relative to it.
-    pub fn look(&mut self, error: &FilmError, lost: f64) {
+    /// Takes what a film tells, and what limits kept from it.
+    pub fn look(&mut self, error: &FilmError, losses: &Losses) {
         let FilmError { rounds, blocks, noise, freedom, ref unknown, unseen, .. } = *error;
         let noise = [noise, error_bound(noise, freedom, self.stop.confidence)];
         let of_maps = error.places.map_or(1.0, |places| places.of_maps());
         let is_off_surfaces = unknown.off_surfaces.is_all();
-        self.seen = Some(Look { rounds, noise, of_maps, unknown: unknown.relative, is_off_surfaces, unseen, bias: error.bias, lost });
+        let (lost, is_lost_by_bounces) = (losses.relative, losses.cut_off > losses.clamped);
+        let unknown = unknown.relative;
+        self.seen = Some(Look { rounds, noise, of_maps, unknown, is_off_surfaces, unseen, bias: error.bias, lost, is_lost_by_bounces });
         self.next_look = next_look(blocks);
         self.looked = Instant::now();
     }
@@ -262,10 +266,15 @@ impl Watch {
             return refused("cannot be reached, because no point lies on a surface, and some light of this scene is only found there; move the points onto surfaces".to_owned());
         }
         if look.lost > wanted {
-            return refused(format!(
-                "cannot be reached, because photons are cut off after {bounces} bounces, and what they carry may add up to {:.2} % of the result; allow more --bounces",
-                100.0 * look.lost
-            ));
+            let percent = 100.0 * look.lost;
+            return refused(match look.is_lost_by_bounces {
+                true => format!(
+                    "cannot be reached, because photons are cut off after {bounces} bounces, and what they carry may add up to {percent:.2} % of the result; allow more --bounces"
+                ),
+                false => format!(
+                    "cannot be reached, because limits of shading normals, of paths between mirrors and of large values keep light from the result that may add up to {percent:.2} % of it; ask for a larger error, or run without --error to see how much each keeps"
+                ),
+            });
         }
         if let Some(Bias { lower, upper, .. }) = look.bias
             && self.alpha == 1.0

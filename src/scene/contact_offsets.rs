@@ -74,12 +74,8 @@ impl Offsets {
         pairs.iter_mut().filter(|(a, b)| place(*a) > place(*b)).for_each(|(a, b)| std::mem::swap(a, b));
         pairs.sort_unstable();
         pairs.dedup();
-        // Of solids with the very same triangles one is left out; of translucent sheets too, as what lies so near below is dark.
-        let is_clear_sheet = |triangle: u32| {
-            let material = &scene.materials[scene.meshes[sources[triangle as usize].0 as usize].material];
-            kind_of(triangle) == Kind::Sheet && material.layers.diffuse_transmission == 0.0
-        };
-        pairs.retain(|(a, b)| is_clear_sheet(*a) || !is_double(&corners[*a as usize], &corners[*b as usize]));
+        // Of solids with the very same triangles one is left out.
+        pairs.retain(|(a, b)| kind_of(*a) == Kind::Sheet || !is_double(&corners[*a as usize], &corners[*b as usize]));
         let levels = levels(&pairs, &sources, kinds, &ranks);
         let sheet = |triangle: u32| Sheet::new(scene, kinds, sources[triangle as usize].0, corners[triangle as usize]);
         let mut steps: HashMap<(usize, [u64; 3]), Vec<Step>> = HashMap::new();

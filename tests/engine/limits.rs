@@ -90,14 +90,22 @@ fn what_a_cap_cuts_off_of_all_light_is_counted() {
     what_caps_cut_off_is_counted(&[(Illumination::Photons, 0.5, 6)]);
 }
 
-/// An error that a cap makes impossible is refused, when the run first looks: after 30 rounds.
+/// An error that a cap makes impossible is refused, when the run first looks: after 30 rounds. Which cap it is, is said: bounces, or
+/// shading normals that lean far.
 #[test]
 fn an_error_beyond_a_cap_is_refused() {
     let Some(gpu) = device() else { return };
-    let stop = Stop { error: Some(0.01), ..Stop::default() };
-    let settings = SceneSettings { bounces: 4, photons: 500, rounds: 31, stop, ..settings() };
-    let refused = run(&gpu, &furnace(0.9), &settings, 16, &AtomicBool::new(false)).unwrap_err();
-    assert!(refused.to_string().starts_with("--error 1%: cannot be reached"), "{refused}");
+    let mut leaning = furnace(0.5);
+    for wall in &mut leaning.meshes {
+        let [a, b, _] = wall.corners(0);
+        wall.normals = vec![(wall.normal(0) + 3.0 * (b - a).normalize()).normalize(); wall.positions.len()];
+    }
+    for (scene, bounces, error, why) in [(furnace(0.9), 4, 0.01, "after 4 bounces"), (leaning, 64, 0.001, "shading normals")] {
+        let stop = Stop { error: Some(error), ..Stop::default() };
+        let settings = SceneSettings { bounces, photons: 500, rounds: 31, stop, ..settings() };
+        let refused = run(&gpu, &scene, &settings, 16, &AtomicBool::new(false)).map(|lit| lit.losses).unwrap_err().to_string();
+        assert!(refused.starts_with("--error ") && refused.contains("cannot be reached") && refused.contains(why), "{refused}");
+    }
 }
 
 /// Settings with kernels that fit every scene of mirrors, which changes no bit (`tests/light/transport.rs`).

@@ -3,6 +3,7 @@
 
 use std::sync::atomic::AtomicBool;
 
+use crate::common::layered::dull;
 use crate::common::lit::light;
 use crate::common::prelude::*;
 use crate::engine::unseen_light::room_without_floor;
@@ -11,6 +12,7 @@ use photonmill::engine::scene::{self, Target, View, trial};
 use photonmill::output::scene_report;
 use photonmill::plan::radius::{RadiusFrom, area_radius};
 use photonmill::records::Receiver;
+use photonmill::scene::material::Coverage;
 
 /// A room of 4 x 4 x 3 m with a lamp under its ceiling, on a ground of 800 m.
 fn room_on_a_plain() -> Scene {
@@ -135,6 +137,24 @@ fn a_trial_knows_no_seed_builder_or_split() {
     let plan = tried(&gpu, &scene, &geometry, &settings);
     let json: serde_json::Value = serde_json::from_slice(&scene_report::plan_json(&plan)).unwrap();
     assert!(json["trial"]["seconds"].as_f64().unwrap() > 0.0 && json["maps"][0]["radius_from"] == "trial", "{json}");
+}
+
+/// A sheet that lies on all surfaces, as a varnish with gaps, is no wall to the points below and above it.
+#[test]
+fn sheets_that_touch_a_surface_narrow_no_radius() {
+    let Some(gpu) = device() else { return };
+    let bare = scene("cornell");
+    let mut varnished = bare.clone();
+    for mesh in bare.meshes.iter().filter(|mesh| bare.materials[mesh.material].emission == Vec3::ZERO) {
+        varnished.meshes.push(Mesh { name: format!("varnish of {}", mesh.name), material: varnished.materials.len(), ..mesh.clone() });
+    }
+    varnished.materials.push(Material { coverage: Coverage::Blend { alpha: 0.5 }, ..dull(0.5) });
+    let [bare, varnished] = [bare, varnished].map(|scene| {
+        let geometry = Geometry::new(&scene).unwrap();
+        tried(&gpu, &scene, &geometry, &by_rounds()).global.unwrap().radius * geometry.unit
+    });
+    println!("radius {bare:.4} m, {varnished:.4} m with sheets");
+    assert!((0.5..2.0).contains(&(varnished / bare)), "{varnished}, {bare}");
 }
 
 /// A narrow shelf is all that is asked about: the radius that its few photons call for is wider than it.

@@ -347,7 +347,10 @@ fn what_cannot_be_used_is_refused_with_file_and_object() {
         (|v| v["materials"][0]["emissiveFactor"] = json!([-1, 0, 0]), &["material 'glow'", "emits"]),
         (|v| v["nodes"][0]["scale"] = json!([1e300, 1, 1]), &["'wall'", "finite"]),
         (|v| v["extensions"]["KHR_lights_punctual"]["lights"][0]["intensity"] = json!(-1), &["light 'bulb'", "0 or more"]),
-        (|v| v["extensions"]["KHR_lights_punctual"]["lights"][2]["spot"]["outerConeAngle"] = json!(0.1), &["light", "cones"]),
+        (
+            |v| v["extensions"]["KHR_lights_punctual"]["lights"][2]["spot"]["outerConeAngle"] = json!(-0.1),
+            &["light", "cones", "-0.1", "0 or more"],
+        ),
         (|v| v["scenes"][0]["nodes"] = json!([1]), &["no triangle"]),
         (|v| drop(v["scenes"][0].as_object_mut().unwrap().remove("nodes")), &["the scene holds no triangle"]),
         (|v| v["meshes"][0]["primitives"][0]["mode"] = json!(1), &["no triangle; ignored: points and lines: mesh 'wall'"]),

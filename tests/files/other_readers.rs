@@ -162,6 +162,34 @@ fn a_spot_light_may_leave_out_its_cone() {
     assert_eq!((inner_angle, outer_angle), (0.0, std::f32::consts::FRAC_PI_4));
 }
 
+/// A wider inner cone has a sharp edge, an outer cone ends at half a turn, and one of 0 lights nothing.
+#[test]
+fn cones_of_spot_lights_are_brought_into_their_range() {
+    for (inner, outer, expected) in [
+        (0.2, 0.5, Some((0.2, 0.5))),
+        (0.5, 0.5, Some((0.4995, 0.5))),
+        (0.7, 0.5, Some((0.4995, 0.5))),
+        (0.2, 1.6, Some((0.2, FRAC_PI_2))),
+        (1.6, 1.6, Some((0.999 * FRAC_PI_2, FRAC_PI_2))),
+        (0.0, 0.0, None),
+    ] {
+        let mut value = square();
+        value["extensions"]["KHR_lights_punctual"]["lights"][2]["spot"] = json!({"innerConeAngle": inner, "outerConeAngle": outer});
+        let scene = load(&value);
+        let cone = scene.lights.iter().find_map(|light| match light.kind {
+            LightKind::Spot { inner_angle, outer_angle, .. } => Some((f64::from(inner_angle), f64::from(outer_angle))),
+            _ => None,
+        });
+        let is_near = match (cone, expected) {
+            (Some(cone), Some(expected)) => (cone.0 - expected.0).abs() < 1e-6 && (cone.1 - expected.1).abs() < 1e-6,
+            (cone, expected) => cone == expected,
+        };
+        assert!(is_near, "{inner}, {outer}: {cone:?}");
+        let is_named = scene.warnings.iter().any(|text| text.contains("outer cone") && text.contains("'beam'"));
+        assert_eq!(is_named, outer == 0.0 || outer == 1.6, "{:?}", scene.warnings);
+    }
+}
+
 /// Of one name are the primitives of a mesh, and the nodes without one that have a mesh.
 #[test]
 fn messages_tell_primitives_and_nodes_apart() {
@@ -190,7 +218,7 @@ fn messages_tell_primitives_and_nodes_apart() {
 /// glTF-Transform's `metalRough()` writes 1000 for a mirror's index.
 #[test]
 fn any_index_of_refraction_from_1_is_one() {
-    for (ior, kept) in [(1.0, 1.0), (1000.0, 1000.0), (1e30, 1e6), (0.0, 0.0)] {
+    for (ior, kept) in [(0.99999, 1.0), (1.0, 1.0), (1000.0, 1000.0), (1e30, 1e6), (0.0, 0.0)] {
         let mut value = square();
         value["materials"][0]["extensions"] =
             json!({"KHR_materials_ior": {"ior": ior}, "KHR_materials_iridescence": {"iridescenceIor": f64::max(ior, 1.0)}});

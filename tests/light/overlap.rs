@@ -548,6 +548,23 @@ fn a_decal_in_the_plane_of_a_wall_is_seen_where_its_alpha_is() {
     }
 }
 
+/// Red paper that scatters nothing back, on a wall of its very triangles: all that is seen has passed it, gone back from the wall, and
+/// passed it again.
+#[test]
+fn paper_on_a_wall_shows_the_wall() {
+    let Some(gpu) = device() else { return };
+    let layers = Layers { diffuse_transmission: 1.0, diffuse_transmission_colour: Vec3::X, ..dull(0.0).layers };
+    let meshes = vec![level(0.0, [2.0; 2], true, 0), level(0.0, [2.0; 2], true, 1)];
+    let materials = vec![matt(0.8), Material::layered("paper", Vec3::X, layers)];
+    let scene = scene_of(meshes, materials, vec![LightKind::Environment { radiance: Vec3::ONE }]);
+    let camera = Camera::looking_at("above", DVec3::Y * 2.0, DVec3::ZERO, DVec3::NEG_Z, 0.7);
+    let settings = SceneSettings { photons: 8192, caustic_photons: 8192, rounds: 32, samples: 1, ..by_rounds() };
+    let means = means(&seen(&gpu, &scene, &settings, &camera, [8; 2]));
+    let mean = means.iter().sum::<DVec3>() / means.len() as f64;
+    println!("paper on a wall: {mean}");
+    assert!((mean.x / 0.8 - 1.0).abs() < 0.05 && mean.y.max(mean.z) < 0.01, "{mean}");
+}
+
 /// Glass whose faces look inwards is turned, but not what is hollow in it; where five solids and more lie in one another, each counts.
 #[test]
 fn solids_face_outwards() {

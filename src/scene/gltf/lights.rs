@@ -1,5 +1,7 @@
 //! Lights without geometry, and cameras.
 
+use std::f32::consts::FRAC_PI_2;
+
 use glam::{DMat4, DVec3, Vec3};
 use gltf::khr_lights_punctual::Kind;
 
@@ -7,6 +9,9 @@ use super::{Loader, named, printable};
 use crate::error::Result;
 use crate::scene::light::{Light, LightKind};
 use crate::scene::{Camera, Projection};
+
+/// What angles in radians that were written as decimals are off.
+const ROUNDED: f32 = 1e-4;
 
 /// Share of a sharp cone that is fully lit.
 const SHARP: f32 = 0.999;
@@ -63,13 +68,20 @@ impl Loader {
             Kind::Point => LightKind::Point { position, intensity: strength },
             Kind::Directional => LightKind::Directional { direction, irradiance: strength },
             Kind::Spot { inner_cone_angle, outer_cone_angle } => {
-                // glTF wants the inner one smaller; Blender writes both alike for a sharp edge.
-                let (inner_angle, outer_angle) =
-                    (if inner_cone_angle == outer_cone_angle { SHARP * outer_cone_angle } else { inner_cone_angle }, outer_cone_angle);
-                let is_cone = inner_angle >= 0.0 && inner_angle < outer_angle && outer_angle <= std::f32::consts::FRAC_PI_2 + 1e-6;
-                self.require(is_cone, &what, || {
-                    format!("has cones of {inner_angle} and {outer_angle} radians; the inner must be smaller, the outer at most half pi")
+                let are_angles = inner_cone_angle >= 0.0 && outer_cone_angle >= 0.0;
+                self.require(are_angles, &what, || {
+                    format!("has cones of {inner_cone_angle} and {outer_cone_angle} radians; both must be 0 or more")
                 })?;
+                let outer_angle = outer_cone_angle.min(FRAC_PI_2);
+                if outer_cone_angle > FRAC_PI_2 + ROUNDED {
+                    self.leave_out("what is wider than half pi of the outer cones of spot lights", &what);
+                }
+                if outer_angle == 0.0 {
+                    self.leave_out("spot lights whose outer cone is 0 (they light nothing)", &what);
+                    return Ok(());
+                }
+                // glTF wants the inner one smaller; Blender writes both alike for a sharp edge, which other readers take wider ones for too.
+                let inner_angle = if inner_cone_angle < outer_angle { inner_cone_angle } else { SHARP * outer_angle };
                 LightKind::Spot { position, direction, intensity: strength, inner_angle, outer_angle }
             }
         };

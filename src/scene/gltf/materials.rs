@@ -23,6 +23,8 @@ const MAX_TRANSFORM: f32 = 1e6;
 const ANY: f32 = f32::MAX;
 /// Larger indices of refraction are as good as this one: all but 4 millionths of the light is reflected.
 const MAX_IOR: f32 = 1e6;
+/// What is meant for 1 and rounded below counts as 1.
+const LEAST_IOR: f32 = 0.9999;
 /// Largest that is spread over colours.
 const MAX_DISPERSED_IOR: f32 = 100.0;
 
@@ -174,8 +176,8 @@ impl Reader<'_> {
         self.loader.require(emission.is_finite() && emission.min_element() >= 0.0, &self.object, reason)?;
         let ior = extensions.ior.as_ref().map_or(1.5, |extension| extension.ior.0);
         let reason = || format!("has the index of refraction {ior}; it must be 0, or from 1");
-        self.loader.require(ior == 0.0 || ior >= 1.0, &self.object, reason)?;
-        let mut layers = Layers { ior: ior.min(MAX_IOR), ..Layers::default() };
+        self.loader.require(ior == 0.0 || ior >= LEAST_IOR, &self.object, reason)?;
+        let mut layers = Layers { ior: if ior == 0.0 { ior } else { ior.clamp(1.0, MAX_IOR) }, ..Layers::default() };
         match glossy {
             Some(glossy) => {
                 let glossiness = self.factor("glossiness", glossy.glossiness_factor.0, 1.0)?;
@@ -241,9 +243,9 @@ impl Reader<'_> {
         if let Some(film) = self.extension::<Iridescence>(extensions, "KHR_materials_iridescence")? {
             layers.iridescence = self.factor("iridescence factor", film.iridescence_factor, 1.0)?;
             layers.iridescence_texture = self.texture(film.iridescence_texture.as_ref(), Meaning::Numbers)?;
-            layers.film_ior = film.iridescence_ior.min(MAX_IOR);
+            layers.film_ior = film.iridescence_ior.clamp(1.0, MAX_IOR);
             let reason = || format!("has a film of the index of refraction {}; it must be from 1", film.iridescence_ior);
-            self.loader.require(film.iridescence_ior >= 1.0, &self.object, reason)?;
+            self.loader.require(film.iridescence_ior >= LEAST_IOR, &self.object, reason)?;
             let thickness = [film.iridescence_thickness_minimum, film.iridescence_thickness_maximum];
             for nanometres in thickness {
                 self.factor("thickness of its film", nanometres, ANY)?;
