@@ -20,8 +20,33 @@ layout(set = 1, binding = 2, scalar) writeonly buffer Clearances { float clearan
 const float COSINES[8] = float[](1.0, 0.70710678, 0.0, -0.70710678, -1.0, -0.70710678, 0.0, 0.70710678);
 // Of a ray's rise above the surface: low steps and a mesh's facets do not count as walls.
 const float RISE = 0.1;
-// What lies no higher above a surface touches it (src/scene/contact_offsets.rs): a sheet on it is no wall.
+// Sheets that touch a surface lie no higher above it, and are no more (src/scene/contact_offsets.rs).
 const float TOUCHING = 1.0 / 16384.0;
+const uint TOUCHING_SHEETS = 16;
+// Least cosine between the normals of two in one plane.
+const float PARALLEL = 0.9999;
+
+// How far a ray from a visible point goes to what is no sheet on its surface.
+float clear_distance(VisiblePoint point, vec3 normal, float error, vec3 direction)
+{
+    float distance = 0.0;
+    vec3 start = offset_origin(point.position, error, normal, direction);
+    for (uint sheet = 0; sheet <= TOUCHING_SHEETS; sheet++) {
+        Hit hit = closest_hit(start, direction);
+        distance += hit.t;
+        bool touches = false;
+        if (HAS_LAYERS && hit.triangle != NONE) {
+            uint plane = 2 * (triangles[hit.triangle].plane & ~HIDDEN);
+            vec3 other = plane_normal(plane);
+            touches = abs(dot(other, normal)) >= PARALLEL && abs(plane_height(plane, point.position)) <= TOUCHING;
+            start = offset_origin(start + hit.t * direction, error, other, direction);
+        }
+        if (!touches) {
+            break;
+        }
+    }
+    return distance;
+}
 
 void main()
 {
@@ -31,13 +56,15 @@ void main()
     }
     VisiblePoint point = visible_points[index];
     vec3 normal = plane_normal(point.plane);
+    vec3 size = abs(point.position);
+    float error = max(size.x, max(size.y, size.z)) * (1.0 / 1048576.0);
     // Ascending.
     float distances[8];
     for (uint k = 0; k < 8; k++) {
         vec3 direction = normalize(to_frame(vec3(COSINES[k], COSINES[(k + 6) % 8], RISE), normal));
         float distance = 0.0;
         if (point.arrivals != 0) {
-            distance = closest_hit(offset_origin(point.position, TOUCHING, normal, direction), direction).t;
+            distance = clear_distance(point, normal, error, direction);
         }
         uint place = k;
         while (place > 0 && distances[place - 1] > distance) {

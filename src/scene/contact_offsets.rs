@@ -1,7 +1,7 @@
 //! Offsets of surfaces that touch and of which both count ([`super::contact`]): some two millionths of the scene's size, so that rays
-//! meet one, then the other. A sheet is moved off what it lies on, to the side from which both are seen; a solid into the one beside it.
+//! meet one, then the other. A sheet is moved off what it lies on, to the side from which both are seen; solids into each other.
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use glam::{DVec3, Vec3};
 
@@ -76,22 +76,26 @@ impl Offsets {
         pairs.dedup();
         // Of solids with the very same triangles one is left out.
         pairs.retain(|(a, b)| kind_of(*a) == Kind::Sheet || !is_double(&corners[*a as usize], &corners[*b as usize]));
-        let levels = levels(&pairs, &sources, kinds, &ranks);
         let sheet = |triangle: u32| Sheet::new(scene, kinds, sources[triangle as usize].0, corners[triangle as usize]);
+        let face_alike = |a: u32, b: u32| sheet(a).normal.dot(sheet(b).normal) > 0.0;
+        let levels = levels(&pairs, &sources, kinds, &ranks, face_alike);
         let mut steps: HashMap<(usize, [u64; 3]), Vec<Step>> = HashMap::new();
-        for (mover, other) in pairs {
-            let (mesh, triangle) = sources[mover as usize];
-            let (own, beside) = (sheet(mover), sheet(other));
-            let step = || match kinds[mesh as usize] {
-                Kind::Sheet => Step {
-                    along: if beside.of.material.has_two_sides() { own.normal } else { beside.normal },
-                    by: f64::from(levels[&mesh]) * OFFSET * unit,
-                    sheet: Some(mesh),
-                },
-                _ => Step { along: own.normal, by: -own.normal.dot(beside.normal).signum() * OFFSET * unit, sheet: None },
-            };
+        let mut add = |triangle: u32, along: DVec3, sheet: Option<u32>| {
+            let (mesh, number) = sources[triangle as usize];
+            let by = f64::from(levels[&mesh]) * OFFSET * unit;
             let of = &scene.meshes[mesh as usize];
-            of.corners(triangle as usize).iter().for_each(|corner| steps.entry((of.material, bits(*corner))).or_default().push(step()));
+            let corners = of.corners(number as usize);
+            corners.iter().for_each(|corner| steps.entry((of.material, bits(*corner))).or_default().push(Step { along, by, sheet }));
+        };
+        for (mover, other) in pairs {
+            let (own, beside) = (sheet(mover), sheet(other));
+            match kind_of(mover) {
+                Kind::Sheet => {
+                    let along = if beside.of.material.has_two_sides() { own.normal } else { beside.normal };
+                    add(mover, along, Some(sources[mover as usize].0));
+                }
+                _ => [(mover, own.normal), (other, beside.normal)].into_iter().for_each(|(of, along)| add(of, along, None)),
+            }
         }
         let meshes = (0u32..).zip(&scene.meshes);
         Offsets(meshes.flat_map(|(number, mesh)| offsets_of(number, mesh, &steps, IN_PLANE * unit)).collect())
@@ -115,15 +119,37 @@ fn is_double(one: &[Vec3; 3], other: &[Vec3; 3]) -> bool {
     (0..3).any(|turn| (0..3).all(|corner| one[corner] == other[(corner + turn) % 3]))
 }
 
-/// How many offsets each sheet lies above what is below all.
-fn levels(pairs: &[(u32, u32)], sources: &[(u32, u32)], kinds: &[Kind], ranks: &[u32]) -> BTreeMap<u32, u32> {
+/// How many offsets each sheet and each solid that touches another is moved. Faces of solids all move outwards, so that none leaves air
+/// to what it touches; where two look the same way the larger moves further, and so encloses the other.
+fn levels(
+    pairs: &[(u32, u32)],
+    sources: &[(u32, u32)],
+    kinds: &[Kind],
+    ranks: &[u32],
+    face_alike: impl Fn(u32, u32) -> bool,
+) -> BTreeMap<u32, u32> {
     let mesh_of = |triangle: u32| sources[triangle as usize].0;
-    let mut below: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-    for (mover, other) in pairs.iter().filter(|(mover, _)| kinds[mesh_of(*mover) as usize] == Kind::Sheet) {
-        below.entry(mesh_of(*mover)).or_default().push(mesh_of(*other));
+    // Whatever is nearer to the middle of all, by mesh.
+    let mut below: BTreeMap<u32, BTreeSet<u32>> = BTreeMap::new();
+    for (mover, other) in pairs {
+        let (of_mover, of_other) = (mesh_of(*mover), mesh_of(*other));
+        let is_sheet = kinds[of_mover as usize] == Kind::Sheet;
+        let under_mover = below.entry(of_mover).or_default();
+        if is_sheet {
+            under_mover.insert(of_other);
+        } else {
+            let under_other = below.entry(of_other).or_default();
+            if face_alike(*mover, *other) {
+                under_other.insert(of_mover);
+            }
+        }
     }
+    // Solids, the smallest first, then sheets, the largest first.
     let mut order: Vec<u32> = below.keys().copied().collect();
-    order.sort_by_key(|mesh| std::cmp::Reverse(ranks[*mesh as usize]));
+    order.sort_by_key(|mesh| {
+        let rank = i64::from(ranks[*mesh as usize]);
+        if kinds[*mesh as usize] == Kind::Sheet { (true, -rank) } else { (false, rank) }
+    });
     let mut levels = BTreeMap::new();
     for mesh in order {
         let highest = below[&mesh].iter().map(|other| levels.get(other).copied().unwrap_or(0)).max().unwrap_or(0);

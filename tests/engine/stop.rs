@@ -21,6 +21,8 @@ const SIZE: u32 = 8;
 const CONFIDENCE: f64 = 0.9;
 /// What claims are of the error at most, on the mean of all scenes.
 const MOST_WIDTH: f64 = 1.6;
+/// And of one scene, whose worst runs may be among these or not.
+const WIDEST: f64 = 2.5;
 
 /// Scenes of which the light is random, with every kind of lamp, surface and path. `glass-slab` has no noise: both ways at glass are followed.
 const SCENES: [&str; 9] = [
@@ -198,7 +200,7 @@ fn judge_scenes(judged: &[[f64; 2]]) {
     let [coverage, width] = [0, 1].map(|of: usize| judged.iter().map(|scene| scene[of]).sum::<f64>() / judged.len() as f64);
     println!("all scenes: coverage {coverage:.3}, the claim is {width:.2} times the error");
     assert_holds("all scenes", coverage_check("all scenes", coverage));
-    assert!(width <= MOST_WIDTH && judged.iter().all(|[_, width]| *width < 2.0), "{judged:?}");
+    assert!(width <= MOST_WIDTH && judged.iter().all(|[_, width]| *width < WIDEST), "{judged:?}");
 }
 
 /// What a scene's pixels are without the bias of the radius, and the relative error that this has: of a radius a quarter as large.

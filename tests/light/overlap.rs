@@ -789,6 +789,25 @@ fn surfaces_in_one_plane_show_what_they_do_a_millimetre_apart() {
     assert!(complaints.is_empty(), "{}", complaints.join("\n"));
 }
 
+/// Two solids of which one lies flush in the other, below a third that lies on both: whatever the order of their meshes, all is 1 in a
+/// closed room whose walls glow.
+#[test]
+fn solids_that_meet_in_one_plane_keep_the_light_of_a_furnace() {
+    let Some(gpu) = device() else { return };
+    let block = |material: usize, low: [f64; 3], high: [f64; 3]| cuboid("block", low.into(), high.into(), material);
+    let large = block(1, [0.05, 0.03, 0.05], [0.65, 0.2, 0.65]);
+    let flush = block(2, [0.2, 0.06, 0.2], [0.45, 0.2, 0.45]);
+    let above = block(3, [0.05, 0.2, 0.05], [0.65, 0.25, 0.65]);
+    let camera = Camera::looking_at("eye", DVec3::new(0.9, 0.85, 0.9), DVec3::new(0.3, 0.15, 0.3), DVec3::Y, 0.7);
+    for meshes in [[&large, &above, &flush], [&above, &flush, &large]] {
+        let mut scene = furnace_with(meshes.map(Clone::clone).to_vec(), [1.33, 1.6, 1.47].map(clear_solid).to_vec());
+        scene.materials[0] = Material { emission: Vec3::splat(0.1), ..matt(0.9) };
+        let lit = seen(&gpu, &scene, &SceneSettings { samples: 4, rounds: 16, bounces: 256, ..brief() }, &camera, [8, 8]);
+        println!("three blocks: {}", mean_red(&lit));
+        assert!((mean_red(&lit) - 1.0).abs() < 0.03, "{}", mean_red(&lit));
+    }
+}
+
 /// Light that gets through layers of these indices, outside air, straight down, however often it is reflected between them.
 fn through_layers(indices: &[f64]) -> f64 {
     let around = |k: usize| if k == 0 || k > indices.len() { 1.0 } else { indices[k - 1] };
