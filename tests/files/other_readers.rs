@@ -162,6 +162,23 @@ fn a_spot_light_may_leave_out_its_cone() {
     assert_eq!((inner_angle, outer_angle), (0.0, std::f32::consts::FRAC_PI_4));
 }
 
+/// Bytes that are announced and not there matter where something lies in them.
+#[test]
+fn only_the_bytes_that_are_used_must_be_there() {
+    let mut value = square();
+    let length = value["buffers"][0]["byteLength"].as_u64().unwrap();
+    value["buffers"][0]["byteLength"] = json!(length + 1000);
+    let views = value["bufferViews"].as_array_mut().unwrap();
+    let last = views.iter_mut().max_by_key(|view| view["byteOffset"].as_u64().unwrap_or(0)).unwrap();
+    last["byteLength"] = json!(last["byteLength"].as_u64().unwrap() + 2);
+    let scene = load(&value);
+    assert_eq!(scene.meshes[0].triangles.len(), load(&square()).meshes[0].triangles.len());
+    assert!(scene.warnings.iter().any(|text| text.contains("1000 bytes that are announced and not there")), "{:?}", scene.warnings);
+    value["bufferViews"].as_array_mut().unwrap().iter_mut().for_each(|view| view["byteOffset"] = json!(length - 4));
+    let refused = open("a.gltf", value.to_string().as_bytes()).unwrap_err().to_string();
+    assert!(refused.contains("runs past the 4 bytes of buffer view"), "{refused}");
+}
+
 /// A wider inner cone has a sharp edge, an outer cone ends at half a turn, and one of 0 lights nothing.
 #[test]
 fn cones_of_spot_lights_are_brought_into_their_range() {

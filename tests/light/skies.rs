@@ -232,6 +232,22 @@ fn channels_keep_their_light(settings: &SceneSettings) {
     }
 }
 
+/// A bright red sun, which many rays have met, leaves green and blue of its sky the errors that they have.
+#[test]
+fn a_sun_of_one_colour_leaves_the_others_their_errors() {
+    let Some(gpu) = device() else { return };
+    let colour = DVec3::new(0.0, 0.5, 0.01);
+    let red = sky(64, 32, |i, j| if (i, j) == (15, 5) { Vec3::X * 1e5 } else { colour.as_vec3() });
+    let settings = SceneSettings { rounds: 64, ..by_shadow_rays() };
+    let lit = received(&gpu, &floor_under(red), &settings, &[(DVec3::ZERO, DVec3::Y)]);
+    let (found, error) = (lit.film.mean(0), lit.film.stated_errors()(0));
+    println!("a red sun: {found} +- {error}");
+    for channel in [1, 2] {
+        let exact = PI * colour[channel];
+        assert!((found[channel] - exact).abs() < 0.05 * exact && error[channel] < 0.2 * exact, "channel {channel}: {found} +- {error}");
+    }
+}
+
 /// A sun that takes up little of a pixel: of the picture's sky itself, behind a sheet of which half is a gap, and behind the back of a sheet
 /// of one side.
 #[test]

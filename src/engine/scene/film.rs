@@ -30,6 +30,8 @@ const REACHED: u32 = u32::MAX;
 const WORTH_COUNTING: f64 = 0.1;
 /// Of all pixels, those that are told of as the worst.
 const WORST: f64 = 0.01;
+/// Hits from which on one more, of another colour than all of these, is less and less likely.
+const FEW_HITS: f64 = 16.0;
 
 /// Exact sums over blocks, three channels a pixel, in film units, and what else a run leaves of its light.
 #[derive(Debug, Clone)]
@@ -232,7 +234,8 @@ impl SceneFilm {
 
     /// The errors to be shown, by pixel: infinite where too few blocks tell it, where nothing has reached the pixel, and where a
     /// value may have been clamped. Few hits say little of the others: the next one may have in any channel what those had in the
-    /// brightest, so that much is part of the error. What no ray or photon has met is not: see [`SceneFilm::unseen_bounds`].
+    /// brightest, so that much is part of the error, and less of it the more hits there were. What no ray or photon has met is not: see
+    /// [`SceneFilm::unseen_bounds`].
     pub fn stated_errors(&self) -> impl Fn(usize) -> DVec3 {
         let is_known = self.blocks >= LEAST_BLOCKS;
         move |pixel| {
@@ -241,7 +244,9 @@ impl SceneFilm {
             }
             let (mean, error) = (self.mean(pixel), self.standard_error(pixel));
             // Of n hits the relative variance of the mean is about 1 / n.
-            let one_hit = (error * error / mean).to_array().into_iter().filter(|hit| hit.is_finite()).fold(0.0, f64::max);
+            let one_hit = |mean: f64, error: f64| error * error / mean * (FEW_HITS * (error / mean).powi(2)).min(1.0);
+            let hits = [0, 1, 2].map(|channel| one_hit(mean[channel], error[channel]));
+            let one_hit = hits.into_iter().filter(|hit| hit.is_finite()).fold(0.0, f64::max);
             error.map(|error| error.hypot(one_hit))
         }
     }

@@ -175,11 +175,11 @@ fn slice<'a>(loader: &'a Loader, view: &buffer::View, offset: usize, count: usiz
     }
 }
 
-/// The bytes of a buffer view.
+/// The bytes of a buffer view, as far as its buffer has them.
 pub(super) fn view_bytes<'a>(loader: &'a Loader, view: &buffer::View, what: &str) -> Result<&'a [u8]> {
     let buffer = &loader.buffers[view.buffer().index()];
-    let end = view.offset().checked_add(view.length());
-    end.and_then(|end| buffer.get(view.offset()..end)).ok_or_else(|| {
-        loader.refuse(what, format!("lies in buffer view {}, which runs past the {} bytes of its buffer", view.index(), buffer.len()))
+    let end = view.offset().saturating_add(view.length()).min(buffer.len());
+    buffer.get(view.offset()..end).ok_or_else(|| {
+        loader.refuse(what, format!("lies in buffer view {}, which begins past the {} bytes of its buffer", view.index(), buffer.len()))
     })
 }

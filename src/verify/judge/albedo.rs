@@ -1,7 +1,10 @@
 //! Directional albedos of GGX reflection and of sheen by quadrature, in tables that are made once.
 
+use std::array;
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::LazyLock;
+
+use glam::DVec4;
 
 use super::microfacets::{ggx_visibility, is_delta, schlick, sheen_distribution, sheen_masking};
 use crate::constants::DELTA_ALPHA_INVERSE;
@@ -96,44 +99,39 @@ fn sheen_quadrature(cosine: f64, s: f64, azimuths: &[(f64, f64)], polar: &[(f64,
     sum
 }
 
-/// Values at equal distances over a square, in rows.
+/// Values at equal distances over a square, in rows, of `N` functions.
 struct Table<const N: usize> {
-    values: Vec<[f64; N]>,
+    values: [Vec<f64>; N],
     columns: usize,
     rows: usize,
 }
 
 impl<const N: usize> Table<N> {
-    /// Of a function of two coordinates in [0, 1].
+    /// Of functions of two coordinates in [0, 1].
     fn new(columns: usize, rows: usize, of: impl Fn(f64, f64) -> [f64; N]) -> Table<N> {
         let place = |index: usize, count: usize| index as f64 / (count - 1) as f64;
-        let values = (0..columns * rows).map(|index| of(place(index % columns, columns), place(index / columns, rows)));
-        Table { values: values.collect(), columns, rows }
+        let of_all: Vec<[f64; N]> =
+            (0..columns * rows).map(|index| of(place(index % columns, columns), place(index / columns, rows))).collect();
+        Table { values: array::from_fn(|k| of_all.iter().map(|values| values[k]).collect()), columns, rows }
     }
 
     /// The cubic polynomial through the four nearest values along each axis.
     fn at(&self, x: f64, y: f64) -> [f64; N] {
         let ((column, across), (row, down)) = (cubic(x, self.columns), cubic(y, self.rows));
-        let mut sums = [0.0; N];
-        for (j, weight) in down.into_iter().enumerate() {
-            let values = &self.values[(row + j) * self.columns + column..][..4];
-            for (value, share) in values.iter().zip(across) {
-                for (sum, value) in sums.iter_mut().zip(value) {
-                    *sum += weight * share * value;
-                }
-            }
-        }
-        sums
+        self.values.each_ref().map(|values| {
+            let along = |j: usize| DVec4::from_slice(&values[(row + j) * self.columns + column..]).dot(across);
+            DVec4::new(along(0), along(1), along(2), along(3)).dot(down)
+        })
     }
 }
 
 /// The first of four places next to a coordinate in [0, 1], and Lagrange's weights.
-fn cubic(coordinate: f64, count: usize) -> (usize, [f64; 4]) {
+fn cubic(coordinate: f64, count: usize) -> (usize, DVec4) {
     let at = coordinate.clamp(0.0, 1.0) * (count - 1) as f64;
     let first = (at.floor() as usize).saturating_sub(1).min(count - 4);
     let t = at - first as f64;
     let [a, b, c, d] = [t, t - 1.0, t - 2.0, t - 3.0];
-    (first, [-b * c * d / 6.0, a * c * d / 2.0, -a * b * d / 2.0, a * b * c / 6.0])
+    (first, DVec4::new(-b * c * d / 6.0, a * c * d / 2.0, -a * b * d / 2.0, a * b * c / 6.0))
 }
 
 /// A coordinate that has steps of `scale` near 0 and even ratios above.
