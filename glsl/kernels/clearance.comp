@@ -1,5 +1,5 @@
 // How far it is from each visible point, along its surface, to what stands on it or ends it, in the direction of a rank among 8.
-// A density estimate of a larger radius would look past walls and over edges.
+// A density estimate of a larger radius would look past walls and over edges. Sheets that lie on the surface do not count.
 // Dispatched by src/engine/scene/trial.rs once, before a run, and by src/engine/scene/radius_class.rs in its first round.
 // One thread = one visible point.
 #extension GL_EXT_control_flow_attributes : require

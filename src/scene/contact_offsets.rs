@@ -13,7 +13,8 @@ use super::{Mesh, Scene};
 /// In units of the scene: four times what lies in one plane. Where rays start is known to a quarter of it.
 const OFFSET: f64 = 4.0 * IN_PLANE;
 
-/// Sheets of different materials that lie on one another, each one offset above the next; of more, the uppermost lie in one plane.
+/// Offsets that a surface is moved at most, of sheets or solids that lie on one another each one more than the next; of more, the
+/// outermost lie in one plane.
 const MOST_LEVELS: u32 = 16;
 
 /// Directions that differ by less than this sine are one: facets of a curved surface.
@@ -129,7 +130,7 @@ fn levels(
     face_alike: impl Fn(u32, u32) -> bool,
 ) -> BTreeMap<u32, u32> {
     let mesh_of = |triangle: u32| sources[triangle as usize].0;
-    // Whatever is nearer to the middle of all, by mesh.
+    // By mesh, those that it is moved further than.
     let mut below: BTreeMap<u32, BTreeSet<u32>> = BTreeMap::new();
     for (mover, other) in pairs {
         let (of_mover, of_other) = (mesh_of(*mover), mesh_of(*other));

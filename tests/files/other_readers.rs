@@ -179,7 +179,7 @@ fn only_the_bytes_that_are_used_must_be_there() {
     assert!(refused.contains("runs past the 4 bytes of buffer view"), "{refused}");
 }
 
-/// A wider inner cone has a sharp edge, an outer cone ends at half a turn, and one of 0 lights nothing.
+/// A wider inner cone has a sharp edge, an outer cone ends at half pi, and one of 0 lights nothing.
 #[test]
 fn cones_of_spot_lights_are_brought_into_their_range() {
     for (inner, outer, expected) in [

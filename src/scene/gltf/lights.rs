@@ -80,7 +80,7 @@ impl Loader {
                     self.leave_out("spot lights whose outer cone is 0 (they light nothing)", &what);
                     return Ok(());
                 }
-                // glTF wants the inner one smaller; Blender writes both alike for a sharp edge, which other readers take wider ones for too.
+                // glTF wants the inner one smaller; Blender writes both alike for a sharp edge.
                 let inner_angle = if inner_cone_angle < outer_angle { inner_cone_angle } else { SHARP * outer_angle };
                 LightKind::Spot { position, direction, intensity: strength, inner_angle, outer_angle }
             }
