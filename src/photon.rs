@@ -149,17 +149,4 @@ mod tests {
             assert_eq!(empty.stored().photon(empty.origin(), &Room::default()), empty);
         }
     }
-
-    #[test]
-    fn entries_are_small() {
-        assert_eq!([size_of::<StoredPhoton>(), size_of::<Origin>()], [16, 8]);
-    }
-
-    /// Kernels write it as two words of four.
-    #[test]
-    fn a_map_photon_is_two_words() {
-        let photon = MapPhoton { position: Vec3::new(1.0, 2.0, 3.0), plane: 4, flux: Vec3::new(5.0, 6.0, 7.0), wi: 8 };
-        let [x, y, z, r, g, b] = [1.0f32, 2.0, 3.0, 5.0, 6.0, 7.0].map(f32::to_bits);
-        assert_eq!(bytemuck::cast::<MapPhoton, [[u32; 4]; 2]>(photon), [[x, y, z, 4], [r, g, b, 8]]);
-    }
 }

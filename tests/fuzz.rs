@@ -151,9 +151,32 @@ fn plan_value(what: &str, value: &Value) -> Fate {
     in_time(what, move || plan(tempfile::tempdir().unwrap().path(), "scene.gltf", &text))
 }
 
-fn assert_refused(what: &str, value: &Value) {
-    let fate = plan_value(what, value);
-    assert!(matches!(fate, Fate::Refused(_)), "{what}: {fate:?}");
+type Change = fn(&mut Value);
+
+/// The lines by which the square is refused with each of these changes.
+fn refusals(cases: &[(&str, Change)]) -> Vec<String> {
+    let refusal = |(what, change): &(&str, Change)| {
+        let mut value = square();
+        change(&mut value);
+        match plan_value(what, &value) {
+            Fate::Refused(line) => line,
+            fate => panic!("{what}: {fate:?}"),
+        }
+    };
+    cases.iter().map(refusal).collect()
+}
+
+/// Whether a file is read, into places that are numbers, or refused in one line.
+fn reads(what: &str, value: &Value, at: Option<f64>) -> bool {
+    let text = value.to_string();
+    in_time(what, move || {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.gltf");
+        std::fs::write(&path, text).unwrap();
+        let read = Scene::open_with(path.to_str().unwrap(), Reading { radiometric: false, at }, &mut |_, _| {});
+        let read = read.inspect_err(|error| assert_eq!(error.to_string().lines().count(), 1, "{error}"));
+        read.inspect(|scene| assert!(scene.meshes.iter().flat_map(|mesh| &mesh.positions).all(|position| position.is_finite()))).is_ok()
+    })
 }
 
 /// The square by hand with more of everything: two triangles that shine through a texture, and glass, under a lamp of each kind,
@@ -232,33 +255,18 @@ fn assert_memory() {
 }
 
 /// Cases `make` makes are refused in one line or planned; neither may be all of them.
-fn survive(what: &str, count: usize, mut make: impl FnMut(&mut Random) -> Vec<u8> + Send + 'static) {
+fn survive(what: &str, count: usize, mut make: impl FnMut(&mut Random) -> Vec<u8>) {
     let name = if what.ends_with("gltf") { "a.gltf" } else { "a.glb" };
-    let (send, receive) = mpsc::channel();
-    std::thread::spawn(move || {
-        let mut random = Random(SEED);
-        let folder = tempfile::tempdir().unwrap();
-        for _ in 0..count {
-            let content = make(&mut random);
-            let fate = catch_unwind(AssertUnwindSafe(|| plan(folder.path(), name, &content)));
-            if fate.is_err() {
-                // To look at.
-                std::fs::write(std::env::temp_dir().join(format!("photonmill-fuzz-{name}")), &content).unwrap();
-            }
-            if send.send((fate.is_err(), matches!(fate, Ok(Fate::Planned(_))))).is_err() {
-                return;
-            }
-        }
-    });
-    let (mut planned, mut panics) = (0, Vec::new());
+    let (mut random, mut folder) = (Random(SEED), tempfile::tempdir().unwrap());
+    // Where a case fails, its file is there to be looked at.
+    folder.disable_cleanup(true);
+    let mut planned = 0;
     for case in 0..count {
-        let Ok((panicked, is_planned)) = receive.recv_timeout(PATIENCE) else { panic!("{what}: case {case} does not end") };
-        planned += usize::from(is_planned);
-        if panicked {
-            panics.push(case);
-        }
+        let (path, content) = (folder.path().to_owned(), make(&mut random));
+        let fate = in_time(&format!("{what}, case {case}, in {}", path.display()), move || plan(&path, name, &content));
+        planned += usize::from(matches!(fate, Fate::Planned(_)));
     }
-    assert!(panics.is_empty(), "{what}: cases {panics:?} panic, as said above; the last is in the folder for temporary files");
+    folder.disable_cleanup(false);
     assert!(planned > count / 20 && planned < count, "{what}: {planned} of {count} were planned; the mutations must matter");
     assert_memory();
 }
@@ -332,19 +340,14 @@ fn mutated_bytes_of_a_blender_file_are_planned_or_refused() {
     });
 }
 
-type Change = fn(&mut Value);
-
 /// Members that the specification asks for and a file leaves out, and nodes within themselves, through which a walk without memory
 /// takes 2^depth steps.
 #[test]
 fn documents_without_sense_are_refused() {
-    let cases: &[(&str, Change)] = &[
-        ("an image without a source", |v| v["images"][0] = json!({"name": "nothing"})),
+    refusals(&[
         ("a perspective camera without its numbers", |v| v["cameras"][0] = json!({"type": "perspective"})),
         ("a camera of the other kind", |v| v["cameras"][0]["type"] = json!("orthographic")),
-        ("a light that is not there", |v| v["nodes"][2]["extensions"]["KHR_lights_punctual"]["light"] = json!(3)),
         ("lights without a list", |v| drop(v.as_object_mut().unwrap().remove("extensions"))),
-        ("a texture without a picture", |v| drop(v["textures"][0].as_object_mut().unwrap().remove("source"))),
         ("sparse values without any", |v| v["accessors"][0]["sparse"] = json!({"count": 3})),
         ("a scene that is not there", |v| v["scene"] = json!(4)),
         ("a chain of double links", |v| {
@@ -352,26 +355,15 @@ fn documents_without_sense_are_refused() {
             v["scenes"][0]["nodes"] = json!([0]);
         }),
         ("a node three times within itself", |v| v["nodes"][0]["children"] = json!([0, 0, 0])),
-    ];
-    for (what, change) in cases {
-        let mut value = square();
-        change(&mut value);
-        assert_refused(what, &value);
-    }
-    // What other readers have a default for, or guess, is read.
-    let mut value = square();
-    value["extensions"]["KHR_lights_punctual"]["lights"][2].as_object_mut().unwrap().remove("spot");
-    assert_eq!(plan_value("a spot without cones", &value), plan_value("with them", &square()));
-    value["images"][0].as_object_mut().unwrap().remove("mimeType");
-    plan_value("an image in a buffer view without its type", &value);
+    ]);
 }
 
 /// A few bytes that claim much.
 #[test]
 fn claims_without_content_take_no_memory() {
     let before = peak_memory();
-    let cases: &[(&str, Change)] = &[
-        ("elements", |v| drop(std::mem::replace(&mut v["accessors"][0]["count"], json!(u32::MAX)))),
+    refusals(&[
+        ("elements", |v| v["accessors"][0]["count"] = json!(u32::MAX)),
         ("elements without a view", |v| {
             v["accessors"][0] = json!({"componentType": 5126, "count": 4e9 as u64, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]});
         }),
@@ -380,12 +372,7 @@ fn claims_without_content_take_no_memory() {
                 json!({"count": 4e9 as u64, "indices": {"bufferView": 3, "componentType": 5123}, "values": {"bufferView": 0}});
         }),
         ("a stride", |v| v["bufferViews"][0]["byteStride"] = json!(252)),
-    ];
-    for (what, change) in cases {
-        let mut value = square();
-        change(&mut value);
-        assert_refused(what, &value);
-    }
+    ]);
     // Of a buffer only what is used must be there.
     let mut value = square();
     value["buffers"][0]["byteLength"] = json!(1u64 << 40);
@@ -393,20 +380,6 @@ fn claims_without_content_take_no_memory() {
     if let (Some(before), Some(after)) = (before, peak_memory()) {
         assert!(after - before < 1 << 29, "{} bytes more", after - before);
     }
-}
-
-/// One picture that many textures use is unpacked once.
-#[test]
-fn textures_that_share_a_picture_share_its_memory() {
-    let png = encoded(&RgbImage::new(1024, 1024), ImageFormat::Png);
-    let mut value = square();
-    value["images"] = json!([{"uri": data_uri("image/png", &png)}]);
-    value["textures"] = json!(vec![json!({"source": 0}); 100]);
-    let material = |k: usize| json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": k}, "metallicFactor": 0}});
-    value["materials"] = json!((0..100).map(material).collect::<Vec<_>>());
-    // 100 times 12 bytes a texel would be 1.2 GB.
-    plan_value("100 textures of one picture", &value);
-    assert_memory();
 }
 
 /// Texture coordinates that lie far apart, lights far from the scene, and scenes so small or large that a light's strength in their own
@@ -440,11 +413,8 @@ fn many_equal_triangles_are_planned_or_refused() {
     let mut value = square();
     let primitive = value["meshes"][0]["primitives"][0].clone();
     value["meshes"][0]["primitives"] = json!(vec![primitive; 3000]);
-    match plan_value("6000 triangles, each 3000 times", &value) {
-        // Of each, the first is left.
-        Fate::Planned(triangles) => assert_eq!(triangles, 2),
-        Fate::Refused(line) => panic!("{line}"),
-    }
+    // Of each, the first is left.
+    assert_eq!(plan_value("6000 triangles, each 3000 times", &value), Fate::Planned(2));
 }
 
 /// Planning looks at no chunk, however many are asked for.
@@ -462,7 +432,7 @@ fn a_billion_chunks_are_planned_at_once() {
 /// A name may hold anything; a complaint stays one line.
 #[test]
 fn names_with_line_breaks_do_not_break_the_line() {
-    let cases: &[(&str, Change)] = &[
+    let lines = refusals(&[
         ("a name of several lines", |v| {
             v["nodes"][0]["name"] = json!("wall\nof\r\nmany\u{1b}[31m lines");
             v["accessors"][1]["count"] = json!(3);
@@ -471,13 +441,8 @@ fn names_with_line_breaks_do_not_break_the_line() {
         ("an extension", |v| v["extensionsRequired"] = json!(["EXT\nof\r\nlines"])),
         ("a file", |v| v["buffers"][0]["uri"] = json!("no%0Awhere.bin")),
         ("a place", |v| v["buffers"][0]["uri"] = json!("https:\n//there")),
-    ];
-    for (what, change) in cases {
-        let mut value = square();
-        change(&mut value);
-        let Fate::Refused(line) = plan_value(what, &value) else { panic!("{what} must be refused") };
-        assert!(!line.chars().any(char::is_control), "{what}: {line:?}");
-    }
+    ]);
+    assert!(!lines.concat().chars().any(char::is_control), "{lines:?}");
 }
 
 /// The square with a JPEG of eight by eight for its picture, changed.
@@ -539,12 +504,7 @@ fn every_use_of_a_large_picture_counts() {
     let value = square_with_jpeg(|jpeg| claim(jpeg, 0x4000, 0x4000));
     let Fate::Refused(line) = plan_value("16384 by 16384 texels", &value) else { panic!("must be refused") };
     assert!(line.contains("texels"), "{line}");
-    assert_memory();
-}
-
-/// A picture as long as may be is a picture.
-#[test]
-fn long_pictures_are_planned() {
+    // A picture as long as may be is a picture.
     for (width, height) in [(100_000, 1), (1, 100_000)] {
         let mut value = square();
         value["images"][0] = json!({"uri": data_uri("image/png", &encoded(&RgbImage::new(width, height), ImageFormat::Png))});
@@ -567,16 +527,10 @@ fn skies_of_any_bytes_are_read_or_refused() {
         let read = |content: &[u8]| {
             std::fs::write(&path, content).unwrap();
             let path = path.clone();
-            in_time(name, move || match Sky::read(&path) {
-                Ok(sky) => {
-                    let table = sky.table();
-                    assert!(table.integral.is_finite() && table.most_over_density.is_finite());
-                    true
-                }
-                Err(error) => {
-                    assert_eq!(error.to_string().lines().count(), 1, "{error}");
-                    false
-                }
+            in_time(name, move || {
+                let table = Sky::read(&path).map(|sky| sky.table());
+                let table = table.inspect_err(|reason| assert_eq!(reason.lines().count(), 1, "{reason}"));
+                table.inspect(|table| assert!(table.integral.is_finite() && table.most_over_density.is_finite())).is_ok()
             })
         };
         assert!(read(&whole));
@@ -601,8 +555,6 @@ fn skies_of_any_bytes_are_read_or_refused() {
 /// What extensions bring, with changed members: a scene, or one line.
 #[test]
 fn extensions_with_changed_members_are_read_or_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("a.gltf");
     let files = [
         rich_file::animated(),
         rich_file::instanced(),
@@ -619,21 +571,7 @@ fn extensions_with_changed_members_are_read_or_refused() {
         for _ in 0..1 + random.below(2) {
             change(&mut value, &mut random);
         }
-        std::fs::write(&path, value.to_string()).unwrap();
-        let path = path.clone();
-        read += usize::from(in_time(&format!("case {case}: {value}"), move || {
-            let reading = Reading { radiometric: false, at: (case % 4 == 0).then_some(1.5) };
-            match Scene::open_with(path.to_str().unwrap(), reading, &mut |_, _| {}) {
-                Ok(scene) => {
-                    assert!(scene.meshes.iter().flat_map(|mesh| &mesh.positions).all(|position| position.is_finite()));
-                    true
-                }
-                Err(error) => {
-                    assert_eq!(error.to_string().lines().count(), 1, "{error}");
-                    false
-                }
-            }
-        }));
+        read += usize::from(reads(&format!("case {case}: {value}"), &value, (case % 4 == 0).then_some(1.5)));
     }
     assert!((100..575).contains(&read), "{read}");
     assert_memory();
@@ -642,8 +580,6 @@ fn extensions_with_changed_members_are_read_or_refused() {
 /// The bytes of compressed views, changed and cut off.
 #[test]
 fn compressed_views_of_any_bytes_are_read_or_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("a.gltf");
     let whole = rich_file::compressed("KHR_meshopt_compression");
     let encoded = whole["buffers"][0]["uri"].as_str().unwrap().split_once("base64,").unwrap().1;
     let bytes = base64::Engine::decode(&base64::engine::general_purpose::STANDARD, encoded).unwrap();
@@ -656,12 +592,7 @@ fn compressed_views_of_any_bytes_are_read_or_refused() {
             changed[place] = random.below(256) as u8;
         }
         set_buffer(&mut value, &changed);
-        std::fs::write(&path, value.to_string()).unwrap();
-        let path = path.clone();
-        read += usize::from(in_time(&format!("case {case}"), move || {
-            let scene = Scene::open_with(path.to_str().unwrap(), Reading::default(), &mut |_, _| {});
-            scene.inspect_err(|error| assert_eq!(error.to_string().lines().count(), 1, "{error}")).is_ok()
-        }));
+        read += usize::from(reads(&format!("case {case}"), &value, None));
     }
     assert!((5..400).contains(&read), "{read}");
 }
@@ -733,12 +664,19 @@ fn photon_map(path: &Path) {
     writer.finish().unwrap();
 }
 
-/// What a file with a hash of its own becomes with another header: where its header is, what stands before and behind its length, and
-/// what it is a hash of, are the caller's.
-fn with_header(header: &[u8], random: &mut Random, pack: impl Fn(&[u8]) -> Vec<u8>) -> Vec<u8> {
-    let mut value: Value = serde_json::from_slice(header).unwrap();
-    (0..=random.below(2)).for_each(|_| change(&mut value, random));
-    pack(&serde_json::to_vec(&value).unwrap())
+/// Changes members of a header. `take` packs it into a file, whose hash is right, and uses that, or has the line by which it is refused.
+fn change_headers(header: &[u8], take: impl Fn(&[u8]) -> Result<(), String>) {
+    let mut random = Random(SEED);
+    let mut taken = 0;
+    for _ in 0..600 {
+        let mut value: Value = serde_json::from_slice(header).unwrap();
+        (0..=random.below(2)).for_each(|_| change(&mut value, &mut random));
+        match take(&serde_json::to_vec(&value).unwrap()) {
+            Ok(()) => taken += 1,
+            Err(line) => assert!(!line.is_empty() && line.lines().count() == 1, "{line}"),
+        }
+    }
+    assert!((41..560).contains(&taken), "{taken} of 600 are taken");
 }
 
 /// Checkpoints whose header says anything, with a checksum that is right: refused in one line, or of use.
@@ -749,27 +687,13 @@ fn checkpoints_of_any_header_are_refused_or_of_use() {
         assert!(SavedRun::from_bytes(&whole).unwrap() == saved);
         let length = u64::from_le_bytes(whole[16..24].try_into().unwrap()) as usize;
         let (header, arrays) = whole[24..whole.len() - 32].split_at(length);
-        let mut random = Random(SEED);
-        let (mut taken, mut refused) = (0, 0);
-        for _ in 0..600 {
-            let bytes = with_header(header, &mut random, |header| {
-                let mut bytes = [&whole[..16], &(header.len() as u64).to_le_bytes(), header, arrays].concat();
-                let checksum = Sha256::digest(&bytes);
-                bytes.extend_from_slice(&checksum);
-                bytes
-            });
-            match SavedRun::from_bytes(&bytes) {
-                Ok(run) => {
-                    taken += 1;
-                    use_run(&run, &saved);
-                }
-                Err(line) => {
-                    refused += 1;
-                    assert!(!line.is_empty() && line.lines().count() == 1, "{line}");
-                }
-            }
-        }
-        assert!(taken > 40 && refused > 40, "{taken} taken, {refused} refused");
+        change_headers(header, |header| {
+            let mut bytes = [&whole[..16], &(header.len() as u64).to_le_bytes(), header, arrays].concat();
+            let checksum = Sha256::digest(&bytes);
+            bytes.extend_from_slice(&checksum);
+            use_run(&SavedRun::from_bytes(&bytes)?, &saved);
+            Ok(())
+        });
     }
 }
 
@@ -796,30 +720,18 @@ fn photon_maps_of_any_header_are_refused_or_of_use() {
     let whole = std::fs::read(&path).unwrap();
     let tail = whole.len() - 56;
     let start = tail - u64::from_le_bytes(whole[tail..tail + 8].try_into().unwrap()) as usize;
-    let mut random = Random(SEED);
-    let (mut taken, mut refused) = (0, 0);
-    for _ in 0..600 {
-        let bytes = with_header(&whole[start..tail], &mut random, |header| {
-            [&whole[..start], header, &(header.len() as u64).to_le_bytes(), &Sha256::digest(header), &whole[..16]].concat()
-        });
+    change_headers(&whole[start..tail], |header| {
+        let bytes = [&whole[..start], header, &(header.len() as u64).to_le_bytes(), &Sha256::digest(header), &whole[..16]].concat();
         std::fs::write(&path, bytes).unwrap();
-        match MapFile::open("--map", &path) {
-            Ok(map) => {
-                taken += 1;
-                let _ = (photonmill::output::photon_map::text(&map.header), photonmill::output::photon_map::json(&map.header));
-                for round in 0..map.rounds() {
-                    for of_map in &map.header.maps {
-                        // Checksums may be wrong now.
-                        let _ = map.photons(round, &of_map.name, 2, 100, &mut |_| Ok(()));
-                    }
-                }
-            }
-            Err(error) => {
-                refused += 1;
-                let line = error.to_string();
-                assert_eq!((error.exit_code(), line.lines().count()), (2, 1), "{line}");
+        let opened = MapFile::open("--map", &path).inspect_err(|error| assert_eq!(error.exit_code(), 2, "{error}"));
+        let map = opened.map_err(|error| error.to_string())?;
+        let _ = (photonmill::output::photon_map::text(&map.header), photonmill::output::photon_map::json(&map.header));
+        for round in 0..map.rounds() {
+            for of_map in &map.header.maps {
+                // Checksums may be wrong now.
+                let _ = map.photons(round, &of_map.name, 2, 100, &mut |_| Ok(()));
             }
         }
-    }
-    assert!(taken > 40 && refused > 40, "{taken} taken, {refused} refused");
+        Ok(())
+    });
 }

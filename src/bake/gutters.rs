@@ -67,24 +67,3 @@ pub fn nearest(width: u32, height: u32, texels: impl IntoIterator<Item = (u32, u
 fn square(x: f64) -> f64 {
     x * x
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn gutters_take_the_nearest_texel() {
-        let (width, height) = (29, 17);
-        let texels: Vec<(u32, u32)> = (0..width * height)
-            .filter(|place| place * 7919 % 101 < 3 || (4..7).contains(&(place % width)) && place / width > 9)
-            .map(|place| (place % width, place / width))
-            .collect();
-        assert!(texels.len() > 20 && texels.len() < 100, "{}", texels.len());
-        let found = nearest(width, height, texels.iter().copied());
-        for place in 0..width * height {
-            let distance = |(x, y): &(u32, u32)| x.abs_diff(place % width).pow(2) + y.abs_diff(place / width).pow(2);
-            let least = texels.iter().map(distance).min().unwrap();
-            assert_eq!(distance(&texels[found[place as usize] as usize]), least, "texel {place}");
-        }
-    }
-}

@@ -100,32 +100,3 @@ impl PaperArgs {
 const MAX_LARGE: u32 = 1 << 31;
 const MAX_REPEATS: u32 = 1000;
 const MAX_THREADS: usize = 1024;
-
-#[cfg(test)]
-mod tests {
-    use clap::Parser;
-
-    use crate::cli::Cli;
-    use crate::output::command;
-    use crate::rng::Rng;
-    use crate::settings::{Builder, Gather, Preset, RoomSettings};
-
-    /// The page prints the command that repeats each experiment, so it must mean what was run.
-    #[test]
-    fn printed_commands_give_the_settings_they_stand_for() {
-        for preset in [Preset::Naive, Preset::Modified, Preset::Phong, Preset::Rounds] {
-            let defaults = RoomSettings::preset(preset);
-            let full_light = defaults.full_light_for(65_536);
-            for settings in [
-                defaults.clone(),
-                RoomSettings { builder: Builder::Cpu, threads: 3, bounces: 7, gather: Gather::Brute, ..defaults.clone() },
-                RoomSettings { photons: 65_536, full_light, rng: Rng::Philox, rounds: 5, ..defaults.clone() },
-                RoomSettings { shininess: [Some(0.01); 5], ..defaults.clone() },
-            ] {
-                let line = command::main_job(preset, &settings);
-                let Ok(cli) = Cli::try_parse_from(line.split_whitespace()) else { panic!("{line} cannot be parsed") };
-                assert_eq!(cli.run.settings(), settings, "{line}");
-            }
-        }
-    }
-}

@@ -165,15 +165,3 @@ fn read_points(path: &Path) -> Result<Vec<(DVec3, DVec3)>> {
     }
     Ok(points)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn points_may_follow_a_mark_of_the_byte_order() {
-        let file = tempfile::NamedTempFile::new().unwrap();
-        std::fs::write(file.path(), "\u{feff}1 2 3 0 0 2\n").unwrap();
-        assert_eq!(read_points(file.path()).unwrap(), [(DVec3::new(1.0, 2.0, 3.0), DVec3::Z)]);
-    }
-}

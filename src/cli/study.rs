@@ -115,15 +115,30 @@ mod tests {
     use super::super::{Cli, Command};
     use crate::measure::study::axes::{self, Group, Line};
     use crate::output::command;
-    use crate::settings::Preset;
+    use crate::rng::Rng;
     use crate::settings::scene::Effect;
+    use crate::settings::{Builder, Gather, Preset, RoomSettings};
 
     fn parse(line: &str) -> Cli {
         Cli::try_parse_from(line.split(' ')).unwrap_or_else(|error| panic!("{line}: {error}"))
     }
 
+    /// Pages print the command that repeats each experiment, so it must mean what was run.
     #[test]
     fn printed_commands_give_the_settings_they_stand_for() {
+        for preset in [Preset::Naive, Preset::Modified, Preset::Phong, Preset::Rounds] {
+            let defaults = RoomSettings::preset(preset);
+            let full_light = defaults.full_light_for(65_536);
+            for settings in [
+                defaults.clone(),
+                RoomSettings { builder: Builder::Cpu, threads: 3, bounces: 7, gather: Gather::Brute, ..defaults.clone() },
+                RoomSettings { photons: 65_536, full_light, rng: Rng::Philox, rounds: 5, ..defaults.clone() },
+                RoomSettings { shininess: [Some(0.01); 5], ..defaults },
+            ] {
+                let line = command::main_job(preset, &settings);
+                assert_eq!(parse(&line).run.settings(), settings, "{line}");
+            }
+        }
         let groups: Vec<Group> =
             [axes::of_paper(12, 8192), axes::of_the_papers_rounds(12), axes::of_scene(8192, &Effect::ALL, Some(0.1), true, true)].concat();
         let configurations: Vec<_> = groups.iter().flat_map(|group| &group.configurations).collect();
@@ -134,7 +149,7 @@ mod tests {
                     let line = command::main_job(Preset::Modified, settings);
                     let parsed = parse(&line).run.settings();
                     // Full light is of the paper's picture, which no study looks at.
-                    assert_eq!(crate::settings::RoomSettings { full_light: settings.full_light, ..parsed }, *settings, "{line}");
+                    assert_eq!(RoomSettings { full_light: settings.full_light, ..parsed }, *settings, "{line}");
                 }
                 Line::Scene(settings) => {
                     let line = command::on_scene("render open-box -o picture.exr", settings);

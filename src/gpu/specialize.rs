@@ -321,17 +321,19 @@ mod tests {
         instructions(words).filter(|instruction| opcode(instruction) == op::LABEL).map(|label| label[1]).collect()
     }
 
+    const EQUAL: &str = "%condition = OpSpecConstantOp %bool IEqual %number %two";
+    const OPEN: &str = "%undefined = OpUndef %bool\n%condition = OpSpecConstantOp %bool LogicalEqual %undefined %flag";
+
     #[test]
     fn branches_go_where_their_constants_say() {
-        let equal = "%condition = OpSpecConstantOp %bool IEqual %number %two";
         let both = "%other = OpSpecConstantOp %bool LogicalNot %flag
                     %large = OpSpecConstantOp %bool UGreaterThan %number %two
                     %condition = OpSpecConstantOp %bool LogicalAnd %large %other";
         for (condition, constants, expected) in [
-            (equal, &[][..], true),
-            (equal, &[(3, 2)][..], true),
-            (equal, &[(3, 1)][..], false),
-            (equal, &[(7, 1)][..], true),
+            (EQUAL, &[][..], true),
+            (EQUAL, &[(3, 2)][..], true),
+            (EQUAL, &[(3, 1)][..], false),
+            (EQUAL, &[(7, 1)][..], true),
             (both, &[][..], false),
             (both, &[(3, 3)][..], true),
             (both, &[(3, 3), (7, 1)][..], false),
@@ -354,7 +356,6 @@ mod tests {
     /// Whatever no block that is reached names changes no content; all else does.
     #[test]
     fn the_content_is_what_is_left() {
-        let condition = "%condition = OpSpecConstantOp %bool IEqual %number %two";
         let digest = |words: &[u32], constants: &[(u32, u32)]| content(&decided(words, constants), constants);
         let whole = |condition: &str| {
             let mut words = module(condition);
@@ -364,22 +365,20 @@ mod tests {
             words.splice(place..place, [first_word(op::ENTRY_POINT, 4), 5, function, 0]);
             words
         };
-        let words = whole(condition);
+        let words = whole(EQUAL);
         let same = digest(&words, &[(3, 1), (7, 0)]);
         assert_eq!(digest(&words, &[(3, 1), (7, 1)]), same, "nothing names %flag");
         assert_eq!(digest(&words, &[(3, 4), (7, 1)]), same, "no block that is left names %number");
         assert_ne!(digest(&words, &[(3, 2)]), same, "the other way");
-        let open = "%undefined = OpUndef %bool\n%condition = OpSpecConstantOp %bool LogicalEqual %undefined %flag";
-        let words = whole(open);
+        let words = whole(OPEN);
         assert_ne!(digest(&words, &[(7, 0)]), digest(&words, &[(7, 1)]), "the condition names %flag");
         assert_eq!(digest(&words, &[(3, 0)]), digest(&words, &[(3, 1)]), "and not %number");
     }
 
     #[test]
     fn what_is_not_known_stays_open() {
-        let compared = "%undefined = OpUndef %bool\n%condition = OpSpecConstantOp %bool LogicalEqual %undefined %flag";
         let unusual = "%condition = OpSpecConstantOp %bool Select %flag %flag %flag";
-        for condition in [compared, unusual] {
+        for condition in [OPEN, unusual] {
             let words = module(condition);
             assert_eq!(decided(&words, &[(3, 1), (7, 1)]), words);
         }

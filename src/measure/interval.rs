@@ -139,23 +139,26 @@ fn quantile(freedom: f64) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::rng::philox;
 
-    fn normal(trial: u32, draw: u32) -> f64 {
-        let uniform = philox([trial, draw, 0, 0], [7, 1]).map(|word| (f64::from(word) + 0.5) / 4_294_967_296.0);
+    pub fn normal(key: [u32; 2], trial: u32, draw: u32) -> f64 {
+        let uniform = philox([trial, draw, 0, 0], key).map(|word| (f64::from(word) + 0.5) / 4_294_967_296.0);
         (-2.0 * uniform[0].ln()).sqrt() * (std::f64::consts::TAU * uniform[1]).cos()
     }
 
+    const KEY: [u32; 2] = [7, 1];
+
     /// Times around `median` whose logarithms have this standard deviation.
     fn times(trial: u32, first: u32, count: u32, median: f64, deviation: f64) -> Vec<f64> {
-        (first..first + count).map(|draw| median * (deviation * normal(trial, draw)).exp()).collect()
+        (first..first + count).map(|draw| median * (deviation * normal(KEY, trial, draw)).exp()).collect()
     }
 
     const TRIALS: u32 = 4000;
 
-    fn coverage(truth: f64, interval: impl Fn(u32) -> Interval) -> f64 {
+    /// Of this many trials, the share whose interval holds the truth.
+    pub fn coverage(truth: f64, interval: impl Fn(u32) -> Interval) -> f64 {
         let holds = |trial: &u32| (interval(*trial).low..=interval(*trial).high).contains(&truth);
         f64::from((0..TRIALS).filter(holds).count() as u32) / f64::from(TRIALS)
     }
@@ -175,7 +178,7 @@ mod tests {
         }
         // Points with normal errors around a line of slope 1.
         let held = coverage(1.0, |trial| {
-            let points: Vec<(f64, f64)> = (0..5).map(|x| (f64::from(x), f64::from(x) + 0.1 * normal(trial, x))).collect();
+            let points: Vec<(f64, f64)> = (0..5).map(|x| (f64::from(x), f64::from(x) + 0.1 * normal(KEY, trial, x))).collect();
             Interval::of_slope(&LineFit::of(&points).unwrap(), points.len())
         });
         assert!((held - CONFIDENCE).abs() < 0.0104, "slopes: {held}");
@@ -185,7 +188,7 @@ mod tests {
     #[test]
     fn shares_are_covered() {
         let held = coverage(0.5, |trial| {
-            let heads = (0..100).filter(|draw| normal(trial, *draw) > 0.0).count();
+            let heads = (0..100).filter(|draw| normal(KEY, trial, *draw) > 0.0).count();
             Interval::of_share(heads as f64 / 100.0, 100.0)
         });
         assert!(held >= CONFIDENCE, "{held}");
@@ -199,6 +202,7 @@ mod tests {
         for interval in [Interval::of_ratio(&three, &two), Interval::of_ratio(&two, &three), Interval::of_geometric_mean(&two)] {
             assert!(!interval.is_bounded() && interval.above(0.01) == Decision::Undecided, "{interval:?}");
         }
+        assert_eq!(LineFit::of(&[(0.0, 0.0)]), None);
         let fit = LineFit::of(&[(0.0, 0.0), (1.0, 1.0)]).unwrap();
         assert_eq!(Interval::of_slope(&fit, 2).within(0.9, 1.1), Decision::Undecided);
         assert_eq!(Interval::of_ratio(&three, &[1.0, 1.01, 1.02]).above(1.1), Decision::Yes);

@@ -29,16 +29,3 @@ impl LineFit {
         self.intercept + self.slope * x
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_power_law_gives_its_exponent() {
-        let points: Vec<(f64, f64)> = (1..6).map(|x| (f64::from(x), 3.0 * f64::from(x).powf(1.5))).collect();
-        let fit = LineFit::of_logarithms(&points).unwrap();
-        assert!((fit.slope - 1.5).abs() < 1e-12 && (fit.intercept - 3f64.ln()).abs() < 1e-12 && fit.slope_error < 1e-9, "{fit:?}");
-        assert_eq!(LineFit::of_logarithms(&points[..1]), None);
-    }
-}

@@ -419,15 +419,6 @@ mod tests {
     }
 
     #[test]
-    fn folders_are_made_when_they_are_filled() {
-        let parent = tempfile::tempdir().unwrap();
-        let folder = Folder::open("--irradiance", &parent.path().join("a/b")).unwrap();
-        assert_eq!(std::fs::read_dir(parent.path()).unwrap().count(), 0);
-        write_all(vec![(folder.file("c"), b"d".to_vec())]).unwrap();
-        assert_eq!(std::fs::read(folder.path().join("c")).unwrap(), b"d");
-    }
-
-    #[test]
     fn a_file_whose_folder_goes_away_is_saved_in_another() {
         let parent = tempfile::tempdir().unwrap();
         let folder = parent.path().join("a");
@@ -439,22 +430,6 @@ mod tests {
         let Err(Error::Saved { folder, .. }) = staged.finish() else { panic!("nothing was saved") };
         assert_eq!(std::fs::read(folder.join("output/photons.pm")).unwrap(), b"photons");
         std::fs::remove_dir_all(folder).unwrap();
-    }
-
-    #[test]
-    fn two_outputs_may_not_share_a_file() {
-        let folder = tempfile::tempdir().unwrap();
-        let at = |option, name: &str| Destination { option, path: folder.path().join(name) };
-        assert!(check_distinct(&[at("--json", "a"), at("--trace", "b")]).is_ok());
-        let error = check_distinct(&[at("--json", "a"), at("--trace", "./a")]).unwrap_err().to_string();
-        assert!(error.contains("--json") && error.contains("--trace"), "{error}");
-    }
-
-    #[cfg(target_os = "linux")]
-    #[test]
-    fn a_folder_that_takes_no_files_is_called_so() {
-        let error = Destination::open("-o", Path::new("/proc/a.png")).unwrap_err().to_string();
-        assert!(error.contains("no file can be made there") && !error.contains("no such file"), "{error}");
     }
 
     #[cfg(unix)]

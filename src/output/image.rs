@@ -212,16 +212,16 @@ impl Picture {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::scene::open_box::open_box;
     use crate::settings::RoomSettings;
 
-    /// Walls that shine with 0.1 times their face number plus one.
-    fn numbered_walls(scene: &RoomScene) -> Vec<WallEstimate> {
+    /// Walls of this illumination by face and texel.
+    pub(crate) fn walls_of(scene: &RoomScene, texels: usize, of_texel: impl Fn(usize, usize) -> f64) -> Vec<WallEstimate> {
         let wall = |face: usize, name| {
-            let illumination = vec![0.1 * (face + 1) as f64; 16];
-            let none = vec![0.0; illumination.len()];
+            let illumination: Vec<f64> = (0..texels).map(|texel| of_texel(face, texel)).collect();
+            let none = vec![0.0; texels];
             let (radiosity, irradiance) = (illumination.clone(), illumination.clone());
             WallEstimate { name, face, illumination, radiosity, irradiance, radiosity_error: none.clone(), irradiance_error: none }
         };
@@ -231,7 +231,7 @@ mod tests {
     #[test]
     fn walls_stand_where_they_belong() {
         let scene = open_box(&RoomSettings::default());
-        let walls = numbered_walls(&scene);
+        let walls = walls_of(&scene, 16, |face, _| 0.1 * (face + 1) as f64);
         let unfolded = unfolded(&scene, &walls);
         let at = |column: usize, row: usize| {
             let (i, j) = (column * WALL_PIXELS + WALL_PIXELS / 2, row * WALL_PIXELS + WALL_PIXELS / 2);

@@ -72,16 +72,7 @@ mod tests {
         for pixel in 0..30u32 {
             let (first, count) = (of_pixels[2 * pixel as usize], of_pixels[2 * pixel as usize + 1]);
             let (x, y) = (pixel % 6, pixel / 6);
-            assert_eq!(
-                count,
-                if y == 4 && x < 4 {
-                    2
-                } else if y < 4 && x >= 4 {
-                    14
-                } else {
-                    0
-                }
-            );
+            assert_eq!(count, [[0, 14], [2, 0]][usize::from(y == 4)][usize::from(x >= 4)], "{x}, {y}");
             assert!((first..first + count).all(|sample| pixels[sample as usize] == pixel));
         }
         let text = serde_json::to_string(&tiles).unwrap();

@@ -344,10 +344,8 @@ mod tests {
     /// Where the light changes little by little, a region knows what there is round about it.
     #[test]
     fn shadows_that_end_beyond_a_region_are_not_unseen() {
-        let found: Vec<[f32; 3]> = (0..64).map(|k| if k % 32 < 16 { [1.0, 0.5, 0.0] } else { [0.1, 0.5, 0.0] }).collect();
-        let found: Vec<[f32; 3]> =
-            found.into_iter().enumerate().map(|(k, [a, b, c])| if k < 8 { [0.0, b, c] } else { [a, b, c] }).collect();
-        let samples = row(&found, Vec3::Y);
+        let of_first = |k: u32| if k % 32 < 16 { f32::from(k >= 8) } else { 0.1 };
+        let samples = row(&(0..64).map(|k| [of_first(k), 0.5, 0.0]).collect::<Vec<_>>(), Vec3::Y);
         let (regions, leaves) = regions(&samples, 8);
         let first = &leaves[region_of(&regions, [0.0; 6]) as usize];
         assert_eq!((first[0].len(), first[1].len()), (8, 64));

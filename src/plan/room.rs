@@ -342,16 +342,8 @@ mod tests {
     fn several_counters_serve_many_photons_of_the_atomic_builder() {
         let limits = Limits { buffer_bytes: 1 << 32, memory_bytes: 1 << 36, counters: 8, ..Limits::of_host() };
         let counters = |photons, builder, counters| {
-            let settings = RoomSettings {
-                photons,
-                builder,
-                counters,
-                bounces: 2,
-                chunk: Some(photons),
-                mesh: 1,
-                rng: Rng::Philox,
-                ..RoomSettings::default()
-            };
+            let small = RoomSettings { bounces: 2, mesh: 1, rng: Rng::Philox, ..RoomSettings::default() };
+            let settings = RoomSettings { photons, builder, counters, chunk: Some(photons), ..small };
             RoomPlan::new(&open_box(&settings), &settings, &limits).unwrap().counters
         };
         assert_eq!([1000, (1 << 21) - 1, 1 << 21, 1 << 24].map(|photons| counters(photons, Builder::Atomic, None)), [1, 1, 8, 8]);
@@ -390,27 +382,6 @@ mod tests {
         }
     }
 
-    /// Whatever the split, every photon of the round is in one chunk, and every chunk holds each
-    /// light's share.
-    #[test]
-    fn chunks_partition_the_round() {
-        for (photons, chunk) in [(5000, None), (5000, Some(64)), (5001, Some(7)), (11, Some(2))] {
-            let settings = RoomSettings { photons, chunk, ..RoomSettings::preset(Preset::Modified) };
-            let plan = RoomPlan::new(&open_box(&settings), &settings, &Limits::of_host()).unwrap();
-            let mut seen = vec![0; photons as usize];
-            for chunk in 0..plan.chunks_per_round {
-                let ranges = plan.chunk(chunk);
-                assert!(photons_of(&ranges) <= plan.path_capacity);
-                for range in ranges {
-                    let light = usize::from(range.first_photon >= plan.light_photons[0]);
-                    assert_eq!(range.light as usize, light);
-                    (0..range.count).for_each(|k| seen[(range.first_photon + k) as usize] += 1);
-                }
-            }
-            assert!(seen.iter().all(|count| *count == 1), "{photons} photons, chunks of {chunk:?}");
-        }
-    }
-
     /// Photons and points of a wall share its coordinate across it to the bit: the grid's gather counts on it, and stored
     /// photons do without it.
     #[test]
@@ -446,22 +417,31 @@ mod tests {
         }
     }
 
-    /// Whatever the split, each light numbers its photons of all rounds without gaps.
+    /// Whatever the split, each light numbers its photons of all rounds without gaps: every photon of a round is in one chunk, and every
+    /// chunk holds each light's share.
     #[test]
     fn lights_number_their_photons_without_gaps() {
-        for chunk in [None, Some(64)] {
-            let settings =
-                RoomSettings { photons: 5001, chunk, rounds: 3, light_power: [2.0, 1.0], ..RoomSettings::preset(Preset::Modified) };
+        let (even, uneven) = ([1.0; 2], [2.0, 1.0]);
+        for (photons, chunk, light_power) in [
+            (5000, None, even),
+            (5000, Some(64), even),
+            (5001, Some(7), even),
+            (11, Some(2), even),
+            (5001, None, uneven),
+            (5001, Some(64), uneven),
+        ] {
+            let settings = RoomSettings { photons, chunk, rounds: 3, light_power, ..RoomSettings::preset(Preset::Modified) };
             let plan = RoomPlan::new(&open_box(&settings), &settings, &Limits::of_host()).unwrap();
             let mut samples = [Vec::new(), Vec::new()];
             for (round, ranges) in (0..settings.rounds).flat_map(|round| plan.chunks().map(move |ranges| (round, ranges))) {
+                assert!(photons_of(&ranges) <= plan.path_capacity);
                 for range in ranges {
                     let first = plan.first_sample(round, &range);
                     samples[range.light as usize].extend(first..first + range.count);
                 }
             }
             for (samples, count) in samples.iter().zip(&plan.light_photons) {
-                assert!(samples.iter().copied().eq(0..settings.rounds * count), "chunks of {chunk:?}");
+                assert!(samples.iter().copied().eq(0..settings.rounds * count), "{photons} photons, chunks of {chunk:?}");
             }
         }
     }

@@ -483,15 +483,8 @@ mod tests {
 
     #[test]
     fn photons_go_where_the_noise_is() {
-        let of_map = |of_round: f64, share: f64| MapVariance {
-            of_round,
-            at: BEFORE.global(),
-            sample_power: 0.0,
-            share,
-            bias: USUAL_BIAS[0],
-            uncertainty: USUAL_UNCERTAINTY,
-            widest: Some(100.0),
-        };
+        let map = MapVariance { at: BEFORE.global(), bias: USUAL_BIAS[0], uncertainty: USUAL_UNCERTAINTY, ..MapVariance::default() };
+        let of_map = |of_round: f64, share: f64| MapVariance { of_round, share, widest: Some(100.0), ..map };
         let variance = Variance { path: 0.1, global: of_map(0.05, 0.5), caustic: of_map(1e-4, 0.01), ..Variance::default() };
         let found = rounds(variance, Cost { round: 1e6, paths: 1e6, shadow_rays: 1e5, photons: [5.0; 2], ..Cost::default() });
         let of = |error: f64| best(&found, BEFORE, Free::ALL, &goal(error), (MOST_SAMPLES, MOST_PHOTONS));

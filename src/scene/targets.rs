@@ -194,23 +194,20 @@ mod tests {
     use super::*;
     use crate::scene::{Material, Mesh, Scene, Surface, built_in};
 
-    /// Those of a geometry's materials that are mirrors or glass.
-    fn mirrors_and_glass(geometry: &Geometry) -> Vec<bool> {
-        geometry.materials.iter().map(|material| matches!(material.surface, SURFACE_MIRROR | SURFACE_DIELECTRIC)).collect()
-    }
-
-    fn of_balls(balls: &[(DVec3, f64)]) -> Geometry {
+    fn balls(balls: impl Iterator<Item = (DVec3, f64)>) -> Scene {
         let mirror = Material { surface: Surface::Mirror, ..Material::lambert("mirror", Vec3::ONE) };
-        let meshes = balls.iter().map(|(centre, radius)| Mesh::sphere("ball", *centre, *radius, 12, 0)).collect();
-        Geometry::new(&Scene { meshes, materials: vec![mirror], ..Scene::default() }).unwrap()
+        let meshes = balls.map(|(centre, radius)| Mesh::sphere("ball", centre, radius, 12, 0)).collect();
+        Scene { meshes, materials: vec![mirror], ..Scene::default() }
     }
 
-    /// Fails unless every corner of what makes caustics lies in a sphere, with room to spare.
-    fn assert_held(geometry: &Geometry, targets: &[CausticTarget]) {
+    /// The spheres around mirrors and glass of a scene. Fails unless every corner of what makes caustics lies in one, with room to spare.
+    fn held(scene: &Scene) -> (Geometry, Vec<CausticTarget>) {
+        let geometry = Geometry::new(scene).unwrap();
+        let surfaces = geometry.materials.iter().map(|material| material.surface);
+        let is_wanted: Vec<bool> = surfaces.map(|surface| matches!(surface, SURFACE_MIRROR | SURFACE_DIELECTRIC)).collect();
+        let targets = caustic_targets(&geometry, &is_wanted);
         assert!(targets.len() <= MAX_TARGETS);
-        for triangle in
-            geometry.triangles.iter().filter(|triangle| geometry.materials[triangle.material as usize].surface >= SURFACE_MIRROR)
-        {
+        for triangle in geometry.triangles.iter().filter(|triangle| is_wanted[triangle.material as usize]) {
             // A triangle may only lie in one sphere, or part of it could lie in none.
             let holds = |target: &CausticTarget| {
                 let is_in = |corner: Vec3| corner.as_dvec3().distance(target.centre.as_dvec3()) < f64::from(target.radius) - 0.5 * MARGIN;
@@ -218,18 +215,18 @@ mod tests {
             };
             assert!(targets.iter().any(holds), "{triangle:?} is in none of {targets:?}");
         }
+        (geometry, targets)
+    }
+
+    fn of_built_in(name: &str) -> (Geometry, Vec<CausticTarget>) {
+        held(&built_in::by_name(name).unwrap())
     }
 
     #[test]
     fn each_ball_has_a_tight_sphere_of_its_own() {
-        for (name, balls) in [("cornell-spheres", 2), ("caustic-sphere", 1), ("cornell", 0)] {
-            let geometry = Geometry::new(&built_in::by_name(name).unwrap()).unwrap();
-            let targets = caustic_targets(&geometry, &mirrors_and_glass(&geometry));
-            assert_eq!(targets.len(), balls, "{name}");
-            assert_held(&geometry, &targets);
-        }
-        let spheres = Geometry::new(&built_in::by_name("cornell-spheres").unwrap()).unwrap();
-        for target in caustic_targets(&spheres, &mirrors_and_glass(&spheres)) {
+        assert_eq!(["cornell-spheres", "caustic-sphere", "cornell"].map(|name| of_built_in(name).1.len()), [2, 1, 0]);
+        let (spheres, targets) = of_built_in("cornell-spheres");
+        for target in targets {
             let radius = f64::from(target.radius) * spheres.unit;
             assert!((0.18..0.1802).contains(&radius), "{radius}");
         }
@@ -238,32 +235,20 @@ mod tests {
         assert!(caustic_targets(&spheres, &vec![false; mirrors.len()]).is_empty());
     }
 
-    /// Eight balls in the corners of a cube have one each; packed side by side they share.
+    /// Eight balls in the corners of a cube have one each; packed side by side they share; and many are held by few.
     #[test]
     fn distant_balls_are_kept_apart_and_close_ones_merged() {
-        let cube = |edge: f64| -> Vec<(DVec3, f64)> {
-            let place = |k: u32| edge * DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2));
-            (0..8).map(|k| (place(k), 0.1)).collect()
-        };
         for (edge, count) in [(2.0, 8), (0.05, 1)] {
-            let geometry = of_balls(&cube(edge));
-            let targets = caustic_targets(&geometry, &mirrors_and_glass(&geometry));
-            assert_eq!(targets.len(), count, "{edge} m apart");
-            assert_held(&geometry, &targets);
+            let place = |k: u32| edge * DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2));
+            assert_eq!(held(&balls((0..8).map(|k| (place(k), 0.1)))).1.len(), count, "{edge} m apart");
         }
-    }
-
-    #[test]
-    fn many_balls_are_held_by_few_spheres() {
         let place = |k: u32| DVec3::new(f64::from(k % 7), f64::from(k / 7 % 5), f64::from(k / 35));
-        let geometry = of_balls(&(0..175).map(|k| (place(k), 0.05 + 0.002 * f64::from(k % 13))).collect::<Vec<_>>());
-        assert_held(&geometry, &caustic_targets(&geometry, &mirrors_and_glass(&geometry)));
+        held(&balls((0..175).map(|k| (place(k), 0.05 + 0.002 * f64::from(k % 13)))));
     }
 
     #[test]
     fn a_lamp_far_off_sends_a_small_share_and_one_within_sends_all() {
-        let geometry = Geometry::new(&built_in::by_name("caustic-sphere").unwrap()).unwrap();
-        let targets = caustic_targets(&geometry, &mirrors_and_glass(&geometry));
+        let (geometry, targets) = of_built_in("caustic-sphere");
         let (least, most) = aimed_shares(&geometry, &targets);
         // About the solid angle over pi of a ball of 0.25 m, 1.2 m off.
         assert!(0.035 < least && least <= most && most < 0.055, "{least}, {most}");

@@ -148,18 +148,9 @@ mod tests {
         assert_eq!(run.options(&SceneSettings::default()), []);
     }
 
-    /// Fewer photons leave the box as bright.
+    /// A radius of twice the width holds four times the photons; light of the box stays as bright, and so it does with fewer photons.
     #[test]
-    fn the_box_is_as_bright_with_other_photons() {
-        let of_box = RoomSettings::default();
-        let run = RunChoices::of(&Subject::Box(Box::new(of_box.clone())), Some(of_box.photons / 5), "cpu");
-        let settings = run.of_box(&of_box);
-        assert_eq!((settings.photons, settings.full_light), (of_box.photons / 5, of_box.full_light / 5.0));
-    }
-
-    /// A radius of twice the width holds four times the photons; light of the box stays as bright.
-    #[test]
-    fn radii_are_scaled_by_what_they_hold() {
+    fn radii_and_photons_keep_the_brightness() {
         let mut run = choices();
         run.scale_radius(2.0);
         let usual = SceneSettings::default();
@@ -167,5 +158,7 @@ mod tests {
         let of_box = RoomSettings::default();
         let settings = RunChoices { photons: of_box.photons, ..run }.of_box(&of_box);
         assert_eq!((settings.radius, settings.full_light), (2.0 * of_box.radius, 4.0 * of_box.full_light));
+        let settings = RunChoices::of(&Subject::Box(Box::new(of_box.clone())), Some(of_box.photons / 5), "cpu").of_box(&of_box);
+        assert_eq!((settings.photons, settings.full_light), (of_box.photons / 5, of_box.full_light / 5.0));
     }
 }

@@ -1,23 +1,9 @@
 //! Small scenes with a caustic under each kind of light, and whether aimed photons light them as others do.
 
+use super::known::kept;
 use super::prelude::*;
 use photonmill::verify::selfcheck::Estimate;
 use photonmill::verify::selfcheck::measure::estimate_of;
-
-/// What [`scene`] knows.
-pub const KINDS: [&str; 11] = [
-    "point",
-    "spot",
-    "cosine disc",
-    "grazing disc",
-    "sun",
-    "sky",
-    "two-sided triangles",
-    "overlapping cones",
-    "overlapping discs",
-    "lamps in and out of a bowl",
-    "a ball before a mirror wall",
-];
 
 const BALL: DVec3 = DVec3::new(0.0, 0.5, 0.0);
 
@@ -34,92 +20,76 @@ fn bulb(position: DVec3) -> LightKind {
 /// A half sphere, open downwards, that reflects on both sides.
 fn bowl(centre: DVec3, radius: f64) -> Mesh {
     let mut bowl = Mesh::sphere("bowl", centre, radius, 24, 3);
-    let above = |vertex: &u32| bowl.positions[*vertex as usize].y > centre.y - 1e-9;
-    bowl.triangles = bowl.triangles.iter().filter(|triangle| triangle.iter().all(above)).copied().collect();
+    bowl.triangles.retain(|triangle| triangle.iter().all(|vertex| bowl.positions[*vertex as usize].y > centre.y - 1e-9));
     bowl
 }
 
-pub fn scene(kind: &str) -> Scene {
-    let disc = |normal: DVec3, law| disc(DVec3::new(0.3, 1.5, 0.1), normal.normalize(), 0.1, law);
-    match kind {
-        "point" => bench(vec![bulb(DVec3::new(0.5, 1.4, 0.2))]),
+fn tilted_disc(normal: DVec3, law: EmissionLaw) -> LightKind {
+    disc(DVec3::new(0.3, 1.5, 0.1), normal.normalize(), 0.1, law)
+}
+
+/// Two more balls, which from a light lie before one another.
+fn balls_in_a_row(light: LightKind) -> Scene {
+    let mut scene = bench(vec![light]);
+    scene.meshes.push(Mesh::sphere("small ball", DVec3::new(0.1, 0.95, 0.02), 0.12, 24, 1));
+    scene.meshes.push(Mesh::sphere("smaller ball", DVec3::new(0.35, 0.8, 0.0), 0.08, 24, 1));
+    scene
+}
+
+/// By name.
+pub const SCENES: [(&str, fn() -> Scene); 11] = [
+    ("point", || bench(vec![bulb(DVec3::new(0.5, 1.4, 0.2))])),
+    ("spot", || {
         // Its falloff crosses the ball.
-        "spot" => bench(vec![LightKind::Spot {
-            position: DVec3::new(0.4, 1.5, 0.0),
-            direction: (DVec3::X * 0.2 + BALL - DVec3::new(0.4, 1.5, 0.0)).normalize(),
-            intensity: Vec3::ONE,
-            inner_angle: 0.1,
-            outer_angle: 0.35,
-        }]),
-        "cosine disc" => bench(vec![disc(DVec3::new(0.3, -1.0, 0.0), EmissionLaw::Cosine)]),
-        // Its plane cuts the ball.
-        "grazing disc" => bench(vec![disc(DVec3::new(0.9, -0.25, 0.0), EmissionLaw::Uniform)]),
-        "sun" => bench(vec![sun(DVec3::new(-0.3, -1.0, 0.2))]),
-        "sky" => bench(vec![LightKind::Environment { radiance: Vec3::ONE }]),
-        // A textured panel that faces the ball with one side, and two panels that only one side or none shines of.
-        "two-sided triangles" => {
-            let mut scene = bench(vec![]);
-            let emission_texture = Some(TextureUse::of(0, 0));
-            scene.materials.push(Material { two_sided: true, emission_texture, ..shining(0.0) });
-            scene.materials.push(shining(0.0));
-            let texels = vec![Vec3::ONE, Vec3::new(0.1, 0.4, 0.2)];
-            scene.textures = vec![Texture {
-                name: "two".into(),
-                width: 2,
-                height: 1,
-                texels: texels.into(),
-                wrap: [Wrap::Clamp; 2],
-                filter: Default::default(),
-            }];
-            let (y, z) = (DVec3::Y * 0.4, DVec3::Z * 0.4);
-            scene.meshes.push(Mesh::parallelogram("panel", DVec3::new(0.6, 0.8, -0.2), y, z, 3));
-            scene.meshes.push(Mesh::parallelogram("towards", DVec3::new(-0.7, 0.8, -0.2), y, z, 4));
-            scene.meshes.push(Mesh::parallelogram("away", DVec3::new(-0.2, 0.8, -0.7), DVec3::X * 0.4, y, 4));
-            scene
-        }
-        "overlapping cones" | "overlapping discs" => {
-            let sun = sun(DVec3::new(-0.2, -1.0, 0.0));
-            let mut scene = bench(vec![if kind == "overlapping cones" { bulb(DVec3::new(0.2, 1.5, 0.0)) } else { sun }]);
-            scene.meshes.push(Mesh::sphere("small ball", DVec3::new(0.1, 0.95, 0.02), 0.12, 24, 1));
-            scene.meshes.push(Mesh::sphere("smaller ball", DVec3::new(0.35, 0.8, 0.0), 0.08, 24, 1));
-            scene
-        }
-        // Of the light of one, all directions are kept.
-        "lamps in and out of a bowl" => {
-            let mut scene = bench(vec![bulb(DVec3::new(-0.5, 1.4, 0.0)), bulb(DVec3::new(0.45, 1.42, 0.1))]);
-            scene.materials.push(Material { two_sided: true, ..mirror(0.9) });
-            scene.meshes.push(bowl(DVec3::new(0.5, 1.4, 0.1), 0.12));
-            scene
-        }
-        // The wall's sphere is so large that it holds the ball and nearly the lamp.
-        "a ball before a mirror wall" => {
-            let mut scene = bench(vec![bulb(DVec3::new(0.4, 1.6, 0.0))]);
-            let wall = Mesh::parallelogram("wall", DVec3::new(-0.4, 0.0, -0.4), DVec3::Y * 0.9, DVec3::Z * 0.8, 2);
-            scene.meshes.push(wall);
-            scene
-        }
-        _ => panic!("there is no {kind}"),
-    }
+        let position = DVec3::new(0.4, 1.5, 0.0);
+        let direction = (DVec3::X * 0.2 + BALL - position).normalize();
+        bench(vec![LightKind::Spot { position, direction, intensity: Vec3::ONE, inner_angle: 0.1, outer_angle: 0.35 }])
+    }),
+    ("cosine disc", || bench(vec![tilted_disc(DVec3::new(0.3, -1.0, 0.0), EmissionLaw::Cosine)])),
+    // Its plane cuts the ball.
+    ("grazing disc", || bench(vec![tilted_disc(DVec3::new(0.9, -0.25, 0.0), EmissionLaw::Uniform)])),
+    ("sun", || bench(vec![sun(DVec3::new(-0.3, -1.0, 0.2))])),
+    ("sky", || bench(vec![LightKind::Environment { radiance: Vec3::ONE }])),
+    // A textured panel that faces the ball with one side, and two panels that only one side or none shines of.
+    ("two-sided triangles", || {
+        let mut scene = bench(vec![]);
+        let emission_texture = Some(TextureUse::of(0, 0));
+        scene.materials.push(Material { two_sided: true, emission_texture, ..shining(0.0) });
+        scene.materials.push(shining(0.0));
+        scene.textures = vec![texture(2, vec![Vec3::ONE, Vec3::new(0.1, 0.4, 0.2)], [Wrap::Clamp; 2])];
+        let (y, z) = (DVec3::Y * 0.4, DVec3::Z * 0.4);
+        scene.meshes.push(Mesh::parallelogram("panel", DVec3::new(0.6, 0.8, -0.2), y, z, 3));
+        scene.meshes.push(Mesh::parallelogram("towards", DVec3::new(-0.7, 0.8, -0.2), y, z, 4));
+        scene.meshes.push(Mesh::parallelogram("away", DVec3::new(-0.2, 0.8, -0.7), DVec3::X * 0.4, y, 4));
+        scene
+    }),
+    ("overlapping cones", || balls_in_a_row(bulb(DVec3::new(0.2, 1.5, 0.0)))),
+    ("overlapping discs", || balls_in_a_row(sun(DVec3::new(-0.2, -1.0, 0.0)))),
+    // Of the light of one, all directions are kept.
+    ("lamps in and out of a bowl", || {
+        let mut scene = bench(vec![bulb(DVec3::new(-0.5, 1.4, 0.0)), bulb(DVec3::new(0.45, 1.42, 0.1))]);
+        scene.materials.push(Material { two_sided: true, ..mirror(0.9) });
+        scene.meshes.push(bowl(DVec3::new(0.5, 1.4, 0.1), 0.12));
+        scene
+    }),
+    // The wall's sphere is so large that it holds the ball and nearly the lamp.
+    ("a ball before a mirror wall", || {
+        let mut scene = bench(vec![bulb(DVec3::new(0.4, 1.6, 0.0))]);
+        scene.meshes.push(Mesh::parallelogram("wall", DVec3::new(-0.4, 0.0, -0.4), DVec3::Y * 0.9, DVec3::Z * 0.8, 2));
+        scene
+    }),
+];
+
+pub fn scene(kind: &str) -> Scene {
+    let (_, made) = SCENES.iter().find(|(known, _)| *known == kind).unwrap_or_else(|| panic!("there is no {kind}"));
+    made()
 }
 
 /// What some of these scenes need, all have: one set of kernels serves them all.
-const EFFECTS: [Effect; 11] = [
-    Effect::Bvh,
-    Effect::SmoothNormals,
-    Effect::SpecularChains,
-    Effect::Textures,
-    Effect::TwoSided,
-    Effect::MeshLights,
-    Effect::PointLights,
-    Effect::SpotLights,
-    Effect::DiscLights,
-    Effect::DirectionalLights,
-    Effect::Environment,
-];
-
 pub fn settings(photons: u32, aim: bool) -> SceneSettings {
     let caustic = SceneSettings { part: Part::Caustic, caustic_radius: Some(0.2), alpha: 1.0, ..by_rounds() };
-    SceneSettings { caustic_photons: photons, aim, bounces: 12, rounds: 1, with: EFFECTS.into(), ..caustic }
+    let with = vec![Effect::SmoothNormals, Effect::SpecularChains, Effect::Textures];
+    kept(SceneSettings { caustic_photons: photons, aim, bounces: 12, rounds: 1, with, ..caustic })
 }
 
 /// Runs of other seeds on either side.
@@ -129,6 +99,12 @@ const RUNS: u64 = 32;
 pub fn mean_and_error(values: &[f64]) -> (f64, f64) {
     let Estimate { mean, standard_error } = estimate_of(values);
     (mean, standard_error)
+}
+
+/// The same of each channel.
+pub fn mean_of_all(values: &[DVec3]) -> (DVec3, DVec3) {
+    let of = [0, 1, 2].map(|channel| mean_and_error(&values.iter().map(|value| value[channel]).collect::<Vec<_>>()));
+    (of.map(|(mean, _)| mean).into(), of.map(|(_, error)| error).into())
 }
 
 /// Adds the light of all photons and that of aimed ones: over the floor, in each channel that differs, and at each point

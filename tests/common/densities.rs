@@ -59,26 +59,26 @@ pub fn is_unit(what: &str, direction: Vec3, bound: f64) -> Check {
     require(off <= bound, || format!("{what}: {direction:?} is {off:e} longer or shorter than 1"))
 }
 
-/// Directions over a hemisphere against their density per solid angle.
-pub fn hemisphere_check(what: &str, directions: &[Vec3], frame: DMat3, density: impl Fn(DVec3) -> f64) -> Check {
+/// Directions against their density per solid angle, by cells of polar angles in a frame.
+pub fn directions_check(what: &str, directions: &[Vec3], frame: DMat3, grid: &Grid, density: impl Fn(DVec3) -> f64) -> Check {
     let places: Vec<(f64, f64)> = directions.iter().map(|direction| polar(frame, *direction)).collect();
-    let grid = angles(even(0.0, FRAC_PI_2, 20));
-    density_check(what, &places, places.len(), &grid, ONE, &on_sphere(frame, density))
+    density_check(what, &places, places.len(), grid, ONE, &on_sphere(frame, density))
+}
+
+/// The same over a hemisphere.
+pub fn hemisphere_check(what: &str, directions: &[Vec3], frame: DMat3, density: impl Fn(DVec3) -> f64) -> Check {
+    directions_check(what, directions, frame, &angles(even(0.0, FRAC_PI_2, 20)), density)
 }
 
 /// Directions that should be even over the sphere.
 pub fn sphere_check(what: &str, directions: &[Vec3]) -> Check {
-    let frame = DMat3::IDENTITY;
-    let places: Vec<(f64, f64)> = directions.iter().map(|direction| polar(frame, *direction)).collect();
-    density_check(what, &places, places.len(), &angles(even(0.0, PI, 20)), ONE, &on_sphere(frame, |_| 0.25 / PI))
+    directions_check(what, directions, DMat3::IDENTITY, &angles(even(0.0, PI, 20)), |_| 0.25 / PI)
 }
 
 /// Directions of a lobe around the z axis.
 pub fn lobe_check(what: &str, directions: &[Vec3], exponent: f64) -> Check {
-    let frame = DMat3::IDENTITY;
-    let places: Vec<(f64, f64)> = directions.iter().map(|direction| polar(frame, *direction)).collect();
-    let density = move |wi: DVec3| (exponent + 1.0) / TAU * lobe(wi.z, exponent);
-    density_check(what, &places, places.len(), &lobe_angles(exponent), ONE, &on_sphere(frame, density))
+    let density = |wi: DVec3| (exponent + 1.0) / TAU * lobe(wi.z, exponent);
+    directions_check(what, directions, DMat3::IDENTITY, &lobe_angles(exponent), density)
 }
 
 /// Points of a disc around the origin.

@@ -4,6 +4,7 @@ use std::cmp::Ordering;
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
 
+use super::aimed::mean_and_error;
 use super::{Check, Complaint, Kind};
 
 /// Chance that a whole family complains although every value in it is right. Seeds are fixed, so a family that
@@ -52,10 +53,8 @@ impl Family {
 
     /// The mean of independent values, of which the spread tells the error. No error is below rounding.
     pub fn expect_mean(&mut self, what: impl Into<String>, values: &[f64], expected: f64) {
-        let count = values.len() as f64;
-        let mean = values.iter().sum::<f64>() / count;
-        let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0);
-        self.push(what.into(), mean, expected, (variance / count).sqrt(), Some(values.len() as u32 - 1));
+        let (mean, error) = mean_and_error(values);
+        self.expect_estimate(what, mean, error, values.len() as u32, expected);
     }
 
     /// A mean whose error was estimated from so many independent values.

@@ -2,7 +2,7 @@
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
-use image::{ImageFormat, RgbImage};
+use image::{DynamicImage, ImageFormat};
 use serde_json::{Value, json};
 
 pub fn floats(numbers: &[f32]) -> Vec<u8> {
@@ -13,9 +13,9 @@ pub fn data_uri(kind: &str, bytes: &[u8]) -> String {
     format!("data:{kind};base64,{}", BASE64.encode(bytes))
 }
 
-pub fn encoded(picture: &RgbImage, format: ImageFormat) -> Vec<u8> {
+pub fn encoded(picture: &(impl Clone + Into<DynamicImage>), format: ImageFormat) -> Vec<u8> {
     let mut bytes = std::io::Cursor::new(Vec::new());
-    picture.write_to(&mut bytes, format).unwrap();
+    Into::<DynamicImage>::into(picture.clone()).write_to(&mut bytes, format).unwrap();
     bytes.into_inner()
 }
 

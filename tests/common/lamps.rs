@@ -94,7 +94,7 @@ pub fn same_light_and_noise(what: &str, found: &RunResult, expected: &RunResult,
     family.complaint()?;
     let ratio = variance / allowed;
     println!("{what}: {ratio:.3} times the variance");
-    if ratio <= most { Ok(()) } else { Err(Complaint::new(Kind::TooNoisy, format!("{what}: {ratio} times the variance, {most} may be"))) }
+    Kind::TooNoisy.unless(ratio <= most, || format!("{what}: {ratio} times the variance, {most} may be"))
 }
 
 /// Direct light of a room beside one whose lamp is so many times as strong, compared with that of the room alone.
@@ -159,9 +159,8 @@ pub fn scattered_light(gpu: &Gpu, ratio: f32, by_sight: bool) -> Check<Complaint
     };
     let [alone, found] = [all(&rooms(&[1.0])), all(&rooms(&[1.0, ratio]))];
     let unknown = found.film.unknown(0.95);
-    if unknown.unreached > 0 || !unknown.absent.is_empty() {
-        return Err(Complaint::new(Kind::TooDark, unknown.text("point", "W/m2", 0.95, found.film.rounds)));
-    }
+    let is_known = unknown.unreached == 0 && unknown.absent.is_empty();
+    Kind::TooDark.unless(is_known, || unknown.text("point", "W/m2", 0.95, found.film.rounds))?;
     let sums = |lit: &RunResult, of: &dyn Fn(&RunResult, usize) -> f64| (0..points().len()).map(|point| of(lit, point)).sum::<f64>();
     let means = [&alone, &found].map(|lit| sums(lit, &|lit, point| red(lit, point).0));
     let noise = [&alone, &found].map(|lit| sums(lit, &|lit, point| (red(lit, point).1 / red(&alone, point).0).powi(2)));
@@ -188,14 +187,7 @@ fn screen(wrap: Wrap) -> Scene {
     mesh.uvs[0].iter_mut().for_each(|uv| *uv = 2.0 * *uv - DVec2::splat(0.5));
     let lamp = Material { emission_texture: Some(TextureUse::of(0, 0)), ..lamp_of(1.0) };
     let mut scene = scene_of(vec![level(0.0, [4.0; 2], true, 0), mesh], vec![matt(0.0), lamp], vec![]);
-    scene.textures = vec![Texture {
-        name: "screen".into(),
-        width: 256,
-        height: 256,
-        texels: texels.into(),
-        wrap: [wrap; 2],
-        filter: Default::default(),
-    }];
+    scene.textures = vec![texture(256, texels, [wrap; 2])];
     scene
 }
 
@@ -220,11 +212,9 @@ pub fn bright_spot(gpu: &Gpu, wrap: Wrap, illumination: Illumination) -> Check<C
         let right = (0..steps * steps).map(of_place).sum::<f64>() * 4.0 / (steps * steps) as f64;
         let (mean, error) = (found.film.mean(number).x, found.film.stated_error(number).x);
         println!("{wrap:?}, {illumination:?}: {mean:.4} +- {error:.4}, {right:.4} is right");
-        // Written so that NaN complains.
-        if !((mean - right).abs() <= 4.0 * error && error < 0.1 * right) {
-            let text = format!("{wrap:?}, {illumination:?}: {mean} +- {error} at {point} instead of {right}");
-            return Err(Complaint::new(if mean < right { Kind::TooDark } else { Kind::TooBright }, text));
-        }
+        let is_right = (mean - right).abs() <= 4.0 * error && error < 0.1 * right;
+        let kind = if mean < right { Kind::TooDark } else { Kind::TooBright };
+        kind.unless(is_right, || format!("{wrap:?}, {illumination:?}: {mean} +- {error} at {point} instead of {right}"))?;
     }
     Ok(())
 }

@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 
+use super::estimate_check;
 use super::prelude::*;
-use photonmill::engine::scene::{self, RunResult, Target, View};
+use photonmill::engine::scene::{self, RunResult, Target, View, trial};
 use photonmill::verify::selfcheck::Estimate;
 
 /// The default settings with blocks of one round: few rounds tell the error well.
@@ -89,6 +90,15 @@ pub fn seen(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, camera: &Camera,
 /// Red mean and standard error of a pixel or point.
 pub fn red(lit: &RunResult, place: usize) -> (f64, f64) {
     (lit.film.mean(place).x, lit.film.standard_error(place).x)
+}
+
+/// Fails unless the red channel of a pixel or point is known to some share of what is right; it must be right to its error, or to another
+/// share if that is more.
+pub fn red_check(what: &str, lit: &RunResult, place: usize, expected: f64, [known_to, right_to]: [f64; 2]) -> Check<Complaint> {
+    let (found, error) = red(lit, place);
+    println!("{what}: {found} +- {error}, {expected} expected");
+    assert!(error < known_to * expected, "{what}: {found} +- {error}");
+    estimate_check(what, found, expected, error.max(right_to * expected))
 }
 
 /// Mean of the red channel over all pixels or points.
@@ -234,6 +244,12 @@ pub fn disc(centre: DVec3, normal: DVec3, radius: f64, law: EmissionLaw) -> Ligh
     LightKind::Disc { centre, normal, radius, power: Vec3::ONE, law }
 }
 
+/// A picture of so many texels a row, linear between them.
+pub fn texture(width: u32, texels: impl Into<Texels>, wrap: [Wrap; 2]) -> Texture {
+    let texels = texels.into();
+    Texture { name: "picture".into(), width, height: texels.count() as u32 / width, texels, wrap, filter: Default::default() }
+}
+
 /// A scene with all its points moved.
 pub fn moved(mut scene: Scene, way: impl Fn(DVec3) -> DVec3) -> Scene {
     scene.meshes.iter_mut().flat_map(|mesh| &mut mesh.positions).for_each(|at| *at = way(*at));
@@ -256,4 +272,57 @@ pub fn tessellated(name: &str, origin: DVec3, u: DVec3, v: DVec3, n: u32) -> Mes
 /// Two independent estimates of one light.
 pub fn same_light(what: &str, found: Estimate, expected: Estimate) -> Check {
     z_check(what, found.mean, expected.mean, found.standard_error.hypot(expected.standard_error).max(1e-5 * expected.mean.abs()))
+}
+
+/// A scene as its first camera sees it.
+pub struct Viewed {
+    pub scene: Scene,
+    pub geometry: Geometry,
+    pub camera: Camera,
+}
+
+impl Viewed {
+    pub fn new(scene: Scene) -> Viewed {
+        Viewed { geometry: Geometry::new(&scene).unwrap(), camera: scene.first_camera(), scene }
+    }
+
+    pub fn view(&self) -> View<'_> {
+        View { geometry: &self.geometry, camera: Some(&self.camera), phases: &[] }
+    }
+
+    /// With radii by a trial round.
+    pub fn tried(&self, gpu: &Gpu, settings: &SceneSettings, sensor: Sensor) -> ScenePlan {
+        trial::plan(gpu, &self.scene, &self.view(), settings, sensor).unwrap()
+    }
+
+    /// With radii by the scene's area.
+    pub fn planned(&self, gpu: &Gpu, settings: &SceneSettings, sensor: Sensor) -> ScenePlan {
+        ScenePlan::new(&self.scene, &self.geometry, settings, sensor, &engine::limits(gpu.facts())).unwrap()
+    }
+
+    /// Runs to the end, whatever comes out.
+    pub fn lit(&self, gpu: &Gpu, plan: ScenePlan) -> RunResult {
+        run(gpu, &self.view(), plan)
+    }
+}
+
+/// The sides of a box, of a material each: below and above, back and front, left and right.
+pub fn sides(corner: DVec3, size: DVec3, faces_in: bool, materials: [usize; 6]) -> Vec<Mesh> {
+    let [x, y, z] = [DVec3::X * size.x, DVec3::Y * size.y, DVec3::Z * size.z];
+    let far = corner + size;
+    let faces = [(corner, z, x), (far, -x, -z), (corner, x, y), (far, -y, -x), (corner, y, z), (far, -z, -y)];
+    let side = |((origin, u, v), material)| {
+        let (u, v) = if faces_in { (u, v) } else { (v, u) };
+        Mesh::parallelogram("side", origin, u, v, material)
+    };
+    faces.into_iter().zip(materials).map(side).collect()
+}
+
+/// A rectangle about a hole from `low` to `high`, as shares of its edges.
+pub fn around_hole(origin: DVec3, u: DVec3, v: DVec3, [low, high]: [DVec2; 2], material: usize) -> Vec<Mesh> {
+    let part = |[from_u, to_u]: [f64; 2], [from_v, to_v]: [f64; 2]| {
+        Mesh::parallelogram("around a hole", origin + from_u * u + from_v * v, (to_u - from_u) * u, (to_v - from_v) * v, material)
+    };
+    let beside = [low.y, high.y];
+    vec![part([0.0, 1.0], [0.0, low.y]), part([0.0, 1.0], [high.y, 1.0]), part([0.0, low.x], beside), part([high.x, 1.0], beside)]
 }

@@ -39,6 +39,8 @@ use photonmill::gpu::Work;
 use photonmill::records::RandomKey;
 use photonmill::rng::{self, Streams};
 use photonmill::scene::room::Wall;
+
+use chi_square::counts_check;
 use prelude::*;
 
 /// A device under the validation layer, which must not have said a word by the end of the test, nor may anything be held.
@@ -134,9 +136,7 @@ pub fn run(gpu: &Gpu, settings: &RoomSettings) -> RunResult {
 
 /// Runs a scene on a device to its end.
 pub fn run_scene(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings) -> RunResult {
-    let mut control = Control::default();
-    let settings = &RoomSettings { paranoid: true, ..settings.clone() };
-    sound(room::on_gpu(gpu, scene, settings, &mut control).unwrap_or_else(|error| panic!("{error}\n{settings:?}")))
+    sound(settings, |settings, control| room::on_gpu(gpu, scene, settings, control))
 }
 
 /// What a run comes to, where it may fail: with `paranoid` no value may be infinite or no number.
@@ -147,11 +147,13 @@ pub fn outcome_of(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings) -> Resu
 }
 
 pub fn nothing_odd(nonfinite_values: &NonfiniteValues) -> Check<Complaint> {
-    if nonfinite_values.count == 0 { Ok(()) } else { Err(Complaint::new(Kind::NoNumber, nonfinite_values.text())) }
+    Kind::NoNumber.unless(nonfinite_values.count == 0, || nonfinite_values.text())
 }
 
-/// Whatever is run here has no value that is infinite or no number.
-fn sound(outcome: RunResult) -> RunResult {
+/// Whatever is run here comes to an end, and has no value that is infinite or no number.
+fn sound(settings: &RoomSettings, run: impl FnOnce(&RoomSettings, &mut Control) -> Result<RunResult, Error>) -> RunResult {
+    let settings = RoomSettings { paranoid: true, ..settings.clone() };
+    let outcome = run(&settings, &mut Control::default()).unwrap_or_else(|error| panic!("{error}\n{settings:?}"));
     assert_holds("the run", nothing_odd(outcome.nonfinite_values.as_ref().expect("somebody looked")));
     outcome
 }
@@ -170,9 +172,7 @@ pub fn closed_box(settings: &RoomSettings, albedo: f32) -> RoomScene {
 
 /// Runs a scene on the CPU builder to its end.
 pub fn run_scene_on_cpu(scene: &RoomScene, settings: &RoomSettings) -> RunResult {
-    let mut control = Control::default();
-    let settings = &RoomSettings { paranoid: true, ..settings.clone() };
-    sound(room::on_cpu(scene, settings, &mut control).unwrap_or_else(|error| panic!("{error}\n{settings:?}")))
+    sound(settings, |settings, control| room::on_cpu(scene, settings, control))
 }
 
 /// Photons of round 0 of the open box, as a builder of the device stores them.
@@ -203,15 +203,7 @@ pub fn gathered(gpu: &Gpu, plan: &RoomPlan, photons: &[Photon], times: u32, film
     let (scene, chunk) = (open_box(&plan.settings), plan.settings.photons);
     let mut commands = Commands::new(gpu, room::constants(plan), Instant::now()).unwrap();
     let resources = RoomResources::new(gpu, &mut commands, &scene, plan).unwrap();
-    upload_photons(&mut commands, &resources, plan, photons);
-    film.into_iter().for_each(|sums| commands.upload(&resources.film, sums).unwrap());
-    index::build(&mut commands, &resources, plan, chunk).unwrap();
-    (0..times).for_each(|_| estimate::gather(&mut commands, &resources, plan, chunk).unwrap());
-    commands.read(&resources.film, plan.points.len() * plan.channel_count as usize).unwrap()
-}
-
-/// Puts photons into the photon map as if they had been traced.
-pub fn upload_photons(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan, photons: &[Photon]) {
+    // As if they had been traced.
     let stored: Vec<StoredPhoton> = photons.iter().map(Photon::stored).collect();
     commands.upload(&resources.photons, &stored).unwrap();
     if plan.keeps_origins {
@@ -219,6 +211,10 @@ pub fn upload_photons(commands: &mut Commands, resources: &RoomResources, plan: 
         commands.upload(&resources.origins, &origins).unwrap();
     }
     commands.upload(&resources.counters, &[photons.len() as u32]).unwrap();
+    film.into_iter().for_each(|sums| commands.upload(&resources.film, sums).unwrap());
+    index::build(&mut commands, &resources, plan, chunk).unwrap();
+    (0..times).for_each(|_| estimate::gather(&mut commands, &resources, plan, chunk).unwrap());
+    commands.read(&resources.film, plan.points.len() * plan.channel_count as usize).unwrap()
 }
 
 /// What a device would do with these settings.
@@ -266,15 +262,11 @@ pub fn relative_check(what: &str, found: f64, expected: f64, allowed: f64) -> Ch
     require(error <= allowed, || format!("{what}: {found} where {expected} is right, {error:e} off where {allowed:e} may be"))
 }
 
-/// Counts of 100 classes that are equally likely, by chi-square on both sides: 99 degrees of freedom leave
-/// (44.7, 183.7) once in a million either way. Too even is as wrong as too uneven.
+/// Counts of 100 classes that are equally likely, by chi-square on both sides: too even is as wrong as too uneven.
 pub fn evenness_check(what: &str, classes: impl Iterator<Item = usize>) -> Check {
     let mut counts = [0u64; 100];
     classes.for_each(|class| counts[class] += 1);
-    let expected = counts.iter().sum::<u64>() as f64 / 100.0;
-    let chi_square: f64 = counts.iter().map(|count| (*count as f64 - expected).powi(2) / expected).sum();
-    let is_usual = 44.7 < chi_square && chi_square < 183.7;
-    require(is_usual, || format!("{what}: chi-square {chi_square:.1} of 99 degrees of freedom"))
+    counts_check(what, &counts, &[0.01; 100])
 }
 
 /// Sorted by photon and bounce, which no two entries of a photon map share.
@@ -331,6 +323,11 @@ impl Kind {
             kind => kind,
         };
         self != Kind::Broken && (wanted == self || wanted == general)
+    }
+
+    /// Complains of this unless it holds, as no comparison with NaN does.
+    pub fn unless(self, holds: bool, complaint: impl FnOnce() -> String) -> Check<Complaint> {
+        require(holds, complaint).map_err(|text| Complaint::new(self, text))
     }
 }
 
@@ -427,6 +424,11 @@ pub fn estimate_check(what: &str, measured: f64, expected: f64, standard_error: 
     Err(Complaint::new(kind, format!("{what}: {measured} where {expected} +- {standard_error:.3e} is right, z = {z:.2}")))
 }
 
+/// The same of each channel.
+pub fn colour_check(what: &str, measured: DVec3, expected: DVec3, standard_error: DVec3) -> Check<Complaint> {
+    (0..3).try_for_each(|k| estimate_check(&format!("{what}, channel {k}"), measured[k], expected[k], standard_error[k]))
+}
+
 /// `count` of `trials` against its probability, by the binomial standard error.
 pub fn share_check(what: &str, count: u64, trials: u64, probability: f64) -> Check {
     let share = count as f64 / trials as f64;
@@ -440,9 +442,7 @@ pub fn equal_sums(what: &str, found: &[u64], expected: &[u64]) -> Check {
 
 /// The same, and in which way they are off.
 pub fn same_sums(what: &str, found: &[u64], expected: &[u64]) -> Check<Complaint> {
-    if found.len() != expected.len() {
-        return Err(Complaint::new(Kind::Broken, format!("{what}: {} sums instead of {}", found.len(), expected.len())));
-    }
+    Kind::Broken.unless(found.len() == expected.len(), || format!("{what}: {} sums instead of {}", found.len(), expected.len()))?;
     let differing: Vec<usize> = (0..found.len()).filter(|&place| found[place] != expected[place]).collect();
     let Some(&first) = differing.first() else { return Ok(()) };
     let larger = differing.iter().filter(|place| found[**place] > expected[**place]).count();
@@ -466,11 +466,8 @@ pub fn same_photons(found: &[Photon], expected: &[Photon]) -> Check<Complaint> {
         Ordering::Greater => Kind::PhotonsAdded,
         Ordering::Equal => Kind::OtherPhotons,
     };
-    if kind != Kind::OtherPhotons {
-        return Err(Complaint::new(kind, format!("{} photons instead of {}", found.len(), expected.len())));
-    }
+    kind.unless(kind == Kind::OtherPhotons, || format!("{} photons instead of {}", found.len(), expected.len()))?;
     let differing: Vec<_> = found.iter().zip(&expected).filter(|(a, b)| bytemuck::bytes_of(*a) != bytemuck::bytes_of(*b)).collect();
-    differing
-        .first()
-        .map_or(Ok(()), |(a, b)| Err(Complaint::new(kind, format!("{} photons differ, the first {a:?} instead of {b:?}", differing.len()))))
+    let text = || format!("{} photons differ, the first {:?} instead of {:?}", differing.len(), differing[0].0, differing[0].1);
+    kind.unless(differing.is_empty(), text)
 }

@@ -32,11 +32,6 @@ impl Place {
         let (x, y) = normal.any_orthonormal_pair();
         Place { row: 0, column: 0, middle: DVec3::ZERO, x, y, normal, wo }
     }
-
-    /// Of the normal and the way to the eye.
-    pub fn cosine(&self) -> f64 {
-        self.normal.dot(self.wo)
-    }
 }
 
 pub struct Plates {
@@ -57,7 +52,7 @@ impl Plates {
         assert!(column < self.columns, "there is room for {} plates", self.columns);
         let place = place(row, column as f64 + 0.5 - 0.5 * self.columns as f64, column);
         let width = 0.75 * PITCH * (1.0 - place.middle.z / EYE.z);
-        let (u, v) = (width * place.x, width / place.cosine() * place.y);
+        let (u, v) = (width * place.x, width / place.normal.dot(place.wo) * place.y);
         self.scene.materials.push(material);
         self.scene.meshes.push(Mesh::parallelogram("plate", place.middle - 0.5 * (u + v), u, v, self.scene.materials.len() - 1));
         self.places.push(place);

@@ -25,12 +25,12 @@ pub use photonmill::settings::scene::{Effect, Illumination, Part, SceneSettings}
 pub use photonmill::settings::{Builder, EmissionLaw, Gather, Math, Preset, RoomSettings, Sums};
 pub use photonmill::verify::judge::Judge;
 
-pub use super::aimed::mean_and_error;
+pub use super::aimed::{mean_and_error, mean_of_all};
 pub use super::family::Family;
 pub use super::lit::{
     BOTH, assert_builders_agree, beam, by_rounds, cone, disc, every_kind_of_light, fixed_radius, flights, glass, grid, irradiances, lamp,
-    level, mapped, matt, mean_red, means, mirror, moved, point, radiances, received, red, same_light, scene, scene_of, scene_plan,
-    scene_plan_within, seen, shaft, shining, square_picture, standard_errors, sun, tessellated,
+    level, mapped, matt, mean_red, means, mirror, moved, point, radiances, received, red, red_check, same_light, scene, scene_of,
+    scene_plan, scene_plan_within, seen, shaft, shining, square_picture, standard_errors, sun, tessellated, texture,
 };
 pub use super::program::{Place, text};
 pub use super::{

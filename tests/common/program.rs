@@ -60,15 +60,11 @@ fn words(line: &str) -> Vec<&str> {
     parts.flat_map(|(k, part)| if k % 2 == 1 { vec![part] } else { part.split_whitespace().collect() }).collect()
 }
 
-/// The device under test, of a command line that uses one and names none.
-pub fn device_of(line: &str) -> Option<String> {
-    let has_none = ["compare", "denoise", "devices", "info", "map export", "map info", "merge"].iter().any(|name| line.starts_with(name));
-    std::env::var("PHOTONMILL_DEVICE").ok().filter(|_| !has_none && !line.contains("--device"))
-}
-
-/// A command line on the device under test.
+/// A command line on the device under test, if it uses one and names none.
 pub fn on_device(line: &str) -> String {
-    device_of(line).map_or(line.to_owned(), |device| format!("{line} --device '{device}'"))
+    let has_none = ["compare", "denoise", "devices", "info", "map export", "map info", "merge"].iter().any(|name| line.starts_with(name));
+    let device = std::env::var("PHOTONMILL_DEVICE").ok().filter(|_| !has_none && !line.contains("--device"));
+    device.map_or(line.to_owned(), |device| format!("{line} --device '{device}'"))
 }
 
 /// The same under the validation layer.
@@ -128,9 +124,7 @@ impl Place {
     /// What a run on the device under test says on stdout and stderr; it must end well.
     #[track_caller]
     pub fn succeed(&self, line: &str) -> (String, String) {
-        let output = self.run(&on_device(line));
-        assert!(output.status.success(), "{line}: {}", text(&output.stderr));
-        (text(&output.stdout), text(&output.stderr))
+        self.said(&on_device(line))
     }
 
     /// The one line by which the program refuses a command line, with exit code 2, nothing on stdout and no new file; or what
@@ -207,6 +201,28 @@ impl Place {
     pub fn names(&self) -> Vec<String> {
         entries(self.path())
     }
+
+    /// Fails unless a line's last option is refused with each of these values, as they were typed, by what is allowed. A comma and a space
+    /// stand between values.
+    #[track_caller]
+    pub fn assert_values_refused(&self, cases: &[(&str, &str, &str)]) {
+        for (line, values, allowed) in cases {
+            let option = line.rsplit(' ').next().unwrap_or_default();
+            for typed in values.split(", ") {
+                let refusal = self.refusal(&format!("{line} '{typed}'")).unwrap();
+                let is_named = refusal.starts_with(&format!("photonmill: {option} {typed}: "));
+                assert!(is_named && refusal.contains(*allowed), "{line} {typed} must name {allowed:?}: {refusal}");
+            }
+        }
+    }
+
+    /// What a run says on stdout and stderr, with no device added to its options; it must end well.
+    #[track_caller]
+    pub fn said(&self, line: &str) -> (String, String) {
+        let output = self.run(line);
+        assert!(output.status.success(), "{line}: {}", text(&output.stderr));
+        (text(&output.stdout), text(&output.stderr))
+    }
 }
 
 /// What lies in a folder, sorted.
@@ -223,4 +239,11 @@ pub fn without_vulkan(command: &mut Command) -> &mut Command {
 
 pub fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// Fails unless a text has all of these words.
+#[track_caller]
+pub fn assert_says<'a>(text: &str, words: impl IntoIterator<Item = &'a str>) {
+    let missing: Vec<&str> = words.into_iter().filter(|word| !text.contains(*word)).collect();
+    assert!(missing.is_empty(), "{missing:?} is not in\n{text}");
 }

@@ -73,14 +73,8 @@ impl Rectangle {
     /// What of it lies on either side of a plane across one of its edges.
     pub fn cut_at(&self, axis: DVec3, at: f64) -> Vec<Rectangle> {
         let share = |edge: DVec3| (at - self.origin.dot(axis)) / edge.dot(axis);
-        let is_inside = |share: f64| share > 1e-9 && share < 1.0 - 1e-9;
-        if is_inside(share(self.u)) {
-            self.parts(true, share(self.u)).into()
-        } else if is_inside(share(self.v)) {
-            self.parts(false, share(self.v)).into()
-        } else {
-            vec![*self]
-        }
+        let crossed = [(true, share(self.u)), (false, share(self.v))].into_iter().find(|(_, share)| *share > 1e-9 && *share < 1.0 - 1e-9);
+        crossed.map_or(vec![*self], |(across_u, share)| self.parts(across_u, share).into())
     }
 }
 

@@ -169,16 +169,12 @@ impl Model {
 
     /// Arrivals at each bounce.
     pub fn hits_per_bounce(&self, arrivals: &[Arrival]) -> Vec<u64> {
-        let mut counts = vec![0; self.bounces];
-        arrivals.iter().for_each(|arrival| counts[arrival.bounce] += 1);
-        counts
+        (0..self.bounces).map(|bounce| arrivals.iter().filter(|arrival| arrival.bounce == bounce).count() as u64).collect()
     }
 
     /// Photons of the map at each bounce.
     pub fn stored_per_bounce(&self, arrivals: &[Arrival]) -> Vec<u64> {
-        let mut counts = vec![0; self.bounces];
-        arrivals.iter().filter(|arrival| arrival.stored).for_each(|arrival| counts[arrival.bounce] += 1);
-        counts
+        self.hits_per_bounce(&arrivals.iter().copied().filter(|arrival| arrival.stored).collect::<Vec<_>>())
     }
 }
 

@@ -66,14 +66,9 @@ pub fn instanced() -> Value {
 pub fn compressed(extension: &str) -> Value {
     let mut value = square();
     let bytes = square_buffer();
-    let words = |from: usize, to: usize| -> Vec<u32> {
-        bytes[from..to].chunks_exact(4).map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]])).collect()
-    };
-    let rows = |from: usize, to: usize| words(from, to).chunks_exact(3).map(|row| [row[0], row[1], row[2]]).collect::<Vec<[u32; 3]>>();
-    let positions = meshopt::encode_vertex_buffer(&rows(0, 48)).unwrap();
+    let positions = meshopt::encode_vertex_buffer(&bytemuck::pod_collect_to_vec::<u8, [u32; 3]>(&bytes[..48])).unwrap();
     let normals = meshopt::encode_vertex_buffer(&[[0i8, 0, 127, 0]; 4]).unwrap();
-    let places: Vec<[u32; 2]> = words(96, 128).chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect();
-    let places = meshopt::encode_vertex_buffer(&places).unwrap();
+    let places = meshopt::encode_vertex_buffer(&bytemuck::pod_collect_to_vec::<u8, [u32; 2]>(&bytes[96..128])).unwrap();
     let indices = meshopt::encode_index_buffer(&[0u32, 1, 2, 0, 2, 3], 4).unwrap();
     let (mut buffer, mut offset) = (Vec::new(), 0);
     let parts: [(&[u8], Value); 4] = [
@@ -145,15 +140,14 @@ pub fn draco_square() -> Value {
 /// A picture of blocks of 4 x 4 texels beside each other, each of one colour, as UASTC in a KTX 2 container.
 pub fn ktx2(blocks: &[[u8; 4]]) -> Vec<u8> {
     let mut bytes = b"\xabKTX 20\xbb\r\n\x1a\n".to_vec();
-    let data = (80 + 24 + 44u32, 16 * blocks.len() as u64);
-    let words = |bytes: &mut Vec<u8>, words: &[u32]| words.iter().for_each(|word| bytes.extend(word.to_le_bytes()));
+    let size = 16 * blocks.len() as u64;
     // Format, bytes of a number, width, height, depth, layers, faces, levels, compression; where its description lies.
-    words(&mut bytes, &[0, 1, 4 * blocks.len() as u32, 4, 0, 0, 1, 1, 0, 80 + 24, 44, 0, 0, 0, 0, 0, 0]);
-    for number in [u64::from(data.0), data.1, data.1] {
-        bytes.extend(number.to_le_bytes());
-    }
+    let header = [0, 1, 4 * blocks.len() as u32, 4, 0, 0, 1, 1, 0, 80 + 24, 44, 0, 0, 0, 0, 0, 0];
+    bytes.extend_from_slice(bytemuck::bytes_of(&header));
+    bytes.extend_from_slice(bytemuck::bytes_of(&[80 + 24 + 44, size, size]));
     // UASTC, primaries of sRGB and its curve, 4 x 4 texels in 16 bytes, one sample of all four channels.
-    words(&mut bytes, &[44, 0, 2 | 40 << 16, 166 | 1 << 8 | 2 << 16, 3 | 3 << 8, 16, 0, 127 << 16 | 3 << 24, 0, 0, u32::MAX]);
+    let description = [44, 0, 2 | 40 << 16, 166 | 1 << 8 | 2 << 16, 3 | 3 << 8, 16, 0, 127 << 16 | 3 << 24, 0, 0, u32::MAX];
+    bytes.extend_from_slice(bytemuck::bytes_of(&description));
     for colour in blocks {
         // Mode 8: one colour behind five bits.
         let block = 0x17 | u128::from(u32::from_le_bytes(*colour)) << 5;
@@ -193,9 +187,7 @@ pub fn with_image_light() -> Value {
         // Codes over alpha as the extension packs them: 255 of 1, and beyond with less.
         let colour = |x: u32, y: u32| if (x, y) == (0, 0) { [0, 255, 0, 51] } else { [255, 0, 0, 255 / (number + 1)] };
         let picture = image::RgbaImage::from_fn(8, 8, |x, y| image::Rgba(colour(x, y)));
-        let mut bytes = std::io::Cursor::new(Vec::new());
-        picture.write_to(&mut bytes, ImageFormat::Png).unwrap();
-        json!({"uri": data_uri("image/png", &bytes.into_inner())})
+        json!({"uri": data_uri("image/png", &encoded(&picture, ImageFormat::Png))})
     };
     value["images"] = (0..6).map(side).collect();
     let light = json!({"name": "studio", "intensity": 2, "specularImages": [[0, 1, 2, 3, 4, 5]], "specularImageSize": 8,

@@ -1,8 +1,8 @@
 //! Sheets that let some light pass straight: gaps of alpha and thin smooth walls.
 
-use super::estimate_check;
 use super::layered::{dull, layered, metal, plastic, row_of_texels};
 use super::prelude::*;
+use super::{colour_check, estimate_check};
 use photonmill::engine::scene::RunResult;
 use photonmill::scene::material::{Coverage, Layers};
 use photonmill::scene::texture::Filter;
@@ -53,6 +53,8 @@ fn stacks() -> Vec<Stack> {
     let textured = |material: Material| Material { base_colour_texture: Some(TextureUse::of(0, 0)), ..material };
     let of = |count: usize, material: Material| vec![(material, as_it_is as fn(&mut Mesh)); count];
     let stack = |what, sheets, share| Stack { what, sheets, share };
+    let at_64: fn(&mut Mesh) = |mesh| mesh.uvs[0] = vec![DVec2::new(0.3, 0.5); 4];
+    let at_191: fn(&mut Mesh) = |mesh| mesh.uvs[0] = vec![DVec2::new(0.7, 0.5); 4];
     vec![
         stack("nothing", Vec::new(), |_| DVec3::ONE),
         stack("alpha 0", of(3, blended(0.0, black())), |_| DVec3::ONE),
@@ -68,12 +70,8 @@ fn stacks() -> Vec<Stack> {
             vec![(blended(0.8, black()), |mesh| (mesh.alphas, mesh.colours) = (vec![0.25; 4], vec![DVec3::ONE; 4]))],
             |_| DVec3::splat(0.8),
         ),
-        stack("alpha of a texture", vec![(textured(blended(0.8, black())), |mesh| mesh.uvs[0] = vec![DVec2::new(0.7, 0.5); 4])], |_| {
-            DVec3::splat(1.0 - 0.8 * 191.0 / 255.0)
-        }),
-        stack("a masked texture", vec![(textured(masked(1.0, black())), |mesh| mesh.uvs[0] = vec![DVec2::new(0.3, 0.5); 4])], |_| {
-            DVec3::ONE
-        }),
+        stack("alpha of a texture", vec![(textured(blended(0.8, black())), at_191)], |_| DVec3::splat(1.0 - 0.8 * 191.0 / 255.0)),
+        stack("a masked texture", vec![(textured(masked(1.0, black())), at_64)], |_| DVec3::ONE),
         stack("a pane", of(1, pane()), through_a_pane),
         stack("three panes", of(3, pane()), |cosine| through_a_pane(cosine).powf(3.0)),
         stack("a pane with gaps", of(1, blended(0.25, pane())), |cosine| 0.75 + 0.25 * through_a_pane(cosine)),
@@ -101,9 +99,7 @@ fn points(stacks: &[Stack]) -> Vec<(DVec3, DVec3)> {
 /// Stacks on their floors, each for itself, so that the sheets' middles are in line with a direction through the floor's.
 fn scene_with(stacks: &[Stack], floor: Material, towards: DVec3, lights: Vec<LightKind>) -> Scene {
     let mut scene = scene_of(Vec::new(), vec![floor], lights);
-    let codes = [[255, 255, 255, 64], [255, 255, 255, 191]];
-    let texels = Texels::Linear(codes.to_vec());
-    scene.textures = vec![Texture { name: "halves".into(), width: 2, height: 1, texels, wrap: [Wrap::Clamp; 2], filter: Filter::Nearest }];
+    scene.textures = vec![row_of_texels(&[[255, 255, 255, 64], [255, 255, 255, 191]], Filter::Nearest)];
     for (k, (stack, (middle, _))) in pairs(stacks, points(stacks)).enumerate() {
         let floor = level(0.0, [0.8 * PITCH; 2], true, 0);
         scene.meshes.push(Mesh { positions: floor.positions.iter().map(|at| *at + middle).collect(), ..floor });
@@ -158,11 +154,7 @@ pub fn photons_off_a_pane(gpu: &Gpu) -> Check<Complaint> {
     let scene = scene_of(vec![level(0.0, [1.0; 2], true, 0), level(1.0, [3.0; 2], true, 1)], vec![matt(0.0), pane], vec![sun(direction)]);
     let lit = received(gpu, &scene, &mapped(20_000, 32, 4, 0.3), &[(DVec3::ZERO, DVec3::Y)]);
     let cosine = direction.normalize().y;
-    let expected = cosine * (0.5 + 0.5 * schlick(cosine));
-    let (found, error) = red(&lit, 0);
-    println!("photons off a pane: {found} +- {error}, {expected} expected");
-    assert!(error < 0.02 * expected, "{error}");
-    estimate_check("photons off a pane", found, expected, error)
+    red_check("photons off a pane", &lit, 0, cosine * (0.5 + 0.5 * schlick(cosine)), [0.02, 0.0])
 }
 
 /// A lamp with gaps of alpha shines with what is there of it.
@@ -170,12 +162,9 @@ pub fn blended_lamp(gpu: &Gpu, illumination: Illumination) -> Check<Complaint> {
     let lamp = Material { emission: Vec3::ONE, ..blended(0.5, dull(0.0)) };
     let scene = scene_of(vec![level(0.0, [1.0; 2], true, 0), level(1.0, [0.1; 2], false, 1)], vec![matt(0.0), lamp], vec![]);
     let settings = SceneSettings { shadow_rays: 4, illumination, part: Part::Direct, ..mapped(20_000, 32, 1, 0.05) };
-    let (found, error) = red(&received(gpu, &scene, &settings, &[(DVec3::ZERO, DVec3::Y)]), 0);
+    let lit = received(gpu, &scene, &settings, &[(DVec3::ZERO, DVec3::Y)]);
     // It is small and far away, and what is within the radius sees all but the same.
-    let expected = 0.5 * 0.01;
-    println!("a lamp with gaps, {illumination:?}: {found} +- {error}, {expected} expected");
-    assert!(error < 0.04 * expected, "{error}");
-    estimate_check("a lamp with gaps", found, expected, error.max(1e-3 * expected))
+    red_check(&format!("a lamp with gaps, {illumination:?}"), &lit, 0, 0.5 * 0.01, [0.04, 1e-3])
 }
 
 /// A shining floor through every stack, seen straight from above.
@@ -202,10 +191,7 @@ fn compare(what: &str, stacks: &[Stack], lit: &RunResult, places: &[usize], cosi
         let expected = (stack.share)(cosine);
         println!("{what}, {}: {found} +- {error}, {expected} expected", stack.what);
         assert!(error.max_element() < 0.04, "{error}");
-        for channel in 0..3 {
-            let text = format!("{what}, {}, channel {channel}", stack.what);
-            estimate_check(&text, found[channel], expected[channel], error[channel].max(2e-5))?;
-        }
+        colour_check(&format!("{what}, {}", stack.what), found, expected, error.max(DVec3::splat(2e-5)))?;
     }
     Ok(())
 }

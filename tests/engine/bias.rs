@@ -3,12 +3,13 @@
 use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
+use crate::common::lit::Viewed;
 use crate::common::prelude::*;
 use photonmill::engine::bias::{Bias, BiasFrom};
 use photonmill::engine::bias_batches::{self, Batches};
 use photonmill::engine::room;
 use photonmill::engine::room::film::estimate_walls;
-use photonmill::engine::scene::{self, View};
+use photonmill::engine::scene;
 use photonmill::plan::radius::mean_squared_radius;
 use photonmill::settings::stop::{Measure, Stop};
 use photonmill::verify::judge::radiosity::{Law, Radiosity, WALLS, on_wall};
@@ -45,11 +46,7 @@ fn at_points() -> &'static [f64] {
 fn true_bias_in_box(gpu: Option<&Gpu>, radius: f64) -> f64 {
     let settings = RoomSettings { rounds: 48, ..in_box(radius, 8191, 4711) };
     let scene = open_box(&settings);
-    let mut control = Control::default();
-    let outcome = match gpu {
-        Some(gpu) => room::on_gpu(gpu, &scene, &settings, &mut control).unwrap(),
-        None => room::on_cpu(&scene, &settings, &mut control).unwrap(),
-    };
+    let outcome = room::run(gpu, &scene, &settings, &mut Control::default()).unwrap();
     let (mut off, mut light, mut count) = (0.0, 0.0, 0.0f64);
     let walls = estimate_walls(&outcome.film, &scene, &outcome.plan);
     let found = walls.iter().flat_map(|wall| pairs(&wall.irradiance, &wall.irradiance_error));
@@ -63,10 +60,10 @@ fn true_bias_in_box(gpu: Option<&Gpu>, radius: f64) -> f64 {
 
 /// Whether the interval of a bias holds the truth.
 fn interval_check(bias: &Bias, truth: f64) -> Check {
-    if (bias.lower..=bias.upper).contains(&truth) {
-        return Ok(());
-    }
-    Err(format!("{truth:.5} where {:.5} to {:.5} is stated, {:.5} in the middle", bias.lower, bias.upper, bias.relative))
+    let Bias { lower, upper, relative, .. } = *bias;
+    require((lower..=upper).contains(&truth), || {
+        format!("{truth:.5} where {lower:.5} to {upper:.5} is stated, {relative:.5} in the middle")
+    })
 }
 
 /// Whether intervals hold the truth as often as they say.
@@ -75,16 +72,13 @@ fn coverage_check(biases: &[Bias], truth: f64) -> Check {
     if within >= CONFIDENCE { Ok(()) } else { Err(format!("{:.0} % of the intervals hold {truth:.5}", 100.0 * within)) }
 }
 
-/// What would be stated if the difference of the two radii were taken for the bias.
-fn without_the_two(bias: &Bias) -> Bias {
-    bias.scaled(0.5)
-}
-
-fn report(what: &str, biases: &[Bias], truth: f64) {
+/// Fails unless they do, and prints how wide they are.
+fn assert_coverage(what: &str, biases: &[Bias], truth: f64) {
     let mean = |of: fn(&Bias) -> f64| biases.iter().map(of).sum::<f64>() / biases.len() as f64;
     let [middle, lower, upper] = [mean(|bias| bias.relative), mean(|bias| bias.lower), mean(|bias| bias.upper)];
     let within = biases.iter().filter(|bias| interval_check(bias, truth).is_ok()).count();
     println!("{what}: bias {truth:.4}; on average {middle:.4}, {lower:.4} to {upper:.4}; {within} of {} intervals hold it", biases.len());
+    assert_holds(what, coverage_check(biases, truth));
 }
 
 /// Light along x that does not change along y, as the mean over the discs of radius r around points of the x axis, where
@@ -110,7 +104,6 @@ fn disc_means(light: impl Fn(f64) -> f64, has_surface: impl Fn(f64) -> bool, rad
 /// Where the law c r^2 fails, by how much: the stated interval of light without noise is the allowance alone.
 #[test]
 fn the_allowance_covers_edges_shadows_and_bumps() {
-    let everywhere = |_: f64| true;
     let bump = |width: f64| move |x: f64| 1.0 + (-0.5 * (x / width).powi(2)).exp();
     type OfX = Box<dyn Fn(f64) -> f64>;
     let cases: [(&str, OfX, bool, f64); 7] = [
@@ -124,12 +117,11 @@ fn the_allowance_covers_edges_shadows_and_bumps() {
     ];
     for (what, light, at_edge, expected) in cases {
         let points: Vec<f64> = (0..800).map(|k| (f64::from(k) + 0.5) / 100.0 - if at_edge { 0.0 } else { 4.0 }).collect();
-        let has_surface = |x: f64| if at_edge { x > 0.0 } else { everywhere(x) };
+        let has_surface = |x: f64| !at_edge || x > 0.0;
         let at = |radius: f64| disc_means(&light, has_surface, radius, &points);
         let bias = bias_batches::extrapolate(Measure::Rmse, CONFIDENCE, 1, |factor, _| Ok(Some(at(factor)))).unwrap().unwrap();
         let (found, truth) = (at(1.0), at(0.0));
-        let square_sum = |values: &mut dyn Iterator<Item = f64>| values.map(|value| value * value).sum::<f64>();
-        let off = square_sum(&mut pairs(&found, &truth).map(|(found, truth)| found - truth));
+        let off: f64 = pairs(&found, &truth).map(|(found, truth)| (found - truth).powi(2)).sum();
         let lit = found.iter().filter(|value| **value > 0.0).count() as f64;
         let relative = (off * lit).sqrt() / found.iter().sum::<f64>();
         println!("{what}: {:.3} of what is extrapolated", relative / bias.relative);
@@ -150,12 +142,11 @@ fn box_intervals_hold(seeds: u64, radii: &[f64]) {
             room::measure_bias(gpu, &open_box(&settings), &settings, 1, &NEVER).unwrap().unwrap()
         };
         let biases: Vec<Bias> = (1..=seeds).map(|seed| measured(seed, 3001)).collect();
-        report(&format!("the paper's box, radius {radius} m"), &biases, truth);
-        assert_holds(radius, coverage_check(&biases, truth));
-        // A factor 2 shows where noise is less than that.
+        assert_coverage(&format!("the paper's box, radius {radius} m"), &biases, truth);
+        // A factor 2 shows where noise is less than that: it is what the difference of the two radii leaves out.
         if radius >= 0.15 {
             assert!(biases.iter().all(|bias| bias.upper < 4.0 * truth), "an interval that says nothing");
-            let spoiled: Vec<Bias> = biases.iter().map(without_the_two).collect();
+            let spoiled: Vec<Bias> = biases.iter().map(|bias| bias.scaled(0.5)).collect();
             assert_complains("biases without their factor 2", coverage_check(&spoiled, truth));
         }
     }
@@ -177,13 +168,14 @@ fn the_bias_of_the_box_lies_in_its_interval_at_every_radius() {
 fn scene_intervals_hold(seeds: u64, cases: &[(&str, Illumination, f64)], rounds: u32) {
     let Some(gpu) = device() else { return };
     for &(name, illumination, radius) in cases {
-        let long = RunResult::new(scene(name), illumination, radius, 20_000, 99, &gpu);
-        let [lower, middle, upper] = long.difference(&gpu, 0.2, rounds).map(|difference| difference / (1.0 - 0.04));
+        let long = Picture::new(name, illumination, radius, 20_000, 99, &gpu);
+        let batch = |factor: f64, number: u32| long.batch(&gpu, rounds, factor, number);
+        let differences = bias_batches::difference(Measure::Rmse, CONFIDENCE, 0.2, batch).unwrap().unwrap();
+        let [lower, middle, upper] = differences.map(|difference| difference / (1.0 - 0.04));
         let biases: Vec<Bias> =
-            (1..=seeds).map(|seed| RunResult::new(scene(name), illumination, radius, 4000, seed, &gpu).bias_of_blocks(&gpu, 16)).collect();
+            (1..=seeds).map(|seed| Picture::new(name, illumination, radius, 4000, seed, &gpu).bias_of_blocks(&gpu, 16)).collect();
         println!("{name}: {lower:.4} to {upper:.4}");
-        report(&format!("{name}, {illumination:?}, radius {radius}"), &biases, middle);
-        assert_holds(name, coverage_check(&biases, middle));
+        assert_coverage(&format!("{name}, {illumination:?}, radius {radius}"), &biases, middle);
     }
 }
 
@@ -195,9 +187,8 @@ fn the_bias_of_scenes_lies_in_its_interval_as_often_as_stated() {
 #[test]
 #[ignore = "hundreds of runs: minutes on a software device"]
 fn the_bias_of_many_scenes_lies_in_its_interval_as_often_as_stated() {
-    let both = [Illumination::Photons, Illumination::Split];
     let names = ["open-box", "cornell", "cornell-spheres", "caustic-sphere"];
-    let cases: Vec<_> = names.into_iter().flat_map(|name| both.map(|illumination| (name, illumination, 0.15))).collect();
+    let cases: Vec<_> = names.into_iter().flat_map(|name| BOTH.map(|illumination| (name, illumination, 0.15))).collect();
     scene_intervals_hold(20, &cases, 16);
     scene_intervals_hold(20, &[("disc-over-plane", Illumination::Photons, 0.1)], 16);
 }
@@ -221,7 +212,7 @@ fn no_area_is_lost_where_a_wall_lies_between_the_two_radii() {
 fn the_bias_of_a_shrinking_radius_lies_in_the_scaled_interval() {
     let Some(gpu) = device() else { return };
     const ROUNDS: u32 = 32;
-    let long = RunResult::new(scene("disc-over-plane"), Illumination::Photons, 0.15, 4000, 99, &gpu);
+    let long = Picture::new("disc-over-plane", Illumination::Photons, 0.15, 4000, 99, &gpu);
     let alpha = by_rounds().alpha;
     let batch = |factor: f64, number: u32| {
         if factor < 1.0 {
@@ -229,16 +220,14 @@ fn the_bias_of_a_shrinking_radius_lies_in_the_scaled_interval() {
         }
         let seed = bias_batches::seed(long.plan.settings.seed, number);
         let settings = SceneSettings { rounds: ROUNDS, alpha, seed, ..long.plan.settings.clone() };
-        let (_, plan) = scene_plan(&gpu, &long.scene, &settings, long.plan.sensor)?;
-        let lit = scene::light(&gpu, &long.view(), plan, &mut Control::default())?;
+        let lit = long.of.lit(&gpu, long.of.planned(&gpu, &settings, long.plan.sensor));
         Ok(Some(lit.film.surface_means().flat_map(|mean| mean.to_array()).collect()))
     };
     let truth = bias_batches::difference(Measure::Rmse, CONFIDENCE, 0.2, batch).unwrap().unwrap()[1];
-    let of_seed = |seed| RunResult::new(scene("disc-over-plane"), Illumination::Photons, 0.15, 4000, seed, &gpu).bias(&gpu, 2);
+    let of_seed = |seed| Picture::new("disc-over-plane", Illumination::Photons, 0.15, 4000, seed, &gpu).bias(&gpu, 2);
     let first: Vec<Bias> = (1..=8).map(of_seed).collect();
     let scaled: Vec<Bias> = first.iter().map(|bias| bias.scaled(mean_squared_radius(alpha, ROUNDS))).collect();
-    report("a shrinking radius", &scaled, truth);
-    assert_holds("a shrinking radius", coverage_check(&scaled, truth));
+    assert_coverage("a shrinking radius", &scaled, truth);
     assert!(first.iter().all(|bias| bias.relative > 1.5 * truth), "the first radius's bias is no smaller: {first:?}");
 }
 
@@ -246,57 +235,43 @@ fn the_bias_of_a_shrinking_radius_lies_in_the_scaled_interval() {
 #[test]
 fn light_without_a_map_has_no_bias() {
     let Some(gpu) = device() else { return };
-    let lit = RunResult::new(scene("disc-over-plane"), Illumination::Split, 0.1, 100, 1, &gpu);
+    let lit = Picture::new("disc-over-plane", Illumination::Split, 0.1, 100, 1, &gpu);
     assert_eq!(lit.bias(&gpu, 1).upper, 0.0);
 }
 
 /// A picture of a scene.
-struct RunResult {
-    scene: Scene,
-    camera: Camera,
-    geometry: Geometry,
+struct Picture {
+    of: Viewed,
     plan: ScenePlan,
 }
 
-impl RunResult {
+impl Picture {
     /// `radius` as a share of the scene's extent.
-    fn new(scene: Scene, illumination: Illumination, radius: f64, photons: u32, seed: u64, gpu: &Gpu) -> RunResult {
-        let camera = scene.first_camera();
-        let (min, max) = scene.bounds();
+    fn new(name: &str, illumination: Illumination, radius: f64, photons: u32, seed: u64, gpu: &Gpu) -> Picture {
+        let of = Viewed::new(scene(name));
+        let (min, max) = of.scene.bounds();
         let radius = Some(radius * (max - min).max_element());
         let radii = SceneSettings { radius, caustic_radius: radius, shadow_rays: 1, stop: stop(), ..by_rounds() };
         let settings = SceneSettings { photons, caustic_photons: photons, illumination, seed, ..radii };
-        let (geometry, plan) = scene_plan(gpu, &scene, &settings, square_picture(16)).unwrap();
-        RunResult { scene, camera, geometry, plan }
-    }
-
-    fn view(&self) -> View<'_> {
-        View { geometry: &self.geometry, camera: Some(&self.camera), phases: &[] }
+        Picture { plan: of.planned(gpu, &settings, square_picture(16)), of }
     }
 
     fn bias(&self, gpu: &Gpu, rounds: u32) -> Bias {
-        scene::bias::measure(gpu, &self.scene, &self.view(), &self.plan, (1.0, rounds), &NEVER).unwrap().unwrap()
+        scene::bias::measure(gpu, &self.of.scene, &self.of.view(), &self.plan, (1.0, rounds), &NEVER).unwrap().unwrap()
     }
 
     /// As so many blocks of a run tell it.
     fn bias_of_blocks(&self, gpu: &Gpu, blocks: u32) -> Bias {
         let settings = SceneSettings { rounds: blocks, alpha: 1.0, ..self.plan.settings.clone() };
-        let (_, plan) = scene_plan(gpu, &self.scene, &settings, self.plan.sensor).unwrap();
-        let bias = scene::light(gpu, &self.view(), plan, &mut Control::default()).unwrap().error().bias.unwrap();
+        let bias = self.of.lit(gpu, self.of.planned(gpu, &settings, self.plan.sensor)).error().bias.unwrap();
         assert_eq!(bias.from, BiasFrom::Blocks(blocks));
         bias
-    }
-
-    /// From light at a radius that is so many times smaller.
-    fn difference(&self, gpu: &Gpu, factor: f64, rounds: u32) -> [f64; 3] {
-        bias_batches::difference(Measure::Rmse, CONFIDENCE, factor, |factor, number| self.batch(gpu, rounds, factor, number))
-            .unwrap()
-            .unwrap()
     }
 
     /// Values of a batch at radii times a factor.
     fn batch(&self, gpu: &Gpu, rounds: u32, factor: f64, number: u32) -> photonmill::error::Result<Option<Vec<f64>>> {
         let batches = Batches { seed: self.plan.settings.seed, measure: Measure::Rmse, confidence: CONFIDENCE, rounds, cancelled: &NEVER };
-        batches.values(factor, number, |batch, control| scene::bias::batch(gpu, &self.scene, &self.view(), &self.plan, batch, control))
+        batches
+            .values(factor, number, |batch, control| scene::bias::batch(gpu, &self.of.scene, &self.of.view(), &self.plan, batch, control))
     }
 }

@@ -3,13 +3,14 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use crate::common::lit::Viewed;
 use crate::common::prelude::*;
 use photonmill::engine::End;
 use photonmill::engine::blocks::Share;
 use photonmill::engine::film::{KeptBlock, LatestBlocks};
 use photonmill::engine::room;
 use photonmill::engine::saved::{SavedFilm, SavedRun};
-use photonmill::engine::scene::{self, RunResult, View, trial};
+use photonmill::engine::scene::{self, RunResult};
 use photonmill::engine::watch::{Keep, SaveRun};
 use photonmill::error::Result;
 use photonmill::ledger::BounceFates;
@@ -40,21 +41,14 @@ const SCENE: &str = "cornell-spheres";
 
 /// A small picture of the scene, and what of it was saved.
 fn kept(gpu: &Gpu, settings: &SceneSettings, part: Part) -> (RunResult, SavedRun) {
-    let (lit, saved) = lit(gpu, settings, part);
-    (lit, saved.expect("a block was done"))
-}
-
-/// The same where not a block may be done.
-fn lit(gpu: &Gpu, settings: &SceneSettings, part: Part) -> (RunResult, Option<SavedRun>) {
     let (lit, saved) = try_lit(gpu, settings, part);
-    (lit.unwrap(), saved)
+    (lit.unwrap(), saved.expect("a block was done"))
 }
 
+/// The same where it may fail, or not a block may be done.
 fn try_lit(gpu: &Gpu, settings: &SceneSettings, part: Part) -> (Result<RunResult>, Option<SavedRun>) {
-    let scene = scene(SCENE);
-    let geometry = Geometry::new(&scene).unwrap();
-    let view = View { geometry: &geometry, camera: Some(&scene.first_camera()), phases: &[] };
-    let plan = trial::plan(gpu, &scene, &view, settings, square_picture(8)).unwrap();
+    let viewed = Viewed::new(scene(SCENE));
+    let plan = viewed.tried(gpu, settings, square_picture(8));
     let (cancelled, mut latest) = (AtomicBool::new(false), Latest::default());
     let mut watch = |progress: &engine::Progress| {
         if part.most_rounds.is_some_and(|most| progress.done >= most) {
@@ -63,7 +57,7 @@ fn try_lit(gpu: &Gpu, settings: &SceneSettings, part: Part) -> (Result<RunResult
     };
     let resume = part.resume.map(|run| (PathBuf::from("a file"), run));
     let keep = Keep { scene: SCENE, share: part.share, resume, every: Duration::ZERO, save: Some(&mut latest), dealt: None };
-    let lit = scene::light(gpu, &view, plan, &mut Control { cancelled: &cancelled, progress: &mut watch, keep });
+    let lit = scene::light(gpu, &viewed.view(), plan, &mut Control { cancelled: &cancelled, progress: &mut watch, keep });
     (lit, latest.0)
 }
 
@@ -182,26 +176,16 @@ fn assert_refused<T>(what: &str, ran: Result<T>) {
 }
 
 #[test]
-fn a_run_goes_on_with_nothing_that_its_settings_do_not_ask_for() {
-    let Some(gpu) = device() else { return };
-    let (_, saved) = kept(&gpu, &small(1, 4), Part::default());
-    for (what, run) in forged(&saved) {
-        assert_refused(what, try_lit(&gpu, &small(1, 8), Part { resume: Some(run), ..Part::default() }).0);
-    }
-}
-
-#[test]
 fn parts_of_the_box_come_to_the_bits_of_one() {
     let gpu = device();
     let settings =
         RoomSettings { photons: 501, rounds: 9, mesh: 8, rng: Rng::Philox, shininess: [Some(2.0); 5], ..RoomSettings::default() };
     let try_run = |gpu: Option<&Gpu>, rounds, share, resume| -> Result<SavedRun> {
-        let (never, mut latest) = (AtomicBool::new(false), Latest::default());
+        let mut latest = Latest::default();
         let resume = Option::map(resume, |run| (PathBuf::from("a file"), run));
         let keep = Keep { scene: "open-box", share, resume, every: Duration::ZERO, save: Some(&mut latest), dealt: None };
-        let mut control = Control { cancelled: &never, progress: &mut |_| {}, keep };
         let settings = RoomSettings { rounds, ..settings.clone() };
-        room::run(gpu, &open_box(&settings), &settings, &mut control)?;
+        room::run(gpu, &open_box(&settings), &settings, &mut Control { keep, ..Control::default() })?;
         Ok(latest.0.unwrap())
     };
     let run = |gpu, rounds, share, resume| try_run(gpu, rounds, share, resume).unwrap();
@@ -231,7 +215,7 @@ fn a_block_cut_short_leaves_nothing() {
     assert!(cut.ledger().closes() && cut.ledger().emitted == u64::from(4 * blocks) * photons);
     assert!(cut.left_out.is_multiple_of(photons) && cut.left_out < 4 * photons, "{}", cut.left_out);
     // Fewer rounds than a block has are all there is.
-    let [few, more] = [3, 4].map(|rounds| lit(&gpu, &small(4, rounds), Part::default()).0);
+    let [few, more] = [3, 4].map(|rounds| try_lit(&gpu, &small(4, rounds), Part::default()).0.unwrap());
     assert_eq!((few.end, few.film.rounds, few.film.blocks, few.left_out), (End::Rounds, 3, 0, 0));
     assert!(few.film.relative_error().is_infinite() && mean_red(&few) > 0.0);
     assert!((mean_red(&few) / mean_red(&more) - 1.0).abs() < 0.2);
@@ -274,8 +258,7 @@ fn the_spread_of_blocks_is_the_error() {
     let (mut spread, mut stated) = (0.0, 0.0);
     for pixel in 0..64 {
         let values: Vec<f64> = runs.iter().map(|lit| lit.film.surface_mean(pixel).x).collect();
-        let mean = values.iter().sum::<f64>() / 12.0;
-        spread += values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / 11.0;
+        spread += 12.0 * mean_and_error(&values).1.powi(2);
         stated += runs.iter().map(|lit| lit.film.surface_error(pixel).x.powi(2)).sum::<f64>() / 12.0;
     }
     println!("stated variance over that of runs {:.3}", stated / spread);
@@ -315,11 +298,12 @@ fn errors_are_of_what_surfaces_scatter() {
     assert!((far.0 / near.0 - 1.0).abs() < 0.35, "{} and {}", near.0, far.0);
 }
 
-/// A checkpoint that is damaged anywhere is refused, and nothing panics.
+/// A checkpoint that is damaged anywhere is refused, and nothing panics; nor does a run go on with anything that its settings do not ask
+/// for.
 #[test]
 fn damaged_files_are_refused() {
     let Some(gpu) = device() else { return };
-    let (_, saved) = kept(&gpu, &small(1, 2), Part::default());
+    let (_, saved) = kept(&gpu, &small(1, 4), Part::default());
     let bytes = saved.to_bytes();
     assert!(SavedRun::from_bytes(&bytes).unwrap() == saved);
     for length in [0, 5, 16, 23, 24, 100, bytes.len() / 2, bytes.len() - 1] {
@@ -348,7 +332,10 @@ fn damaged_files_are_refused() {
         lie(&mut lying);
         assert!(SavedRun::from_bytes(&lying.to_bytes()).is_err(), "lie {number}");
     }
-    assert_eq!(film.blocks, 2);
+    assert_eq!(film.blocks, 4);
+    for (what, run) in forged(&saved) {
+        assert_refused(what, try_lit(&gpu, &small(1, 8), Part { resume: Some(run), ..Part::default() }).0);
+    }
 }
 
 /// The film's unit follows from the scene alone, so that any run can go on.
@@ -362,7 +349,7 @@ fn the_films_unit_is_the_same_in_short_and_long_runs() {
     assert_eq!(unit(1), unit(1 << 16));
     let shift = |rounds| {
         let settings = RoomSettings { rounds, shininess: [Some(2.0); 5], ..RoomSettings::default() };
-        RoomPlan::new(&open_box(&settings), &settings, &Limits::of_host()).unwrap().film_shift
+        plan_for_host(&settings).film_shift
     };
     assert_eq!(shift(1), shift(100_000));
 }

@@ -1,12 +1,10 @@
 //! What a run costs in counts, which no clock disturbs: dispatches, submissions, pipelines, events and bytes of a few
 //! small runs beside the numbers that they had. Whoever changes one of them on purpose writes the new one here.
 
-use crate::common::lit;
+use crate::common::lit::{Viewed, light};
 use crate::common::prelude::*;
-use photonmill::engine::scene::View;
 use photonmill::measure::bench::room::{self, Counts};
-use photonmill::path::StoredPath;
-use photonmill::records::{CameraPath, LightPath, VisiblePoint};
+use photonmill::records::CameraPath;
 
 /// Counts of a run: dispatches, submissions, events of all photons, bytes on the device, and bytes that the build moves.
 #[derive(Debug, PartialEq)]
@@ -14,16 +12,17 @@ struct Cost {
     dispatches: u64,
     submissions: u64,
     events: u64,
+    /// These tell if a record has grown: a plan has buffers of all of them.
     device_bytes: u64,
     /// Over the events, rounded.
     build_bytes_per_event: u64,
 }
 
 /// 1000 photons, 4 bounces, 2 rounds, 5 x 8 x 8 texels over the grid.
-fn of_the_box(builder: Builder, counters: Option<u32>) -> Option<Cost> {
+fn of_the_box(builder: Builder, counters: Option<u32>) -> Cost {
     let cost =
         |dispatches, build_bytes_per_event| Cost { dispatches, submissions: 4, events: 3530, device_bytes: 597_980, build_bytes_per_event };
-    Some(match builder {
+    match builder {
         // A round: two lights, four bounces, five of the index, the gather, the film.
         Builder::Naive => cost(2 * 13, 254),
         // And one after each bounce, which counts it, and one before the index, whose size only the device knows.
@@ -34,8 +33,8 @@ fn of_the_box(builder: Builder, counters: Option<u32>) -> Option<Cost> {
         Builder::Scan => Cost { device_bytes: 598_024, ..cost(2 * 26, 212) },
         // The lights', and no path is stored.
         Builder::Persistent => Cost { device_bytes: 502_076, ..cost(2 * 10, 12) },
-        Builder::Cpu => return None,
-    })
+        Builder::Cpu => panic!("it is none of the device's"),
+    }
 }
 
 #[test]
@@ -59,16 +58,16 @@ fn the_box_costs_what_it_did() {
             device_bytes: outcome.plan.bytes(),
             build_bytes_per_event: (build.cost.bytes / build.items).round() as u64,
         };
-        let expected = of_the_box(builder, counters).unwrap_or_else(|| panic!("{}: write here what it costs: {found:?}", builder.name()));
-        assert_eq!(found, expected, "{}", builder.name());
+        assert_eq!(found, of_the_box(builder, counters), "{}", builder.name());
     }
 }
 
-fn small_scene() -> (Scene, Geometry, SceneSettings, Sensor) {
-    let scene = scene("cornell-spheres");
+fn small_scene(gpu: &Gpu) -> (Viewed, ScenePlan) {
+    let spheres = Viewed::new(scene("cornell-spheres"));
     let settings =
         SceneSettings { photons: 1000, caustic_photons: 500, bounces: 5, rounds: 2, math: Math::Strict, paranoid: true, ..by_rounds() };
-    (scene.clone(), Geometry::new(&scene).unwrap(), settings, Sensor::Picture { width: 16, height: 12 })
+    let plan = spheres.planned(gpu, &settings, Sensor::Picture { width: 16, height: 12 });
+    (spheres, plan)
 }
 
 /// Bytes of a plan without its camera paths, of which there are more where one dispatch may leave some under way.
@@ -82,8 +81,7 @@ const PIPELINES: usize = 14;
 #[test]
 fn a_scene_is_planned_at_what_it_cost() {
     let Some(gpu) = device() else { return };
-    let (scene, geometry, settings, sensor) = small_scene();
-    let plan = ScenePlan::new(&scene, &geometry, &settings, sensor, &engine::limits(gpu.facts())).unwrap();
+    let (_, plan) = small_scene(&gpu);
     assert_eq!(bytes_without_paths(&plan), BYTES);
 }
 
@@ -92,20 +90,12 @@ fn a_scene_is_planned_at_what_it_cost() {
 fn a_scene_costs_what_it_did() {
     // No other test has made pipelines on it.
     let Some(gpu) = device_with(Options { by_plan: true, ..Options::default() }) else { return };
-    let (scene, geometry, settings, sensor) = small_scene();
-    let plan = ScenePlan::new(&scene, &geometry, &settings, sensor, &engine::limits(gpu.facts())).unwrap();
+    let (spheres, plan) = small_scene(&gpu);
     let bytes = bytes_without_paths(&plan);
-    let lit = lit::light(&gpu, &View { geometry: &geometry, camera: scene.cameras.first(), phases: &[] }, plan);
+    let lit = light(&gpu, &spheres.view(), plan);
     let events = [0, 1].map(|map: usize| Counts::of(&lit.fates[map], 1).events as u64);
     // Where one dispatch may leave camera paths under way, the host looks how many, each round.
     let submissions = if lit.plan.chains_go_on() { 7 } else { 4 };
     assert_eq!((lit.dispatches, lit.submissions, lit.pipelines), (88, submissions, PIPELINES));
     assert_eq!((events, bytes), ([3483, 2439], BYTES));
-}
-
-/// Records decide how many bytes an event moves.
-#[test]
-fn records_are_as_small_as_they_were() {
-    assert_eq!([size_of::<StoredPath>(), size_of::<StoredPhoton>(), size_of::<Origin>()], [48, 16, 8]);
-    assert_eq!([size_of::<LightPath>(), size_of::<MapPhoton>(), size_of::<VisiblePoint>()], [48, 32, 48]);
 }

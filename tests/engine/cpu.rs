@@ -24,6 +24,11 @@ fn kinds_of_vectors() -> Vec<Arch> {
     kinds
 }
 
+/// Each of them, with so many threads.
+fn vectors_and_threads() -> impl Iterator<Item = (Arch, usize)> {
+    kinds_of_vectors().into_iter().flat_map(|vectors| [1, 3].map(|threads| (vectors, threads)))
+}
+
 /// A block's photons and fates.
 type Traced = (Vec<Photon>, Vec<Tally>);
 
@@ -40,17 +45,14 @@ fn traced(scene: &RoomScene, plan: &RoomPlan, vectors: Arch, threads: usize) -> 
 
 fn same_blocks(found: &[Traced], expected: &[Traced]) -> Check {
     let same = |(a, b): (&Traced, &Traced)| bytemuck::cast_slice::<_, u32>(&a.0) == bytemuck::cast_slice::<_, u32>(&b.0) && a.1 == b.1;
-    match found.iter().zip(expected).position(|blocks| !same(blocks)) {
-        Some(place) => Err(format!("block {place} of {} differs", expected.len())),
-        None if found.len() == expected.len() => Ok(()),
-        None => Err(format!("{} blocks instead of {}", found.len(), expected.len())),
-    }
+    require(found.len() == expected.len(), || format!("{} blocks instead of {}", found.len(), expected.len()))?;
+    let differing = pairs(found, expected).position(|blocks| !same(blocks));
+    differing.map_or(Ok(()), |place| Err(format!("block {place} of {} differs", expected.len())))
 }
 
 #[test]
 fn neither_threads_nor_vectors_change_a_photon() {
-    let kinds = kinds_of_vectors();
-    println!("{kinds:?}");
+    println!("{:?}", kinds_of_vectors());
     for rng in [Rng::Rand48, Rng::Mt, Rng::Philox, Rng::Sobol] {
         for (emission, shininess) in
             [(EmissionLaw::Uniform, [None; 5]), (EmissionLaw::Cosine, [Some(2.0), None, Some(0.5), Some(0.0), Some(50.0)])]
@@ -63,7 +65,7 @@ fn neither_threads_nor_vectors_change_a_photon() {
                 let (scene, plan) = (open_box(&settings), plan_for_host(&settings));
                 let expected = traced(&scene, &plan, Arch::Scalar, 1);
                 assert!(photons < 500 || expected.iter().map(|(photons, _)| photons.len()).sum::<usize>() > photons as usize);
-                for (vectors, threads) in kinds.iter().flat_map(|kind| [1, 3].map(|threads| (*kind, threads))) {
+                for (vectors, threads) in vectors_and_threads() {
                     let found = traced(&scene, &plan, vectors, threads);
                     let what = format!("{rng:?}, {emission:?}, {photons} photons, {vectors:?}, {threads} threads");
                     assert_holds(&what, same_blocks(&found, &expected));
@@ -167,7 +169,6 @@ fn slab(settings: &RoomSettings) -> RoomScene {
 
 #[test]
 fn splats_are_the_sums_of_brute_force() {
-    let kinds = kinds_of_vectors();
     for (mesh, radius, count) in [
         (1, 0.5, 300),
         (2, 0.3, 300),
@@ -188,12 +189,10 @@ fn splats_are_the_sums_of_brute_force() {
                 let mut expected = vec![0; plan.points.len() * plan.channel_count as usize];
                 gather_brute(&plan, &photons, &mut expected);
                 assert!(expected.iter().any(|sum| *sum > 0));
-                for vectors in &kinds {
-                    for threads in [1, 3] {
-                        let found = splatted(&plan, &photons, *vectors, threads);
-                        let what = format!("mesh {mesh}, radius {radius}, {vectors:?}, {threads} threads");
-                        assert_holds(what, equal_sums("film", &found, &expected));
-                    }
+                for (vectors, threads) in vectors_and_threads() {
+                    let found = splatted(&plan, &photons, vectors, threads);
+                    let what = format!("mesh {mesh}, radius {radius}, {vectors:?}, {threads} threads");
+                    assert_holds(what, equal_sums("film", &found, &expected));
                 }
                 let mut larger = plan.clone();
                 larger.settings.radius *= 1.2;

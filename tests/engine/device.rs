@@ -99,9 +99,7 @@ fn a_device_that_is_absent_is_named_with_those_present() {
         assert!(matches!(error, Error::DeviceAbsent { .. }), "{error}");
         let message = error.to_string();
         assert!(message.contains(wanted) && !message.contains('\n'), "{message}");
-        for facts in &present {
-            assert!(message.contains(&facts.name), "{message} leaves out {}", facts.name);
-        }
+        assert!(present.iter().all(|facts| message.contains(&facts.name)), "{message} leaves out one of {present:?}");
         assert_eq!(error.exit_code(), 2);
     }
 }
@@ -110,8 +108,9 @@ fn a_device_that_is_absent_is_named_with_those_present() {
 fn a_device_opens_by_index_and_by_part_of_its_name() {
     let Some(default) = device() else { return };
     let facts = default.facts();
-    for name in [facts.index.to_string(), facts.name.clone(), facts.name[..4].to_uppercase()] {
-        let Ok(gpu) = Gpu::open(&Options { device: Some(name.clone()), validate: true, ..Options::default() }) else { panic!("{name}") };
+    // Without the layer nothing is said.
+    for (name, validate) in [(facts.index.to_string(), true), (facts.name.clone(), true), (facts.name[..4].to_uppercase(), false)] {
+        let Ok(gpu) = Gpu::open(&Options { device: Some(name.clone()), validate, ..Options::default() }) else { panic!("{name}") };
         gpu.check_validation().unwrap();
         if name.len() > 4 || name.parse::<usize>().is_ok() {
             assert_eq!(gpu.facts().name, facts.name);
@@ -153,15 +152,6 @@ fn a_validation_message_is_an_error() {
     assert!(matches!(gpu.check_validation(), Err(Error::Validation { .. })));
 }
 
-#[test]
-fn without_the_layer_nothing_is_said() {
-    if device().is_none() {
-        return;
-    }
-    let gpu = Gpu::open(&Options { device: std::env::var("PHOTONMILL_DEVICE").ok(), ..Options::default() }).unwrap();
-    gpu.check_validation().unwrap();
-}
-
 /// Scopes directly inside another one.
 fn children<'a>(rows: &'a [Row], parent: &'a str) -> impl Iterator<Item = &'a Row> {
     rows.iter()
@@ -177,17 +167,13 @@ fn nesting_check(rows: &[Row]) -> Check {
         for (clock, of) in [("device", (|row| row.gpu_ms) as fn(&Row) -> Option<f64>), ("host", |row| row.wall_ms)] {
             let inside: f64 = children(rows, &row.name).filter_map(of).sum();
             let count: u64 = children(rows, &row.name).map(|row| row.count).sum();
-            if let Some(time) = of(row)
-                && inside > time + slack(count)
-            {
-                return Err(format!("{} took {time} ms on the {clock}, what is inside it {inside} ms", row.name));
-            }
+            require(of(row).is_none_or(|time| inside <= time + slack(count)), || {
+                format!("{} took {:?} ms on the {clock}, what is inside it {inside} ms", row.name, of(row))
+            })?;
         }
-        if let (Some(gpu), Some(wall)) = (row.gpu_ms, row.wall_ms)
-            && gpu > wall
-        {
-            return Err(format!("{} took {gpu} ms on the device within {wall} ms", row.name));
-        }
+        require(row.gpu_ms.zip(row.wall_ms).is_none_or(|(gpu, wall)| gpu <= wall), || {
+            format!("{} took {:?} ms on the device within {:?} ms", row.name, row.gpu_ms, row.wall_ms)
+        })?;
     }
     Ok(())
 }
@@ -209,15 +195,11 @@ fn count_check(timings: &Timings, settings: &RoomSettings, chunks: u64) -> Check
     for name in &names {
         // A round is one, in as many chunks as it takes.
         let expected = if name == "round" { rounds } else { rounds * chunks };
-        match timings.row(name) {
-            Some(row) if row.count == expected => {}
-            Some(row) => return Err(format!("{name} ran {} times instead of {expected}", row.count)),
-            None => return Err(format!("{name} is missing")),
-        }
+        let count = timings.row(name).map(|row| row.count);
+        require(count == Some(expected), || format!("{name} ran {count:?} times instead of {expected}"))?;
     }
     let rows = timings.rows().iter().filter(|row| row.name.contains("bounce")).count();
-    require(rows == bounces as usize, || format!("{rows} rows of bounces instead of {bounces}"))?;
-    Ok(())
+    require(rows == bounces as usize, || format!("{rows} rows of bounces instead of {bounces}"))
 }
 
 fn timings_nest(many_rounds_of: &[Builder]) {
@@ -266,16 +248,6 @@ fn timings_of_many_rounds_nest_and_count() {
     timings_nest(&Builder::ON_GPU);
 }
 
-#[test]
-fn the_cpu_builder_is_timed_on_the_host() {
-    let settings = RoomSettings { builder: Builder::Cpu, rounds: 3, chunk: Some(1500), mesh: 16, ..RoomSettings::default() };
-    let outcome = run_on_cpu(&settings);
-    assert_holds("cpu", count_check(&outcome.timings, &settings, u64::from(outcome.plan.chunks_per_round)));
-    assert_holds("cpu", nesting_check(outcome.timings.rows()));
-    assert!(outcome.timings.rows().iter().all(|row| row.gpu_ms.is_none() && row.wall_ms.is_some()));
-    assert!(outcome.device.is_none());
-}
-
 /// A run makes no pipeline that its plan has no use for, and a second one none at all.
 #[test]
 fn a_run_makes_the_pipelines_of_its_plan_once() {
@@ -289,11 +261,17 @@ fn a_run_makes_the_pipelines_of_its_plan_once() {
     assert_eq!(gpu.work().pipelines - before, 3);
 }
 
+/// Scopes nest and are counted, and both checks complain about what is off.
 #[test]
-fn the_checks_of_timings_complain() {
-    let settings = RoomSettings { builder: Builder::Cpu, rounds: 2, mesh: 4, ..RoomSettings::default() };
-    let timings = run_on_cpu(&settings).timings;
-    assert_holds("the run itself", nesting_check(timings.rows()));
+fn the_cpu_builder_is_timed_on_the_host() {
+    let settings = RoomSettings { builder: Builder::Cpu, rounds: 3, chunk: Some(1500), mesh: 16, ..RoomSettings::default() };
+    let outcome = run_on_cpu(&settings);
+    let (timings, chunks) = (&outcome.timings, u64::from(outcome.plan.chunks_per_round));
+    assert_holds("cpu", count_check(timings, &settings, chunks));
+    assert_holds("cpu", nesting_check(timings.rows()));
+    assert!(timings.rows().iter().all(|row| row.gpu_ms.is_none() && row.wall_ms.is_some()));
+    assert!(outcome.device.is_none());
+
     let spoiled = |name: &str, spoil: fn(&mut Row)| {
         let mut rows = timings.rows().to_vec();
         rows.iter_mut().filter(|row| row.name == name).for_each(spoil);
@@ -305,9 +283,9 @@ fn the_checks_of_timings_complain() {
 
     let mut twice = timings.clone();
     twice.count("round/build");
-    assert_complains("a build counted twice", count_check(&twice, &settings, 1));
+    assert_complains("a build counted twice", count_check(&twice, &settings, chunks));
     let mut extra = timings.clone();
     extra.count("round/build/bounce 1");
-    assert_complains("a bounce too many", count_check(&extra, &settings, 1));
-    assert_complains("a round left out", count_check(&timings, &RoomSettings { rounds: 3, ..settings.clone() }, 1));
+    assert_complains("a bounce too many", count_check(&extra, &settings, chunks));
+    assert_complains("a round left out", count_check(timings, &RoomSettings { rounds: 4, ..settings.clone() }, chunks));
 }

@@ -1,8 +1,7 @@
 //! What goes wrong around a run: it is killed, or the disk is full. Nothing that was written before is lost, nothing is half-written, and
 //! what goes on comes to the same bits.
 
-use std::io::{BufRead, BufReader};
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 use crate::common::prelude::*;
 use crate::common::program::on_device;
@@ -22,15 +21,12 @@ fn ended_runs_go_on(signals: &[(&str, i32)], kills: usize) {
     for (number, (signal, code, every)) in asked.chain(std::iter::repeat_n(("KILL", None, "1ms"), kills)).enumerate() {
         let resume = if done > 0 { "--resume c.pms" } else { "" };
         let line = line(65_536, &format!("-o a.exr --checkpoint c.pms --every {every} {resume}")).replace(" -q ", " --progress json ");
-        let mut child = place.shell(&format!("exec env --default-signal=INT,TERM,HUP photonmill {line}"));
-        let mut child = child.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
-        let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map_while(Result::ok);
+        let mut run = place.start(&line);
         // Some blocks later each time.
-        let progress = lines.by_ref().filter(|line| line.contains("\"photons\"")).nth((number * 3 + 6) % 17);
-        assert!(progress.is_some(), "SIG{signal}: no progress");
-        assert!(Command::new("kill").args([&format!("-{signal}"), &child.id().to_string()]).status().unwrap().success());
-        let rest: Vec<String> = lines.collect();
-        assert_eq!(child.wait().unwrap().code(), code, "SIG{signal}: {rest:?}");
+        (0..=(number * 3 + 6) % 17).for_each(|_| _ = run.line_with("\"photons\""));
+        run.signal(signal);
+        let (ended_with, rest, _) = run.end();
+        assert_eq!(ended_with, code, "SIG{signal}: {rest:?}");
         let saved = SavedRun::from_bytes(&std::fs::read(place.at("c.pms")).unwrap()).unwrap();
         assert!(saved.done.count() >= done && saved.missing() > 0, "SIG{signal}: {:?}", saved.done);
         assert!(saved.done.count() > done || code.is_none(), "SIG{signal}: nothing was saved");
@@ -249,7 +245,7 @@ fn inputs_and_pipes_stay_what_they_are() {
     assert!(Command::new("mkfifo").args([place.at("pipe"), place.at("pipe.ply")]).status().unwrap().success());
     let read = "it is also read";
     let no_file = "it is no file that could be replaced as a whole; name a file";
-    for (line, expected) in [
+    let refused = [
         ("render cornell --size 8x8 --map m.pm -o y.exr --checkpoint m.pm".into(), read),
         ("render cornell --size 8x8 --map m.pm -o y.exr --json ./m.pm".into(), read),
         (format!("render cornell {SMALL} -o 1.exr --resume 1.pms --trace 1.pms"), read),
@@ -262,10 +258,8 @@ fn inputs_and_pipes_stay_what_they_are() {
         (format!("render cornell {SMALL} -o y.exr --checkpoint pipe"), no_file),
         ("merge 1.pms 2.pms --checkpoint pipe".into(), no_file),
         (format!("bake cornell {} -o d --checkpoint d", SMALL.replace("--size 8x8 ", "")), "--checkpoint writes it too"),
-    ] {
-        let refusal = place.refusal(&line).unwrap_or_else(|why| panic!("{line}: {why}"));
-        assert!(refusal.contains(expected), "{line}: {refusal}");
-    }
+    ];
+    place.assert_refused(refused.map(|(line, word)| (line, [word])));
     let (_, stderr) = place.succeed("render cornell --size 8x8 --samples 1 --photons 4000000 --time 1ms -q -o y.exr --checkpoint none.pms");
     assert!(stderr.contains("warning: --checkpoint none.pms: is not written, as no block of rounds was done"), "{stderr}");
     place.succeed("merge 1.pms 2.pms -o both.exr --checkpoint both.pms");
@@ -277,13 +271,9 @@ fn inputs_and_pipes_stay_what_they_are() {
 fn devices_and_faults_that_there_are_not_are_refused() {
     let Some(_) = device() else { return };
     let place = Place::new();
-    let refusal = place.refusal(&format!("render cornell {SMALL} -o y.exr --devices 0,99")).unwrap();
-    assert!(refusal.starts_with("photonmill: --devices 0,99: there is no device 99;"), "{refusal}");
     // Numbers in a device's name are not its number.
-    for number in ["15", "99"] {
-        let output = place.run(&format!("render cornell {SMALL} -o y.exr --device {number}"));
-        assert_eq!(output.status.code(), Some(2), "{}", text(&output.stderr));
-    }
+    let absent = [("--devices 0,99", "--devices 0,99: there is no device 99;"), ("--device 15", "15"), ("--device 99", "99")];
+    place.assert_refused(absent.map(|(device, word)| (format!("render cornell {SMALL} -o y.exr {device}"), [word])));
     for faults in ["x", "vkQueueSubmit2@", "vkQueueSubmit2@20=foo", "vkQueueSubmit2@0=lost", ","] {
         let output = place.command(&on_device("render cornell -o y.exr")).env("PHOTONMILL_FAULTS", faults).output().unwrap();
         let stderr = text(&output.stderr);

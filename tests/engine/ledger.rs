@@ -40,10 +40,8 @@ fn fates(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings) -> Fates {
     assert_holds(format!("cpu\n{settings:?}"), closes(&expected, total));
     for builder in Builder::ON_GPU {
         let settings = RoomSettings { builder, paranoid: true, ..settings.clone() };
-        match closed_fates(gpu, scene, &settings) {
-            Ok(found) => assert_eq!(found, expected, "{settings:?}"),
-            Err(complaint) => panic!("{settings:?}: {complaint}"),
-        }
+        let found = closed_fates(gpu, scene, &settings).unwrap_or_else(|complaint| panic!("{settings:?}: {complaint}"));
+        assert_eq!(found, expected, "{settings:?}");
     }
     expected
 }

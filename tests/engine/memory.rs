@@ -33,21 +33,26 @@ fn the_papers_line_takes_what_its_plan_says() {
         RoomSettings { rounds: 2, sums: Sums::F32, rng: Rng::Philox, ..small() },
         RoomSettings { radius: 0.004, ..small() },
         RoomSettings { photons: 999, mesh: 5, rounds: 2, ..RoomSettings::preset(Preset::Rounds) },
+        RoomSettings { counters: Some(4), ..small() },
+        // Weights at the eye, which only the builder that keeps order holds apart from their photons.
+        RoomSettings { builder: Builder::Scan, shininess: [Some(2.0); 5], ..small() },
     ];
-    cases.push(RoomSettings { counters: Some(4), ..small() });
     cases.extend(Builder::ON_GPU.map(|builder| RoomSettings { builder, ..small() }));
-    // Weights at the eye, which only the builder that keeps order holds apart from their photons.
-    cases.push(RoomSettings { builder: Builder::Scan, shininess: [Some(2.0); 5], ..small() });
     for settings in cases {
         let (bytes, outcome) = taken(&gpu, || run(&gpu, &settings));
-        let plan = &outcome.plan;
-        assert_holds(format!("{settings:?}"), check("the paper's line", bytes, plan.bytes(), &plan.buffers()));
+        let buffers = outcome.plan.buffers();
+        assert_holds(format!("{settings:?}"), check("the paper's line", bytes, outcome.plan.bytes(), &buffers));
+        // A plan that forgot any one of its buffers would be found out by what the engine takes.
+        for forgotten in 0..buffers.len() {
+            let mut others = buffers.clone();
+            let PlannedBuffer { name, .. } = others.remove(forgotten);
+            assert_complains(name, check("the paper's line", bytes, bytes_of(&others), &others));
+        }
     }
 }
 
 fn scenes_take_what_they_say(all: bool) {
     let Some(gpu) = device() else { return };
-    let limits = engine::limits(gpu.facts());
     let small = SceneSettings { photons: 777, caustic_photons: 555, bounces: 5, rounds: 2, chunk: Some(500), ..by_rounds() };
     let gathers = SceneSettings { final_gather: true, ..small.clone() };
     let all_from_photons = SceneSettings { illumination: Illumination::Photons, ..small.clone() };
@@ -59,8 +64,7 @@ fn scenes_take_what_they_say(all: bool) {
     }
     for (name, settings, sensor, phases) in cases {
         let scene = scene(name);
-        let geometry = Geometry::new(&scene).unwrap();
-        let plan = ScenePlan::new(&scene, &geometry, &settings, sensor, &limits).unwrap();
+        let (geometry, plan) = scene_plan(&gpu, &scene, &settings, sensor).unwrap();
         let stated = plan.bytes_of(phases.max(1));
         let receivers = vec![vec![Default::default(); 9]; phases];
         let camera = scene.cameras.first().filter(|_| phases == 0);
@@ -78,17 +82,4 @@ fn scenes_take_what_their_plan_says() {
 #[ignore = "long: minutes on a software device"]
 fn scenes_take_what_their_plan_says_however_they_are_lit() {
     scenes_take_what_they_say(true);
-}
-
-/// A plan that forgot any one of its buffers would be found out by what the engine takes.
-#[test]
-fn the_check_complains_about_a_forgotten_buffer() {
-    let Some(gpu) = device() else { return };
-    let (bytes, outcome) = taken(&gpu, || run(&gpu, &small()));
-    let buffers = outcome.plan.buffers();
-    for forgotten in 0..buffers.len() {
-        let mut others = buffers.clone();
-        let PlannedBuffer { name, .. } = others.remove(forgotten);
-        assert_complains(name, check("the paper's line", bytes, bytes_of(&others), &others));
-    }
 }

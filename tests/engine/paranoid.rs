@@ -1,40 +1,30 @@
 //! `--paranoid` and `--replay`: no run has a value that is infinite or no number; one that is planted is counted and
 //! its photon named; and that photon takes the same path alone as among all others.
 
+use crate::common::lit::Viewed;
 use crate::common::nothing_odd;
 use crate::common::prelude::*;
 use photonmill::engine::nonfinite_values::{NonfiniteValues, What};
 use photonmill::engine::replay::PhotonName;
-use photonmill::engine::room::{self};
+use photonmill::engine::room;
+use photonmill::engine::scene::RunResult;
 use photonmill::engine::scene::replay::replay;
-use photonmill::engine::scene::{self, RunResult, View};
-
-const SENSOR: Sensor = Sensor::Picture { width: 24, height: 24 };
 
 fn paranoid() -> SceneSettings {
     SceneSettings { photons: 3000, caustic_photons: 3000, rounds: 2, paranoid: true, ..by_rounds() }
 }
 
-fn plan_of(gpu: &Gpu, scene: &Scene, geometry: &Geometry, settings: &SceneSettings) -> ScenePlan {
-    ScenePlan::new(scene, geometry, settings, SENSOR, &engine::limits(gpu.facts())).unwrap()
-}
-
-fn light(gpu: &Gpu, scene: &Scene, geometry: &Geometry, settings: &SceneSettings) -> RunResult {
-    let camera = scene.first_camera();
-    let view = View { geometry, camera: Some(&camera), phases: &[] };
-    let plan = plan_of(gpu, scene, geometry, settings);
-    scene::light(gpu, &view, plan, &mut Control::default()).unwrap()
+fn lit(gpu: &Gpu, viewed: &Viewed, settings: &SceneSettings) -> RunResult {
+    viewed.lit(gpu, viewed.planned(gpu, settings, square_picture(24)))
 }
 
 /// No value of a scene with mirrors and glass is infinite or no number, by either way of lighting it.
 pub fn scene_is_finite(gpu: &Gpu, settings: &SceneSettings) -> Check<Complaint> {
-    let scene = built_in::by_name("cornell-spheres").unwrap();
-    let geometry = Geometry::new(&scene).unwrap();
-    for illumination in [Illumination::Split, Illumination::Photons] {
+    let spheres = Viewed::new(scene("cornell-spheres"));
+    BOTH.into_iter().try_for_each(|illumination| {
         let settings = SceneSettings { illumination, paranoid: true, ..settings.clone() };
-        nothing_odd(light(gpu, &scene, &geometry, &settings).nonfinite_values.as_ref().unwrap())?;
-    }
-    Ok(())
+        nothing_odd(lit(gpu, &spheres, &settings).nonfinite_values.as_ref().unwrap())
+    })
 }
 
 /// Nor is one of the paper's box.
@@ -44,30 +34,24 @@ pub fn box_is_finite(gpu: &Gpu, settings: &RoomSettings) -> Check<Complaint> {
 
 /// A scene by a way of lighting. Looking changes nothing, which is shown of those that are compared.
 fn has_no_odd_value(gpu: &Gpu, name: &str, illumination: Illumination, is_compared: bool) {
-    let scene = built_in::by_name(name).unwrap();
-    let geometry = Geometry::new(&scene).unwrap();
+    let viewed = Viewed::new(scene(name));
     let settings = SceneSettings { illumination, final_gather: illumination == Illumination::Split, photons: 1000, ..paranoid() };
-    let lit = light(gpu, &scene, &geometry, &settings);
-    assert_holds(format!("{name}, {illumination:?}"), nothing_odd(lit.nonfinite_values.as_ref().unwrap()));
-    assert_eq!(lit.nonfinite_values, Some(NonfiniteValues::default()));
+    let watched = lit(gpu, &viewed, &settings);
+    assert_holds(format!("{name}, {illumination:?}"), nothing_odd(watched.nonfinite_values.as_ref().unwrap()));
+    assert_eq!(watched.nonfinite_values, Some(NonfiniteValues::default()));
     if is_compared {
-        let unwatched = light(gpu, &scene, &geometry, &SceneSettings { paranoid: false, ..settings });
+        let unwatched = lit(gpu, &viewed, &SceneSettings { paranoid: false, ..settings });
         assert_eq!(unwatched.nonfinite_values, None);
-        assert_eq!(unwatched.film, lit.film, "{name}, {illumination:?}");
+        assert_eq!(unwatched.film, watched.film, "{name}, {illumination:?}");
     }
 }
 
-/// Mirrors and glass, and a sky.
+/// Mirrors and glass, and a sky. (Of the paper's box every run of `tests/common` is looked at.)
 #[test]
 fn no_built_in_scene_has_a_value_that_is_no_number() {
     let Some(gpu) = device() else { return };
     has_no_odd_value(&gpu, "cornell-spheres", Illumination::Split, false);
     has_no_odd_value(&gpu, "sky-over-plane", Illumination::Photons, true);
-    for preset in [Preset::Naive, Preset::Modified, Preset::Phong, Preset::Rounds] {
-        let settings = RoomSettings { paranoid: true, rounds: 2, ..RoomSettings::preset(preset) };
-        assert_holds(format!("{preset:?}"), box_is_finite(&gpu, &settings));
-        assert_eq!(run_on_cpu(&settings).nonfinite_values, Some(NonfiniteValues::default()), "{preset:?}");
-    }
 }
 
 #[test]
@@ -85,27 +69,21 @@ fn none_of_all_built_in_scenes_has_a_value_that_is_no_number() {
 #[test]
 fn a_planted_value_is_counted_and_its_photon_named() {
     let Some(gpu) = device() else { return };
-    let scene = built_in::by_name("cornell-spheres").unwrap();
-    let mut geometry = Geometry::new(&scene).unwrap();
-    let mirror = scene.materials.iter().position(|material| material.name == "mirror").unwrap();
+    let mut spheres = Viewed::new(scene("cornell-spheres"));
+    let mirror = spheres.scene.materials.iter().position(|material| material.name == "mirror").unwrap();
     for poison in [f32::NAN, f32::INFINITY] {
-        geometry.materials[mirror].base_colour = Vec3::new(1.0, poison, 1.0);
+        spheres.geometry.materials[mirror].base_colour = Vec3::new(1.0, poison, 1.0);
         let settings = SceneSettings { rounds: 1, photons: 400, caustic_photons: 50, ..paranoid() };
-        let lit = light(&gpu, &scene, &geometry, &settings);
-        let nonfinite_values = lit.nonfinite_values.unwrap();
+        let plan = spheres.planned(&gpu, &settings, square_picture(24));
+        let nonfinite_values = spheres.lit(&gpu, plan.clone()).nonfinite_values.unwrap();
         assert!(nonfinite_values.count > 10, "{nonfinite_values:?}");
         assert!(nonfinite_values.text().contains("--replay 0:"), "{}", nonfinite_values.text());
-        let plan = plan_of(&gpu, &scene, &geometry, &settings);
-        let named: BTreeSet<u32> = nonfinite_values
-            .first
-            .iter()
-            .filter(|nonfinite_value| nonfinite_value.what == What::Photon)
-            .map(|nonfinite_value| nonfinite_value.item)
-            .collect();
+        let of_photons = nonfinite_values.first.iter().filter(|value| value.what == What::Photon);
+        let named: BTreeSet<u32> = of_photons.map(|value| value.item).collect();
         // All of them were written down, so that those not named have nothing odd.
         assert!(named.len() < 60 && !named.is_empty(), "{nonfinite_values:?}");
         for photon in named.iter().copied().take(6).chain((0..400).filter(|photon| !named.contains(photon)).take(6)) {
-            let path = replay(&gpu, &geometry, &plan, PhotonName { round: 0, photon, caustic: false }).unwrap();
+            let path = replay(&gpu, &spheres.geometry, &plan, PhotonName { round: 0, photon, caustic: false }).unwrap();
             assert_eq!(path.nonfinite_values.unwrap().count > 0, named.contains(&photon), "photon {photon}: {:?}", path.vertices);
         }
     }

@@ -2,11 +2,11 @@
 
 use std::sync::atomic::AtomicBool;
 
+use crate::common::lit::Viewed;
 use crate::common::prelude::*;
 use photonmill::engine::End;
 use photonmill::engine::scene::pilot::{self, Pilot};
 use photonmill::engine::scene::{RunResult, SceneFilm};
-use photonmill::engine::scene::{View, light, trial};
 use photonmill::plan::work_division::{Division, Free};
 use photonmill::settings::stop::Stop;
 use photonmill::settings::tile_samples::TileSamples;
@@ -15,33 +15,17 @@ const SIZE: u32 = 16;
 static NEVER: AtomicBool = AtomicBool::new(false);
 
 /// Mirrors and glass show each path something else.
-struct Spheres {
-    scene: Scene,
-    geometry: Geometry,
-    camera: Camera,
+fn spheres() -> Viewed {
+    Viewed::new(scene("cornell-spheres"))
 }
 
-impl Spheres {
-    fn new() -> Spheres {
-        let scene = scene("cornell-spheres");
-        Spheres { geometry: Geometry::new(&scene).unwrap(), camera: scene.first_camera(), scene }
-    }
+fn chosen(gpu: &Gpu, spheres: &Viewed, settings: &SceneSettings, free: Free) -> Option<Pilot> {
+    let plan = spheres.tried(gpu, settings, square_picture(SIZE));
+    pilot::choose(gpu, &spheres.scene, &spheres.view(), &plan, free, &NEVER).unwrap()
+}
 
-    fn view(&self) -> View<'_> {
-        View { geometry: &self.geometry, camera: Some(&self.camera), phases: &[] }
-    }
-
-    fn plan(&self, gpu: &Gpu, settings: &SceneSettings) -> ScenePlan {
-        trial::plan(gpu, &self.scene, &self.view(), settings, square_picture(SIZE)).unwrap()
-    }
-
-    fn chosen(&self, gpu: &Gpu, settings: &SceneSettings, free: Free) -> Option<Pilot> {
-        pilot::choose(gpu, &self.scene, &self.view(), &self.plan(gpu, settings), free, &NEVER).unwrap()
-    }
-
-    fn lit(&self, gpu: &Gpu, settings: &SceneSettings) -> RunResult {
-        light(gpu, &self.view(), self.plan(gpu, settings), &mut Control::default()).unwrap()
-    }
+fn lit(gpu: &Gpu, spheres: &Viewed, settings: &SceneSettings) -> RunResult {
+    spheres.lit(gpu, spheres.tried(gpu, settings, square_picture(SIZE)))
 }
 
 /// Few photons, which a software device traces in time.
@@ -52,12 +36,12 @@ fn few() -> SceneSettings {
 
 /// Within a factor: rare light is met by chance, and even samples vary less the more there are. `all`: before the pilot has chosen, too,
 /// and of more rounds.
-fn rounds_vary_as_the_pilot_expects(gpu: &Gpu, spheres: &Spheres, all: bool) {
-    let found = spheres.chosen(gpu, &few(), Free { photons: false, caustic_photons: false, ..Free::ALL }).unwrap();
+fn rounds_vary_as_the_pilot_expects(gpu: &Gpu, spheres: &Viewed, all: bool) {
+    let found = chosen(gpu, spheres, &few(), Free { photons: false, caustic_photons: false, ..Free::ALL }).unwrap();
     let rounds = if all { 32 } else { 16 };
     for division in [found.chosen].into_iter().chain(all.then_some(found.before)) {
         // The squared noise of a round, relative to the mean.
-        let lit = spheres.lit(gpu, &SceneSettings { rounds, alpha: 1.0, seed: 5, stop: Stop::default(), ..division.set(&few()) });
+        let lit = lit(gpu, spheres, &SceneSettings { rounds, alpha: 1.0, seed: 5, stop: Stop::default(), ..division.set(&few()) });
         let measured = lit.film.relative_error().powi(2) * f64::from(lit.film.rounds);
         let variance = &found.rounds.variance;
         let of_paths = variance.of_paths_in_round(division);
@@ -68,33 +52,33 @@ fn rounds_vary_as_the_pilot_expects(gpu: &Gpu, spheres: &Spheres, all: bool) {
     }
 }
 
-fn what_is_set_stays_and_the_rest_is_chosen_alike_each_time(gpu: &Gpu, spheres: &Spheres) {
+fn what_is_set_stays_and_the_rest_is_chosen_alike_each_time(gpu: &Gpu, spheres: &Viewed) {
     let goal = |error| SceneSettings { stop: Stop { error: Some(error), ..Stop::default() }, ..SceneSettings::default() };
     let (usual, coarse) = (goal(0.1), goal(0.4));
-    let found = spheres.chosen(gpu, &usual, Free::ALL).unwrap();
+    let found = chosen(gpu, spheres, &usual, Free::ALL).unwrap();
     assert!(found.gain(&usual.stop) > 2.0, "{}: {found:?}", found.gain(&usual.stop));
-    let again = spheres.chosen(gpu, &SceneSettings { seed: 77, ..usual.clone() }, Free::ALL).unwrap();
+    let again = chosen(gpu, spheres, &SceneSettings { seed: 77, ..usual.clone() }, Free::ALL).unwrap();
     assert_eq!((found.chosen, found.rounds), (again.chosen, again.rounds));
-    let of_rays = spheres.chosen(gpu, &usual, Free { shadow_rays: true, ..Free::default() }).unwrap();
+    let of_rays = chosen(gpu, spheres, &usual, Free { shadow_rays: true, ..Free::default() }).unwrap();
     assert_eq!(of_rays.chosen, Division { shadow_rays: of_rays.chosen.shadow_rays, ..of_rays.before });
     let three = SceneSettings { shadow_rays: 3, ..usual.clone() };
-    let of_others = spheres.chosen(gpu, &three, Free { shadow_rays: false, ..Free::ALL }).unwrap();
+    let of_others = chosen(gpu, spheres, &three, Free { shadow_rays: false, ..Free::ALL }).unwrap();
     assert!(of_others.chosen.shadow_rays == 3 && of_others.chosen != of_others.before, "{of_others:?}");
-    assert_eq!(spheres.chosen(gpu, &usual, Free::default()), None);
+    assert_eq!(chosen(gpu, spheres, &usual, Free::default()), None);
     // A small error takes more of it; a GPU, on which a round costs more than its paths, saves little by a large one.
     let most = if gpu.facts().kind == "cpu" { 0.5 } else { 1.0 };
-    let rough = spheres.chosen(gpu, &coarse, Free::ALL).unwrap();
+    let rough = chosen(gpu, spheres, &coarse, Free::ALL).unwrap();
     let [rough, good] = [(&rough, 0.4), (&found, 0.1)].map(|(pilot, error)| pilot.rounds.until(pilot.chosen, error));
     assert!(rough.0 >= 16.0 && rough.1 < most * good.1, "{rough:?} {good:?}");
 }
 
 /// The work until an error, by what the pilot says of a round and the rounds that runs took.
-fn what_a_pilot_chooses_is_less_work_and_takes_about_the_rounds_that_it_expects(gpu: &Gpu, spheres: &Spheres) {
+fn what_a_pilot_chooses_is_less_work_and_takes_about_the_rounds_that_it_expects(gpu: &Gpu, spheres: &Viewed) {
     let stop = Stop { error: Some(0.5), ..Stop::default() };
     let usual = SceneSettings { photons: 1 << 13, caustic_photons: 1 << 13, rounds: 1 << 12, stop, ..SceneSettings::default() };
-    let pilot = spheres.chosen(gpu, &usual, Free::ALL).unwrap();
+    let pilot = chosen(gpu, spheres, &usual, Free::ALL).unwrap();
     let [(work, rounds), (before, _)] = [(pilot.chosen, pilot.set(&usual)), (pilot.before, usual)].map(|(division, settings)| {
-        let lit = spheres.lit(gpu, &settings);
+        let lit = lit(gpu, spheres, &settings);
         assert_eq!(lit.end, End::Error, "{division:?}");
         let rounds = f64::from(lit.film.rounds);
         (1e-6 * rounds * pilot.rounds.cost(division), rounds)
@@ -106,14 +90,14 @@ fn what_a_pilot_chooses_is_less_work_and_takes_about_the_rounds_that_it_expects(
 }
 
 /// Nodes that rays visit, whatever is dispatched at once; `all`: more shadow rays visit more of them, and each path about as many.
-fn what_paths_meet_is_counted(gpu: &Gpu, spheres: &Spheres, all: bool) {
+fn what_paths_meet_is_counted(gpu: &Gpu, spheres: &Viewed, all: bool) {
     let counted = |samples: u32, shadow_rays: u32, is_split: bool| {
         let settings = SceneSettings { samples, shadow_rays, rounds: 1, block: Some(1), stop: Stop::default(), ..few() };
-        let mut plan = spheres.plan(gpu, &settings);
+        let mut plan = spheres.tried(gpu, &settings, square_picture(SIZE));
         if is_split {
             plan.work_per_submission = 1;
         }
-        let [nodes, triangles] = light(gpu, &spheres.view(), plan, &mut Control::default()).unwrap().film.visited();
+        let [nodes, triangles] = spheres.lit(gpu, plan).film.visited();
         let paths = f64::from(samples * SIZE * SIZE);
         (nodes as f64 / paths, triangles)
     };
@@ -128,11 +112,11 @@ fn what_paths_meet_is_counted(gpu: &Gpu, spheres: &Spheres, all: bool) {
 }
 
 /// Tiles with more samples show the same picture: what differs is noise, and there is less of it.
-fn tiles_with_more_samples_change_no_mean(gpu: &Gpu, spheres: &Spheres, final_gather: bool) {
+fn tiles_with_more_samples_change_no_mean(gpu: &Gpu, spheres: &Viewed, final_gather: bool) {
     // The third column of tiles has eight times the samples.
     let rows: Vec<u32> = (0..16).map(|tile| [0, 1, 3, 2][tile % 4]).collect();
     let light_of = |tiles: Option<TileSamples>| {
-        spheres.lit(gpu, &SceneSettings { tiles, rounds: 16, final_gather, stop: Stop::default(), ..few() }).film
+        lit(gpu, spheres, &SceneSettings { tiles, rounds: 16, final_gather, stop: Stop::default(), ..few() }).film
     };
     let (even, tiled) = (light_of(None), light_of(Some(TileSamples::new(&rows, (SIZE, SIZE)))));
     let mut squares = 0.0;
@@ -163,7 +147,7 @@ fn tiles_with_more_samples_change_no_mean(gpu: &Gpu, spheres: &Spheres, final_ga
 #[test]
 fn a_pilot_expects_what_rounds_are_like_and_chooses_the_same_twice() {
     let Some(gpu) = device() else { return };
-    let spheres = Spheres::new();
+    let spheres = spheres();
     rounds_vary_as_the_pilot_expects(&gpu, &spheres, false);
     what_is_set_stays_and_the_rest_is_chosen_alike_each_time(&gpu, &spheres);
     what_paths_meet_is_counted(&gpu, &spheres, false);
@@ -174,7 +158,7 @@ fn a_pilot_expects_what_rounds_are_like_and_chooses_the_same_twice() {
 #[ignore = "long: runs until an error, and more rounds and samples"]
 fn a_pilot_expects_what_all_rounds_are_like_and_chooses_less_work() {
     let Some(gpu) = device() else { return };
-    let spheres = Spheres::new();
+    let spheres = spheres();
     rounds_vary_as_the_pilot_expects(&gpu, &spheres, true);
     what_a_pilot_chooses_is_less_work_and_takes_about_the_rounds_that_it_expects(&gpu, &spheres);
     what_paths_meet_is_counted(&gpu, &spheres, true);
@@ -184,7 +168,7 @@ fn a_pilot_expects_what_all_rounds_are_like_and_chooses_less_work() {
 #[ignore = "long: kernels of their own"]
 fn tiles_with_more_gather_rays_change_no_mean() {
     let Some(gpu) = device() else { return };
-    tiles_with_more_samples_change_no_mean(&gpu, &Spheres::new(), true);
+    tiles_with_more_samples_change_no_mean(&gpu, &spheres(), true);
 }
 
 /// The program takes what a pilot finds where an error ends the run and nothing is set.
@@ -244,14 +228,12 @@ fn settings_are_kept(size: u32, [error, smaller]: [&str; 2], finds_tiles: bool, 
         }
         place.succeed("merge 1.pms 2.pms -o merged.exr");
         place.succeed(&format!("{short} -o whole.exr"));
-        let light = |name: &str| image::open(place.at(name)).unwrap().into_rgb32f();
-        assert!(light("merged.exr") == light("whole.exr"));
+        assert!(place.pixels("merged.exr") == place.pixels("whole.exr"));
     }
     let (_, stderr) = place.succeed(&format!("render point-over-plane --size {size}x{size} --settings s.json --rounds 1 -o d.exr"));
     assert!(stderr.contains("warning: --settings: chosen for cornell-spheres, which was another scene"), "{stderr}");
-    std::fs::write(place.at("wrong.json"), b"{}").unwrap();
-    let text = String::from_utf8(bytes("s.json")).unwrap();
-    std::fs::write(place.at("many.json"), text.replace("\"shadow_rays\": ", "\"shadow_rays\": 9")).unwrap();
+    place.write("wrong.json", "{}");
+    place.write("many.json", place.text("s.json").replace("\"shadow_rays\": ", "\"shadow_rays\": 9"));
     place.assert_refused([
         ("render cornell --settings absent.json -o e.exr", ["--settings absent.json", "cannot be read"].as_slice()),
         ("render cornell --settings wrong.json -o e.exr", &["--settings wrong.json", "is no file of --save-settings"]),

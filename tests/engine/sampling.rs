@@ -113,32 +113,24 @@ fn frames_are_orthonormal_and_packed_directions_near() {
     let frame_check = |normal: Vec3, tangent: Vec3, bitangent: Vec3| {
         let [n, t, b] = [normal, tangent, bitangent].map(Vec3::as_dvec3);
         let off = [t.dot(t) - 1.0, b.dot(b) - 1.0, t.dot(b), t.dot(n), b.dot(n), t.cross(b).dot(n) - 1.0];
-        let worst = off.iter().fold(0.0, |worst: f64, off| worst.max(if off.is_nan() { f64::INFINITY } else { off.abs() }));
-        if worst <= 5.0 * ULP { Ok(worst) } else { Err(format!("{normal:?}, {tangent:?}, {bitangent:?}: {worst:e} off a frame")) }
+        require(off.iter().all(|off| off.abs() <= 5.0 * ULP), || format!("{normal:?}, {tangent:?}, {bitangent:?}: {off:?} off a frame"))
     };
     let angle_check = |normal: Vec3, unpacked: Vec3, bound: f64| {
         let (n, u) = (normal.as_dvec3(), unpacked.as_dvec3());
         let angle = n.cross(u).length().atan2(n.dot(u));
-        if angle <= bound { Ok(angle) } else { Err(format!("{unpacked:?} is {angle:e} radians off {normal:?}")) }
+        require(angle <= bound, || format!("{unpacked:?} is {angle:e} radians off {normal:?}"))
     };
     for math in BOTH {
-        let mut worst = [0.0f64; 3];
         for (case, samples) in pairs(&cases, ask(&gpu, math, Filter::Box, &cases)) {
-            let found = [
-                frame_check(case.normal, samples.tangent, samples.bitangent),
-                angle_check(case.normal, samples.unpacked_normal, 7e-5),
-                angle_check(case.normal, samples.unpacked_direction, 1.4e-4),
-            ];
-            for (worst, found) in worst.iter_mut().zip(found) {
-                *worst = worst.max(found.unwrap_or_else(|complaint| panic!("{math:?}: {complaint}")));
-            }
+            assert_holds(format!("{math:?}"), frame_check(case.normal, samples.tangent, samples.bitangent));
+            assert_holds(format!("{math:?}"), angle_check(case.normal, samples.unpacked_normal, 7e-5));
+            assert_holds(format!("{math:?}"), angle_check(case.normal, samples.unpacked_direction, 1.4e-4));
         }
-        println!("{math:?}: frames {:.2e} off, normals {:.2e} radians, directions {:.2e}", worst[0], worst[1], worst[2]);
     }
     // As a frame made without regard for the south pole is, and a code of a bit less.
-    assert!(frame_check(Vec3::NEG_Z, Vec3::X, Vec3::new(0.0, 1.0, 1e-6)).is_err());
-    assert!(frame_check(Vec3::Z, Vec3::X, Vec3::NEG_Y).is_err(), "a left-handed frame");
-    assert!(angle_check(Vec3::Z, Vec3::new(1e-4, 0.0, 1.0), 7e-5).is_err());
+    assert_complains("a frame of the south pole", frame_check(Vec3::NEG_Z, Vec3::X, Vec3::new(0.0, 1.0, 1e-6)));
+    assert_complains("a left-handed frame", frame_check(Vec3::Z, Vec3::X, Vec3::NEG_Y));
+    assert_complains("a code of a bit less", angle_check(Vec3::Z, Vec3::new(1e-4, 0.0, 1.0), 7e-5));
 }
 
 /// Van Oosterom and Strackee 1983.

@@ -5,12 +5,13 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use crate::common::lit::Viewed;
 use crate::common::prelude::*;
 use photonmill::engine::End;
 use photonmill::engine::retry::{Remedy, run_on};
 use photonmill::engine::saved::{SavedFilm, SavedRun};
 use photonmill::engine::scene::losses::losses;
-use photonmill::engine::scene::{self, RunResult, SceneFilm, View, trial};
+use photonmill::engine::scene::{self, RunResult, SceneFilm};
 use photonmill::engine::several_devices::Work;
 use photonmill::engine::watch::{Keep, SaveRun};
 use photonmill::ledger::Fates;
@@ -25,12 +26,6 @@ static IDLE: Mutex<Vec<Gpu>> = Mutex::new(Vec::new());
 
 /// For a test that is stuck to fail in the end.
 const MOST_WAIT: Duration = Duration::from_secs(120);
-
-struct Room {
-    scene: Scene,
-    geometry: Geometry,
-    camera: Camera,
-}
 
 /// What goes wrong or slowly on the way.
 #[derive(Default)]
@@ -63,100 +58,91 @@ impl SaveRun for All {
     }
 }
 
-impl Room {
-    fn new() -> Room {
-        let scene = scene("cornell");
-        Room { geometry: Geometry::new(&scene).unwrap(), camera: scene.first_camera(), scene }
-    }
+fn room() -> Viewed {
+    Viewed::new(scene("cornell"))
+}
 
-    fn plan(&self, gpu: &Gpu, settings: &SceneSettings) -> ScenePlan {
-        trial::plan(gpu, &self.scene, &self.view(), settings, square_picture(8)).unwrap()
-    }
+const PICTURE: Sensor = Sensor::Picture { width: 8, height: 8 };
 
-    fn view(&self) -> View<'_> {
-        View { geometry: &self.geometry, camera: Some(&self.camera), phases: &[] }
-    }
+fn alone(room: &Viewed, settings: &SceneSettings) -> RunResult {
+    let gpu = device().unwrap();
+    room.lit(&gpu, room.tried(&gpu, settings, PICTURE))
+}
 
-    fn alone(&self, settings: &SceneSettings) -> RunResult {
-        let gpu = device().unwrap();
-        scene::light(&gpu, &self.view(), self.plan(&gpu, settings), &mut Control::default()).unwrap()
-    }
-
-    fn shared(&self, count: usize, settings: &SceneSettings, trouble: Trouble) -> Result<Came, Error> {
-        let idle = || IDLE.lock().unwrap().pop();
-        let mut gpus: Vec<Gpu> = (0..count).map(|_| idle().unwrap_or_else(|| open(Options::default()).unwrap())).collect();
-        let plan = self.plan(&gpus[0], settings);
-        let (joined, attempts) = (AtomicU32::new(0), AtomicU32::new(0));
-        let run = |gpu: &Gpu, stop: Stop, control: &mut Control| {
-            let number = joined.fetch_add(1, Ordering::Relaxed) as usize;
-            let mut plan = plan.clone();
-            plan.settings.stop = stop;
-            if trouble.differs == Some(number) {
-                plan.settings.seed += 1;
-            }
-            let fails = trouble.fails.filter(|(device, _)| *device == number && attempts.load(Ordering::Relaxed) == 0);
-            let failed = AtomicBool::new(false);
-            let of = &mut control.keep;
-            let save = of.save.as_mut().map(|save| &mut **save as &mut dyn SaveRun);
-            let keep = Keep { scene: of.scene, share: of.share, resume: of.resume.take(), every: of.every, save, dealt: of.dealt.take() };
-            let (outer, cancelled) = (&mut control.progress, control.cancelled);
-            let mut progress = |progress: &engine::Progress| {
-                if let Some(wait) = trouble.waits.get(number) {
-                    std::thread::sleep(*wait);
-                }
-                let began = Instant::now();
-                while trouble.fails.is_some() && fails.is_none() && attempts.load(Ordering::Relaxed) == 0 && began.elapsed() < MOST_WAIT {
-                    std::thread::sleep(Duration::from_millis(1));
-                }
-                if fails.is_some_and(|(_, rounds)| progress.done >= rounds) {
-                    failed.store(true, Ordering::Relaxed);
-                }
-                outer(progress);
-            };
-            // A pause whenever a block is done.
-            let control = &mut Control { cancelled: if fails.is_some() { &failed } else { cancelled }, progress: &mut progress, keep };
-            let lit = scene::light(gpu, &self.view(), plan, control);
-            if failed.load(Ordering::Relaxed) {
-                attempts.fetch_add(1, Ordering::Relaxed);
-                return Err(Error::Device { call: "vkQueueSubmit2", reason: "the device is lost".into() });
-            }
-            lit
-        };
-        let given_up = AtomicU32::new(0);
-        let work = Work {
-            run: &run,
-            film: |film| match film {
-                SavedFilm::Scene(film) => film,
-                SavedFilm::Room(_) => panic!("a scene was lit"),
-            },
-            error: &|film: &SceneFilm| film.error(plan.film.confidence),
-            losses: &|film: &SceneFilm, fates: &[Fates]| losses(&self.geometry, &plan, fates, film),
-            can_go_on: true,
-            stop: plan.settings.stop,
-            alpha: plan.settings.alpha,
-            rounds: plan.settings.rounds,
-            rounds_per_block: plan.film.rounds_per_block,
-            bounces: plan.settings.bounces,
-            photons_per_round: plan.maps().map(|map| u64::from(map.photons)).sum(),
-        };
-        let failed = &|_: &Gpu, _: &Error, remedy: Remedy| {
-            assert_eq!(remedy, Remedy::GivenUp);
-            given_up.fetch_add(1, Ordering::Relaxed);
-        };
-        let (cancelled, mut all) = (AtomicBool::new(false), All::default());
+fn shared(room: &Viewed, count: usize, settings: &SceneSettings, trouble: Trouble) -> Result<Came, Error> {
+    let idle = || IDLE.lock().unwrap().pop();
+    let mut gpus: Vec<Gpu> = (0..count).map(|_| idle().unwrap_or_else(|| open(Options::default()).unwrap())).collect();
+    let plan = room.tried(&gpus[0], settings, PICTURE);
+    let (joined, attempts) = (AtomicU32::new(0), AtomicU32::new(0));
+    let run = |gpu: &Gpu, stop: Stop, control: &mut Control| {
+        let number = joined.fetch_add(1, Ordering::Relaxed) as usize;
+        let mut plan = plan.clone();
+        plan.settings.stop = stop;
+        if trouble.differs == Some(number) {
+            plan.settings.seed += 1;
+        }
+        let fails = trouble.fails.filter(|(device, _)| *device == number && attempts.load(Ordering::Relaxed) == 0);
+        let failed = AtomicBool::new(false);
+        let of = &mut control.keep;
+        let save = of.save.as_mut().map(|save| &mut **save as &mut dyn SaveRun);
+        let keep = Keep { scene: of.scene, share: of.share, resume: of.resume.take(), every: of.every, save, dealt: of.dealt.take() };
+        let (outer, cancelled) = (&mut control.progress, control.cancelled);
         let mut progress = |progress: &engine::Progress| {
-            if trouble.cancelled_at.is_some_and(|rounds| progress.done >= rounds) {
-                cancelled.store(true, Ordering::Relaxed);
+            if let Some(wait) = trouble.waits.get(number) {
+                std::thread::sleep(*wait);
             }
+            let began = Instant::now();
+            while trouble.fails.is_some() && fails.is_none() && attempts.load(Ordering::Relaxed) == 0 && began.elapsed() < MOST_WAIT {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            if fails.is_some_and(|(_, rounds)| progress.done >= rounds) {
+                failed.store(true, Ordering::Relaxed);
+            }
+            outer(progress);
         };
-        let resume = trouble.resume.clone().map(|run| (PathBuf::from("a file"), run));
-        let keep = Keep { scene: &self.scene.name, resume, every: Duration::ZERO, save: Some(&mut all), ..Keep::default() };
-        let mut control = Control { cancelled: &cancelled, progress: &mut progress, keep };
-        let lit = run_on(&mut gpus, &work, failed, &mut control);
-        gpus.iter().for_each(|gpu| gpu.check_validation().unwrap());
-        IDLE.lock().unwrap().append(&mut gpus);
-        Ok(Came { lit: lit?, given_up: given_up.into_inner(), saved: all.0 })
-    }
+        // A pause whenever a block is done.
+        let control = &mut Control { cancelled: if fails.is_some() { &failed } else { cancelled }, progress: &mut progress, keep };
+        let lit = scene::light(gpu, &room.view(), plan, control);
+        if failed.load(Ordering::Relaxed) {
+            attempts.fetch_add(1, Ordering::Relaxed);
+            return Err(Error::Device { call: "vkQueueSubmit2", reason: "the device is lost".into() });
+        }
+        lit
+    };
+    let given_up = AtomicU32::new(0);
+    let work = Work {
+        run: &run,
+        film: |film| match film {
+            SavedFilm::Scene(film) => film,
+            SavedFilm::Room(_) => panic!("a scene was lit"),
+        },
+        error: &|film: &SceneFilm| film.error(plan.film.confidence),
+        losses: &|film: &SceneFilm, fates: &[Fates]| losses(&room.geometry, &plan, fates, film),
+        can_go_on: true,
+        stop: plan.settings.stop,
+        alpha: plan.settings.alpha,
+        rounds: plan.settings.rounds,
+        rounds_per_block: plan.film.rounds_per_block,
+        bounces: plan.settings.bounces,
+        photons_per_round: plan.maps().map(|map| u64::from(map.photons)).sum(),
+    };
+    let failed = &|_: &Gpu, _: &Error, remedy: Remedy| {
+        assert_eq!(remedy, Remedy::GivenUp);
+        given_up.fetch_add(1, Ordering::Relaxed);
+    };
+    let (cancelled, mut all) = (AtomicBool::new(false), All::default());
+    let mut progress = |progress: &engine::Progress| {
+        if trouble.cancelled_at.is_some_and(|rounds| progress.done >= rounds) {
+            cancelled.store(true, Ordering::Relaxed);
+        }
+    };
+    let resume = trouble.resume.clone().map(|run| (PathBuf::from("a file"), run));
+    let keep = Keep { scene: &room.scene.name, resume, every: Duration::ZERO, save: Some(&mut all), ..Keep::default() };
+    let mut control = Control { cancelled: &cancelled, progress: &mut progress, keep };
+    let lit = run_on(&mut gpus, &work, failed, &mut control);
+    gpus.iter().for_each(|gpu| gpu.check_validation().unwrap());
+    IDLE.lock().unwrap().append(&mut gpus);
+    Ok(Came { lit: lit?, given_up: given_up.into_inner(), saved: all.0 })
 }
 
 fn assert_same(what: &str, found: &RunResult, expected: &RunResult) {
@@ -171,7 +157,7 @@ fn several_devices_come_to_the_bits_of_one() {
     let millis = |all: &[u64]| all.iter().map(|wait| Duration::from_millis(*wait)).collect::<Vec<_>>();
     let of_error = SceneSettings { stop: Stop { error: Some(1.0), ..Stop::default() }, rounds: 200, ..settings() };
     let of_photons = SceneSettings { stop: Stop { photons: Some(1000 * 13), ..Stop::default() }, rounds: 200, ..settings() };
-    let room = Room::new();
+    let room = room();
     // An error that is reached at a look, on two devices and with one that lags; photons that end within a block; all rounds; and fewer
     // than two blocks, which are one device's.
     let layouts = [
@@ -181,10 +167,10 @@ fn several_devices_come_to_the_bits_of_one() {
         (End::Rounds, SceneSettings { rounds: 2, ..settings() }, vec![(2, vec![])]),
     ];
     for (end, settings, runs) in layouts {
-        let expected = room.alone(&settings);
+        let expected = alone(&room, &settings);
         assert!(expected.end == end && (end != End::Error || expected.film.blocks < 100), "{:?} instead of {end:?}", expected.end);
         for (count, waits) in runs {
-            let came = room.shared(count, &settings, Trouble { waits, ..Trouble::default() }).unwrap();
+            let came = shared(&room, count, &settings, Trouble { waits, ..Trouble::default() }).unwrap();
             assert_same(&format!("{end:?}, {count} devices"), &came.lit, &expected);
             let others = if expected.film.rounds > 2 { count - 1 } else { 0 };
             assert_eq!((came.given_up, came.lit.more_devices.len()), (0, others), "{end:?}");
@@ -199,14 +185,14 @@ fn several_devices_come_to_the_bits_of_one() {
 /// Which one fails after how many rounds, and how many there are.
 fn failing_devices_are_given_up(cases: &[((usize, u64), usize)]) {
     let Some(_) = device() else { return };
-    let room = Room::new();
-    let expected = room.alone(&settings());
+    let room = room();
+    let expected = alone(&room, &settings());
     for &(fails, count) in cases {
-        let came = room.shared(count, &settings(), Trouble { fails: Some(fails), ..Trouble::default() }).unwrap();
+        let came = shared(&room, count, &settings(), Trouble { fails: Some(fails), ..Trouble::default() }).unwrap();
         assert_same("without one", &came.lit, &expected);
         assert_eq!((came.given_up, came.lit.more_devices.len()), (1, count - 2));
     }
-    let Err(error) = room.shared(1, &settings(), Trouble { fails: Some((0, 2)), ..Trouble::default() }) else { panic!("none is left") };
+    let Err(error) = shared(&room, 1, &settings(), Trouble { fails: Some((0, 2)), ..Trouble::default() }) else { panic!("none is left") };
     assert!(matches!(error, Error::Device { .. }), "{error}");
 }
 
@@ -225,16 +211,16 @@ fn a_device_of_several_that_fails_is_given_up() {
 #[test]
 fn what_was_ended_early_goes_on() {
     let Some(_) = device() else { return };
-    let room = Room::new();
-    let expected = room.alone(&settings());
+    let room = room();
+    let expected = alone(&room, &settings());
     let waits = vec![Duration::from_millis(20); 2];
-    let early = room.shared(2, &settings(), Trouble { waits, cancelled_at: Some(10), ..Trouble::default() }).unwrap();
+    let early = shared(&room, 2, &settings(), Trouble { waits, cancelled_at: Some(10), ..Trouble::default() }).unwrap();
     assert_eq!(early.lit.end, End::Cancelled);
     let saved = early.saved.last().unwrap();
     assert!(early.lit.film.blocks == saved.done.count() && early.lit.film.blocks < 12 && early.lit.film.blocks > 0);
     // From its end, and from what was saved on the way, which on a busy machine may be the same.
     for (count, from) in [(3, saved), (2, &early.saved[early.saved.len() / 2])] {
-        let on = room.shared(count, &settings(), Trouble { resume: Some(from.clone()), ..Trouble::default() }).unwrap();
+        let on = shared(&room, count, &settings(), Trouble { resume: Some(from.clone()), ..Trouble::default() }).unwrap();
         assert_same("gone on", &on.lit, &expected);
     }
 }
@@ -243,22 +229,20 @@ fn what_was_ended_early_goes_on() {
 #[test]
 fn a_time_ends_it_behind_whole_blocks() {
     let Some(_) = device() else { return };
-    let room = Room::new();
+    let room = room();
     let timed = SceneSettings { rounds: 4000, stop: Stop { seconds: Some(0.3), ..Stop::default() }, ..settings() };
-    let came = room.shared(2, &timed, Trouble::default()).unwrap();
+    let came = shared(&room, 2, &timed, Trouble::default()).unwrap();
     let blocks = came.lit.film.blocks;
     assert!(came.lit.end == End::Time && (1..2000).contains(&blocks), "{:?} after {blocks} blocks", came.lit.end);
     assert_eq!((came.saved.last().unwrap().done.end(), came.lit.left_out), (blocks, 0));
-    let expected = room.alone(&SceneSettings { rounds: 2 * blocks, ..settings() });
+    let expected = alone(&room, &SceneSettings { rounds: 2 * blocks, ..settings() });
     assert!(came.lit.film.sums == expected.film.sums && came.lit.fates == expected.fates);
 }
 
 #[test]
 fn devices_that_compute_otherwise_are_refused() {
     let Some(_) = device() else { return };
-    let Err(error) = Room::new().shared(2, &settings(), Trouble { differs: Some(1), ..Trouble::default() }) else {
-        panic!("taken together")
-    };
+    let Err(error) = shared(&room(), 2, &settings(), Trouble { differs: Some(1), ..Trouble::default() }) else { panic!("taken together") };
     let line = error.to_string();
     assert!(line.starts_with("--devices ") && line.contains("cannot take part") && line.contains("seed"), "{line}");
 }

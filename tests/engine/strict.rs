@@ -194,9 +194,7 @@ fn guesses_as_far_off_as_vulkan_allows_change_no_bit() {
         check::math(&gpu, &operands).unwrap()
     };
     let same = |found: &[MathResults]| {
-        let differing = pairs(&operands, pairs(found, &expected)).find(|(_, (a, b))| {
-            bytemuck::cast_slice::<_, u32>(std::slice::from_ref(*a)) != bytemuck::cast_slice::<_, u32>(std::slice::from_ref(*b))
-        });
+        let differing = pairs(&operands, pairs(found, &expected)).find(|(_, (a, b))| bytemuck::bytes_of(*a) != bytemuck::bytes_of(*b));
         differing.map_or(Ok(()), |(operand, (a, b))| Err(format!("of {operand:?}: {a:?} instead of {b:?}")))
     };
     for (quotient, root) in [(-3, -7), (-1, 0), (1, 1), (3, 7)] {
@@ -208,12 +206,6 @@ fn guesses_as_far_off_as_vulkan_allows_change_no_bit() {
     }
     assert_complains("a quotient six off", same(&results_of(6, 0)));
     assert_complains("a root a hundred units off", same(&results_of(0, 100)));
-}
-
-#[test]
-fn a_device_that_rounds_to_nearest_is_let_in() {
-    let Some(gpu) = device() else { return };
-    assert_holds("quotients and roots", rounding_check(&gpu));
 }
 
 /// The check at the start of every strict run.
@@ -248,14 +240,7 @@ fn the_cpu_builder_agrees(all: bool) {
         (EmissionLaw::Uniform, [None; 5], Rng::Sobol),
     ] {
         let settings = strict(&RoomSettings { photons: 50_001, emission, shininess, rng, threads: 2, mesh: 32, ..RoomSettings::default() });
-        let expected = photons_on_cpu(&settings);
-        assert_holds(format!("{emission:?}"), photons_agree(&gpu, &settings, &expected));
-        let mut spoiled = expected.clone();
-        spoiled[100].position.x = f32::from_bits(spoiled[100].position.x.to_bits() + 1);
-        assert_complains_of(Kind::OtherPhotons, "one bit of one photon", photons_agree(&gpu, &settings, &spoiled));
-        spoiled.pop();
-        assert_complains_of(Kind::PhotonsAdded, "one photon more", photons_agree(&gpu, &settings, &spoiled));
-
+        assert_holds(format!("{emission:?}"), photons_agree(&gpu, &settings, &photons_on_cpu(&settings)));
         let on_cpu = run_on_cpu(&settings).film;
         let is_first = emission == EmissionLaw::Uniform && rng == Rng::Rand48;
         for builder in Builder::ON_GPU.into_iter().filter(|builder| all || is_first || *builder == settings.builder) {

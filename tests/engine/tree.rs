@@ -2,8 +2,7 @@
 //! photons that f64 finds by looking at all of them, whatever order they come in.
 
 use crate::common::prelude::*;
-use photonmill::cpu;
-use photonmill::cpu::tree::Tree;
+use crate::engine::film::{assert_same, few_effects, film, gathered_on_cpu, gathered_on_gpu};
 use photonmill::engine::film::BlockSums;
 use photonmill::engine::room::film::{RoomFilm, estimate_walls};
 
@@ -15,25 +14,6 @@ fn by_tree(settings: &RoomSettings) -> RoomSettings {
 fn room_for(photons: &[Photon], settings: &RoomSettings) -> RoomSettings {
     let photons = (photons.len() as u32).max(2);
     RoomSettings { photons, bounces: 1, chunk: Some(photons), rng: Rng::Philox, ..settings.clone() }
-}
-
-/// The device's gather of photons that are handed to it.
-fn gathered_on_gpu(gpu: &Gpu, settings: &RoomSettings, photons: &[Photon]) -> Vec<u64> {
-    let plan = plan_for(gpu, &open_box(settings), settings);
-    assert_eq!(plan.chunks_per_round, 1);
-    gathered(gpu, &plan, photons, 1, None)
-}
-
-fn gathered_on_cpu(plan: &RoomPlan, photons: &[Photon]) -> Vec<u64> {
-    let mut sums = vec![0; plan.points.len() * plan.channel_count as usize];
-    match (plan.settings.gather, plan.settings.nearest) {
-        (Gather::KdTree, Some(count)) => {
-            cpu::nearest::gather(plan, &open_box(&plan.settings), &Tree::build(photons), count, &mut sums);
-        }
-        (Gather::KdTree, None) => cpu::estimate::gather_tree(plan, &Tree::build(photons), &mut sums),
-        _ => cpu::estimate::gather_brute(plan, photons, &mut sums),
-    }
-    sums
 }
 
 /// Photons at random places of all walls, and some on the same coordinate, the same place, and in corners.
@@ -81,39 +61,19 @@ fn the_tree_gives_the_films_of_brute_force_for_every_number_of_photons() {
     }
 }
 
-fn film(gpu: &Gpu, settings: &RoomSettings) -> RoomFilm {
-    run(gpu, settings).film
-}
-
 fn builders_and_splits(all: bool) {
     let Some(gpu) = device() else { return };
-    let lesser = device_with(Options { without_int64_atomics: true, ..Options::default() }).unwrap();
-    let paper = RoomSettings { mesh: 19, ..RoomSettings::default() };
-    let glossy = [Some(2.0), None, Some(0.5), Some(0.01), Some(5.0)];
-    for (half, (what, settings)) in [
-        ("Lambertian walls", paper.clone()),
-        (
-            "two channels, rounds",
-            RoomSettings { photons: 1201, rounds: 3, shininess: glossy, light_power: [3.0, 0.2], radius: 0.025, ..paper },
-        ),
-    ]
-    .into_iter()
-    .enumerate()
-    .skip(if all { 0 } else { 1 })
-    {
+    for (half, (what, settings)) in few_effects().into_iter().enumerate().skip(if all { 0 } else { 1 }) {
         let expected = film(&gpu, &settings);
         assert!(expected.sums.iter().filter(|sum| **sum > 0).count() > expected.sums.len() / 2);
         for (place, builder) in Builder::ON_GPU.into_iter().enumerate().skip(half).step_by(2) {
             let (group_size, chunk, counters) = [(32, None, None), (128, Some(301), Some(4)), (1024, Some(1024), Some(16))][place % 3];
             let group_size = group_size.min(gpu.facts().work_group_size);
             let found = film(&gpu, &RoomSettings { builder, group_size, counters, chunk, ..by_tree(&settings) });
-            assert_eq!((found.channel_count, found.scale), (expected.channel_count, expected.scale));
-            assert_holds(format!("{what}, {builder:?}, groups of {group_size}"), equal_sums("film", &found.sums, &expected.sums));
+            assert_same(what, &format!("{builder:?}, groups of {group_size}"), &found, &expected);
         }
-        assert_holds(format!("{what}, 32 bits"), equal_sums("film", &film(&lesser, &by_tree(&settings)).sums, &expected.sums));
         let settings = RoomSettings { threads: 2, ..settings };
-        let (tree, grid) = (run_on_cpu(&by_tree(&settings)).film, run_on_cpu(&settings).film);
-        assert_holds(format!("{what}, CPU"), equal_sums("film", &tree.sums, &grid.sums));
+        assert_same(what, "CPU", &run_on_cpu(&by_tree(&settings)).film, &run_on_cpu(&settings).film);
     }
     // Nothing is stored in a black box, and the whole line still runs.
     for builder in [Builder::Persistent, Builder::Naive].into_iter().take(if all { 2 } else { 1 }) {
@@ -274,18 +234,16 @@ fn all_take_the_same_nearest_photons(all: bool) {
         let expected = run_on_cpu(&settings).film;
         for (place, builder) in Builder::ON_GPU.into_iter().enumerate().skip(rounds as usize % 2).step_by(2) {
             let other = RoomSettings { builder, group_size: [128, 32, 64][place % 3], ..settings.clone() };
-            let found = film(&gpu, &other);
-            assert_eq!((found.channel_count, found.scale), (expected.channel_count, expected.scale));
-            assert_holds(format!("{nearest} nearest, {builder:?}"), equal_sums("film", &found.sums, &expected.sums));
+            assert_same(&format!("{nearest} nearest"), other.builder.name(), &film(&gpu, &other), &expected);
         }
-        assert_holds("32 bits", equal_sums("film", &film(&lesser, &settings).sums, &expected.sums));
+        assert_same(&format!("{nearest} nearest"), "32 bits", &film(&lesser, &settings), &expected);
         if !all {
             continue;
         }
         let one_channel = RoomSettings { shininess: [None; 5], light_power: [1.0; 2], ..settings };
         let (found, expected) = (film(&gpu, &one_channel), run_on_cpu(&one_channel).film);
         assert_eq!(found.channel_count, 1);
-        assert_holds("one channel", equal_sums("film", &found.sums, &expected.sums));
+        assert_same("one channel", "", &found, &expected);
     }
 }
 

@@ -4,14 +4,13 @@
 use std::sync::atomic::AtomicBool;
 
 use crate::common::layered::dull;
-use crate::common::lit::light;
+use crate::common::lit::{Viewed, light};
 use crate::common::prelude::*;
 use crate::engine::unseen_light::room_without_floor;
 use glam::dvec3;
 use photonmill::engine::scene::{self, Target, View, trial};
 use photonmill::output::scene_report;
 use photonmill::plan::radius::{RadiusFrom, area_radius};
-use photonmill::records::Receiver;
 use photonmill::scene::material::Coverage;
 
 /// A room of 4 x 4 x 3 m with a lamp under its ceiling, on a ground of 800 m.
@@ -22,35 +21,19 @@ fn room_on_a_plain() -> Scene {
     scene_of(meshes, vec![matt(0.6), shining(0.0)], vec![])
 }
 
-/// Points of the room's floor, some of them near its walls.
-fn floor_points() -> Vec<(DVec3, DVec3)> {
-    let places = [-1.7, -0.6, 0.5, 1.6];
-    places.iter().flat_map(|x| places.map(|z| (dvec3(*x, 0.0, z), DVec3::Y))).collect()
-}
-
-fn receivers(geometry: &Geometry, points: &[(DVec3, DVec3)]) -> Vec<Receiver> {
-    let receiver = |(position, normal): &(DVec3, DVec3)| Receiver {
-        position: geometry.to_local(*position),
-        normal: normal.as_vec3(),
-        shading_normal: normal.as_vec3(),
-    };
-    points.iter().map(receiver).collect()
-}
-
 #[test]
 fn a_room_on_a_plain_is_lit_as_it_is_without_the_plain() {
     let Some(gpu) = device() else { return };
     let scene = room_on_a_plain();
-    let points = floor_points();
+    // Points of the room's floor, some of them near its walls.
+    let places = [-1.7, -0.6, 0.5, 1.6];
+    let points: Vec<_> = places.iter().flat_map(|x| places.map(|z| (dvec3(*x, 0.0, z), DVec3::Y))).collect();
     let geometry = Geometry::new(&scene).unwrap();
-    let phases = [receivers(&geometry, &points)];
+    let target = Target::Points(&points);
+    let (phases, sensor) = (target.phases(&geometry), target.sensor());
     let view = View { geometry: &geometry, camera: None, phases: &phases };
-    let sensor = Sensor::Receivers { count: points.len() as u32 };
     let settings = SceneSettings { photons: 1 << 14, rounds: 12, part: Part::Indirect, ..by_rounds() };
-    let mean = |plan: ScenePlan| {
-        let lit = light(&gpu, &view, plan);
-        (0..points.len()).map(|point| lit.film.mean(point).x).sum::<f64>() / points.len() as f64
-    };
+    let mean = |plan: ScenePlan| mean_red(&light(&gpu, &view, plan));
     let judged = Judge::new(&scene, 32).irradiance_at(&points, 3000, 1);
     let expected = judged.iter().map(|point| point.mean.indirect.x).sum::<f64>() / points.len() as f64;
     let plan = trial::plan(&gpu, &scene, &view, &settings, sensor).unwrap();
@@ -60,35 +43,27 @@ fn a_room_on_a_plain_is_lit_as_it_is_without_the_plain() {
     let check = |found: f64| relative_check("light", found, expected, 0.04);
     assert_holds("the room", check(found));
     assert!((0.05..0.6).contains(&radius), "{radius}");
-    let by_area = ScenePlan::new(&scene, &geometry, &settings, sensor, &engine::limits(gpu.facts())).unwrap();
-    println!("by area: {} m", by_area.global.as_ref().unwrap().radius * geometry.unit);
+    let by_area = |settings: &SceneSettings| scene_plan(&gpu, &scene, settings, sensor).unwrap().1;
     // As wide as that, a disc is that of the room alone.
-    assert_holds("a radius by the area, up to the walls", check(mean(by_area)));
+    assert_holds("a radius by the area, up to the walls", check(mean(by_area(&settings))));
     let beyond = SceneSettings { edge_correction: false, ..settings };
-    let by_area = ScenePlan::new(&scene, &geometry, &beyond, sensor, &engine::limits(gpu.facts())).unwrap();
-    assert_complains("a radius by the area, past the walls", check(mean(by_area)));
+    assert_complains("a radius by the area, past the walls", check(mean(by_area(&beyond))));
 }
 
-/// The plan of a picture, by a trial round.
-fn tried(gpu: &Gpu, scene: &Scene, geometry: &Geometry, settings: &SceneSettings) -> ScenePlan {
-    let camera = scene.first_camera();
-    let view = View { geometry, camera: Some(&camera), phases: &[] };
-    trial::plan(gpu, scene, &view, settings, Sensor::Picture { width: 32, height: 24 }).unwrap()
-}
+const PICTURE: Sensor = Sensor::Picture { width: 32, height: 24 };
 
 /// Where photons lie everywhere alike, so that the area tells the same.
 fn keep_about_the_radius_of_their_area(gpu: &Gpu, names: &[&str]) {
     let settings = by_rounds();
     let mut off = Vec::new();
     for name in names {
-        let scene = scene(name);
-        let geometry = Geometry::new(&scene).unwrap();
-        let plan = tried(gpu, &scene, &geometry, &settings);
+        let viewed = Viewed::new(scene(name));
+        let plan = viewed.tried(gpu, &settings, PICTURE);
         let trial = plan.trial.as_ref().unwrap();
         for map in plan.maps() {
             assert_eq!(map.radius_from, RadiusFrom::Trial);
             let neighbours = if map.caustic_only { settings.caustic_neighbours } else { settings.neighbours };
-            let ratio = map.radius / area_radius(&geometry, map.photons, neighbours, map.caustic_only);
+            let ratio = map.radius / area_radius(&viewed.geometry, map.photons, neighbours, map.caustic_only);
             println!("{name}, {}: {ratio:.3} of the radius by area, {trial:?}", map.name);
             if !(0.7..1.45).contains(&ratio) || trial.too_wide > 0.1 {
                 off.push(format!("{name}, {}: {ratio}, {trial:?}", map.name));
@@ -110,20 +85,16 @@ fn built_in_scenes_keep_about_the_radius_of_their_area() {
 fn a_trial_knows_no_seed_builder_or_split() {
     let Some(gpu) = device() else { return };
     keep_about_the_radius_of_their_area(&gpu, &["cornell-spheres"]);
-    let scene = scene("cornell-spheres");
-    let geometry = Geometry::new(&scene).unwrap();
+    let spheres = Viewed::new(scene("cornell-spheres"));
     let radii = |settings: &SceneSettings| {
-        let plan = tried(&gpu, &scene, &geometry, settings);
+        let plan = spheres.tried(&gpu, settings, PICTURE);
         plan.maps().map(|map| (map.radius.to_bits(), map.radius_from)).collect::<Vec<_>>()
     };
     let settings = by_rounds();
     let expected = radii(&settings);
     for builder in [Builder::Atomic, Builder::Ballot] {
-        assert_eq!(
-            radii(&SceneSettings { builder: Some(builder), seed: 7, chunk: Some(5000), ..settings.clone() }),
-            expected,
-            "{builder:?}"
-        );
+        let otherwise = SceneSettings { builder: Some(builder), seed: 7, chunk: Some(5000), ..settings.clone() };
+        assert_eq!(radii(&otherwise), expected, "{builder:?}");
     }
     // A quarter of the photons: twice the radius, in whole steps.
     let fewer = radii(&SceneSettings { photons: settings.photons / 4, ..settings.clone() });
@@ -132,9 +103,8 @@ fn a_trial_knows_no_seed_builder_or_split() {
     let given = SceneSettings { radius: Some(0.03), ..settings.clone() };
     let one = radii(&given);
     assert_eq!((one[0].1, one[1]), (RadiusFrom::User, expected[1]));
-    let plan = tried(&gpu, &scene, &geometry, &SceneSettings { caustic_radius: Some(0.01), ..given });
-    assert_eq!(plan.trial, None);
-    let plan = tried(&gpu, &scene, &geometry, &settings);
+    assert_eq!(spheres.tried(&gpu, &SceneSettings { caustic_radius: Some(0.01), ..given }, PICTURE).trial, None);
+    let plan = spheres.tried(&gpu, &settings, PICTURE);
     let json: serde_json::Value = serde_json::from_slice(&scene_report::plan_json(&plan)).unwrap();
     assert!(json["trial"]["seconds"].as_f64().unwrap() > 0.0 && json["maps"][0]["radius_from"] == "trial", "{json}");
 }
@@ -150,8 +120,8 @@ fn sheets_that_touch_a_surface_narrow_no_radius() {
     }
     varnished.materials.push(Material { coverage: Coverage::Blend { alpha: 0.5 }, ..dull(0.5) });
     let [bare, varnished] = [bare, varnished].map(|scene| {
-        let geometry = Geometry::new(&scene).unwrap();
-        tried(&gpu, &scene, &geometry, &by_rounds()).global.unwrap().radius * geometry.unit
+        let viewed = Viewed::new(scene);
+        viewed.tried(&gpu, &by_rounds(), PICTURE).global.unwrap().radius * viewed.geometry.unit
     });
     println!("radius {bare:.4} m, {varnished:.4} m with sheets");
     assert!((0.5..2.0).contains(&(varnished / bare)), "{varnished}, {bare}");
@@ -168,10 +138,9 @@ fn a_radius_wider_than_what_it_lies_in_is_warned_of() {
     let corners = vec![corner(1.0, 1.0), corner(-1.0, 1.0), corner(1.0, -1.0), corner(-1.0, -1.0)];
     let middle = vec![(DVec3::ZERO, DVec3::Y); 6];
     let warning = |points: Vec<(DVec3, DVec3)>| {
-        let phases = [receivers(&geometry, &points)];
-        let view = View { geometry: &geometry, camera: None, phases: &phases };
-        let settings = SceneSettings { photons: 1 << 10, ..by_rounds() };
-        let plan = trial::plan(&gpu, &scene, &view, &settings, Sensor::Receivers { count: points.len() as u32 }).unwrap();
+        let target = Target::Points(&points);
+        let view = View { geometry: &geometry, camera: None, phases: &target.phases(&geometry) };
+        let plan = trial::plan(&gpu, &scene, &view, &SceneSettings { photons: 1 << 10, ..by_rounds() }, target.sensor()).unwrap();
         scene_report::radius_warning(&plan, &geometry, "point")
     };
     let told = warning([middle.clone(), corners].concat()).expect("a warning");
@@ -188,10 +157,9 @@ fn a_room_too_small_for_its_scene_has_an_unknown_bias() {
         scene.meshes.push(level(-1.0, [width; 2], true, 0));
         let geometry = Geometry::new(&scene).unwrap();
         let points: Vec<_> = (0..8).map(|k| (dvec3(0.4 * f64::from(k) - 1.4, 0.0, 0.1), DVec3::Y)).collect();
-        let phases = [receivers(&geometry, &points)];
-        let view = View { geometry: &geometry, camera: None, phases: &phases };
-        let settings = SceneSettings { photons: 1 << 12, ..by_rounds() };
-        let plan = trial::plan(&gpu, &scene, &view, &settings, Sensor::Receivers { count: points.len() as u32 }).unwrap();
+        let target = Target::Points(&points);
+        let view = View { geometry: &geometry, camera: None, phases: &target.phases(&geometry) };
+        let plan = trial::plan(&gpu, &scene, &view, &SceneSettings { photons: 1 << 12, ..by_rounds() }, target.sensor()).unwrap();
         let bias = scene::bias::measure(&gpu, &scene, &view, &plan, (1.0, 2), &AtomicBool::new(false)).unwrap().unwrap();
         assert_eq!(bias.is_known(), is_known, "{width} m: {bias:?}");
         let warning = scene_report::radius_warning(&plan, &geometry, "point").unwrap_or_default();
@@ -199,18 +167,21 @@ fn a_room_too_small_for_its_scene_has_an_unknown_bias() {
     }
 }
 
+/// The spheres, with radii by a trial round.
+fn rendered(gpu: &Gpu, settings: &SceneSettings, size: [u32; 2]) -> scene::RunResult {
+    let scene = scene("cornell-spheres");
+    scene::render(gpu, &scene, settings, Target::Picture(&scene.first_camera(), size)).unwrap()
+}
+
 /// Radii by density know no builder or chunk: films are the same to the bit.
 #[test]
 fn radii_by_density_change_no_bit_by_builder_or_chunk() {
     let Some(gpu) = device() else { return };
-    let scene = scene("cornell-spheres");
-    let camera = scene.first_camera();
     let settings = SceneSettings { photons: 4000, caustic_photons: 2000, rounds: 2, ..by_rounds() };
-    let lit = |settings: SceneSettings| scene::render(&gpu, &scene, &settings, Target::Picture(&camera, [24, 18])).unwrap();
-    let whole = lit(settings.clone());
+    let whole = rendered(&gpu, &settings, [24, 18]);
     assert!(whole.plan.has_classes() && whole.plan.maps().any(|map| whole.film.classes(map).is_some_and(|(first, last)| first < last)));
     for (builder, chunk) in [(Builder::Naive, Some(700)), (Builder::Persistent, Some(1300))] {
-        let other = lit(SceneSettings { builder: Some(builder), chunk, ..settings.clone() });
+        let other = rendered(&gpu, &SceneSettings { builder: Some(builder), chunk, ..settings.clone() }, [24, 18]);
         assert!(other.film == whole.film && other.film.class_counts == whole.film.class_counts, "{builder:?}, {chunk:?}");
     }
 }
@@ -219,16 +190,13 @@ fn radii_by_density_change_no_bit_by_builder_or_chunk() {
 #[test]
 fn one_radius_may_be_given() {
     let Some(gpu) = device() else { return };
-    let scene = scene("cornell-spheres");
-    let camera = scene.first_camera();
     let settings = SceneSettings { photons: 10_000, caustic_photons: 10_000, rounds: 4, ..by_rounds() };
-    let part_totals = |settings: SceneSettings| {
-        let lit = scene::render(&gpu, &scene, &settings, Target::Picture(&camera, [16, 12])).unwrap();
-        lit.film.part_totals.iter().map(|total| *total as f64).collect::<Vec<_>>()
+    let part_totals = |settings: &SceneSettings| -> Vec<f64> {
+        rendered(&gpu, settings, [16, 12]).film.part_totals.iter().map(|total| *total as f64).collect()
     };
-    let expected = part_totals(settings.clone());
-    let global = part_totals(SceneSettings { radius: Some(0.1), ..settings.clone() });
-    let caustic = part_totals(SceneSettings { caustic_radius: Some(0.02), ..settings });
+    let expected = part_totals(&settings);
+    let global = part_totals(&SceneSettings { radius: Some(0.1), ..settings.clone() });
+    let caustic = part_totals(&SceneSettings { caustic_radius: Some(0.02), ..settings });
     for (what, part) in [("caustics", 2), ("indirect light", 3)] {
         for found in [&global, &caustic] {
             assert!((found[part] / expected[part] - 1.0).abs() < 0.2, "{what}: {found:?}, {expected:?}");

@@ -1,6 +1,7 @@
 //! What nothing has reached has an unknown error and an upper bound, and no run ends on it.
 
 use crate::common::known::of_any_room;
+use crate::common::lit::{around_hole, sides};
 use crate::common::prelude::*;
 use glam::dvec3;
 use photonmill::engine::End;
@@ -10,23 +11,26 @@ use photonmill::settings::stop::Stop;
 
 /// Walls of a room over [-2, 2] x [-2, 2], as high as 3 m, that face inwards; and its ceiling but for a hole in the middle.
 pub fn room_without_floor(hole: f64) -> Vec<Mesh> {
-    let (side, height) = (4.0 * DVec3::X, 3.0 * DVec3::Y);
-    let depth = 4.0 * DVec3::Z;
+    let [side, height, depth] = [4.0 * DVec3::X, 3.0 * DVec3::Y, 4.0 * DVec3::Z];
     let wall = |name, origin, u, v| Mesh::parallelogram(name, origin, u, v, 0);
-    let ceiling = |x: [f64; 2], z: [f64; 2]| {
-        let (u, v) = ((x[1] - x[0]) * DVec3::X, (z[1] - z[0]) * DVec3::Z);
-        wall("ceiling", dvec3(x[0], 3.0, z[0]), u, v)
-    };
-    vec![
+    let walls = vec![
         wall("back", dvec3(-2.0, 0.0, -2.0), side, height),
         wall("front", dvec3(-2.0, 0.0, 2.0), height, side),
         wall("left", dvec3(-2.0, 0.0, -2.0), height, depth),
         wall("right", dvec3(2.0, 0.0, -2.0), depth, height),
-        ceiling([-2.0, 2.0], [-2.0, -hole]),
-        ceiling([-2.0, 2.0], [hole, 2.0]),
-        ceiling([-2.0, -hole], [-hole, hole]),
-        ceiling([hole, 2.0], [-hole, hole]),
-    ]
+    ];
+    [walls, around_hole(dvec3(-2.0, 3.0, -2.0), side, depth, about(hole), 0)].concat()
+}
+
+/// A square hole that reaches so far from the middle of 4 m, as shares of these.
+fn about(hole: f64) -> [DVec2; 2] {
+    [0.5 - 0.25 * hole, 0.5 + 0.25 * hole].map(DVec2::splat)
+}
+
+/// Puts a window into the right wall of such a room, from `low` to `high` as shares of its width and height.
+fn open_right_wall(meshes: &mut Vec<Mesh>, low: (f64, f64), high: (f64, f64)) {
+    let hole = [low, high].map(DVec2::from);
+    meshes.splice(3..4, around_hole(dvec3(2.0, 0.0, -2.0), 4.0 * DVec3::Z, 3.0 * DVec3::Y, hole, 0));
 }
 
 /// A room lit through a hole in its ceiling, so small that no photon of a run may find it.
@@ -70,8 +74,7 @@ fn probes_in_a_house_on_a_sunlit_plain_have_a_bound_and_no_error() {
     let Some(gpu) = device() else { return };
     let mut meshes = room_without_floor(0.0);
     // Sun comes from the left, and light of the ground through a window in the right wall.
-    let pane = |y: [f64; 2]| Mesh::parallelogram("right", dvec3(2.0, y[0], -2.0), 4.0 * DVec3::Z, (y[1] - y[0]) * DVec3::Y, 0);
-    meshes.splice(3..4, [pane([0.0, 1.0]), pane([2.0, 3.0])]);
+    open_right_wall(&mut meshes, (0.0, 1.0 / 3.0), (1.0, 2.0 / 3.0));
     meshes.push(level(0.0, [800.0, 800.0], true, 0));
     let sun = LightKind::Directional { direction: dvec3(1.0, -1.0, 0.0).normalize(), irradiance: Vec3::splat(1000.0) };
     let scene = scene_of(meshes, vec![matt(0.5)], vec![sun]);
@@ -188,17 +191,9 @@ fn points_that_no_photon_has_reached_say_how_much_may_be_unseen() {
 pub fn hidden_lamp(gpu: &Gpu) -> Check<Complaint> {
     // A black sheet 1 m above the floor with a hole of 1 cm, and a bright lamp above it.
     let half = 0.005;
-    let piece = |x: [f64; 2], z: [f64; 2]| {
-        Mesh::parallelogram("sheet", DVec3::new(x[0], 1.0, z[0]), DVec3::Z * (z[1] - z[0]), DVec3::X * (x[1] - x[0]), 3)
-    };
-    let sheet = [
-        piece([-2.0, 2.0], [-2.0, -half]),
-        piece([-2.0, 2.0], [half, 2.0]),
-        piece([-2.0, -half], [-half, half]),
-        piece([half, 2.0], [-half, half]),
-    ];
+    let sheet = around_hole(dvec3(-2.0, 1.0, -2.0), 4.0 * DVec3::Z, 4.0 * DVec3::X, about(half), 3);
     let dim = Mesh::parallelogram("dim", DVec3::new(0.6, 0.5, 0.6), DVec3::X * 0.2, DVec3::Z * 0.2, 1);
-    let meshes = [vec![level(0.0, [4.0; 2], true, 0), level(2.0, [2.0; 2], false, 2), dim], sheet.to_vec()].concat();
+    let meshes = [vec![level(0.0, [4.0; 2], true, 0), level(2.0, [2.0; 2], false, 2), dim], sheet].concat();
     let shining = |radiance: f32| Material { emission: Vec3::splat(radiance), ..matt(0.0) };
     // A black floor needs no photons in the trial.
     let scene = scene_of(meshes, vec![matt(0.0), shining(1.0), shining(1000.0), Material { two_sided: true, ..matt(0.0) }], vec![]);
@@ -212,30 +207,20 @@ pub fn hidden_lamp(gpu: &Gpu) -> Check<Complaint> {
     let (found, error) = (lit.film.mean(0).x, lit.film.stated_error(0).x);
     assert!(missing - found > 5.0 * error, "some ray has met it: look for a smaller hole");
     let is_said = unknown.text("point", "W/m2", 0.95, 16).contains("hidden: ");
-    if unknown.hidden.upper_bound < missing || !is_said {
-        return Err(Complaint::new(Kind::TooDark, format!("{missing} W/m2 are missing, and {:?} is known", unknown.hidden)));
-    }
+    let is_known = unknown.hidden.upper_bound >= missing && is_said;
+    Kind::TooDark.unless(is_known, || format!("{missing} W/m2 are missing, and {:?} is known", unknown.hidden))?;
     let open = Scene { meshes: scene.meshes[..3].to_vec(), ..scene };
     let lit = render(gpu, &open, &settings, Target::Points(&points)).unwrap();
-    match lit.film.unknown(0.95).hidden.points {
-        0 => Ok(()),
-        points => Err(Complaint::new(Kind::TooDark, format!("lamps in full sight are hidden from {points} points"))),
-    }
+    let points = lit.film.unknown(0.95).hidden.points;
+    Kind::TooDark.unless(points == 0, || format!("lamps in full sight are hidden from {points} points"))
 }
 
 /// A box that stands in the middle of the floor of a furnace of 2 m, points of its sides, and what they receive.
 fn box_in_a_furnace(gpu: &Gpu, width: f64) -> Result<RunResult, Error> {
-    let cube = |corner: DVec3, size: f64, faces_in: bool| {
-        let [x, y, z] = [DVec3::X * size, DVec3::Y * size, DVec3::Z * size];
-        let far = corner + size;
-        [(corner, z, x), (far, -x, -z), (corner, x, y), (far, -y, -x), (corner, y, z), (far, -z, -y)].map(|(origin, u, v)| {
-            let (u, v) = if faces_in { (u, v) } else { (v, u) };
-            Mesh::parallelogram("side", origin, u, v, 0)
-        })
-    };
     let corner = dvec3(1.0 - 0.5 * width, 0.0, 1.0 - 0.5 * width);
+    let room = sides(DVec3::ZERO, DVec3::splat(2.0), true, [0; 6]);
     let glowing = Material { emission: Vec3::splat(0.5), ..matt(0.5) };
-    let scene = scene_of([cube(DVec3::ZERO, 2.0, true), cube(corner, width, false)].concat(), vec![glowing], vec![]);
+    let scene = scene_of([room, sides(corner, DVec3::splat(width), false, [0; 6])].concat(), vec![glowing], vec![]);
     let heights = [0.25, 0.5, 0.75].into_iter();
     let points: Vec<_> = heights
         .flat_map(|height| {
@@ -258,17 +243,11 @@ pub fn dim_photons(gpu: &Gpu) -> Check<Complaint> {
     println!("{} of 12 points lack up to {most} W/m2 without an error of it: {:?}", silent.len(), unknown.dim);
     assert!(silent.len() > 4, "bright photons have met the box: look for a smaller one");
     let is_said = unknown.text("point", "W/m2", 0.95, 16).contains("dim: ");
-    if unknown.dim.points < silent.len() as u64 || unknown.dim.upper_bound < most || !is_said {
-        return Err(Complaint::new(
-            Kind::TooDark,
-            format!("{} points lack up to {most} W/m2, and {:?} is known", silent.len(), unknown.dim),
-        ));
-    }
+    let is_known = unknown.dim.points >= silent.len() as u64 && unknown.dim.upper_bound >= most && is_said;
+    Kind::TooDark.unless(is_known, || format!("{} points lack up to {most} W/m2, and {:?} is known", silent.len(), unknown.dim))?;
     let lit = box_in_a_furnace(gpu, 0.4)?;
-    match lit.film.unknown(0.95).dim.points {
-        0 => Ok(()),
-        points => Err(Complaint::new(Kind::TooDark, format!("{points} points among bright photons have met none of them"))),
-    }
+    let points = lit.film.unknown(0.95).dim.points;
+    Kind::TooDark.unless(points == 0, || format!("{points} points among bright photons have met none of them"))
 }
 
 /// Photons that are aimed at a window are dim; those that the ground scatters into it are bright and rare. Without them a room is too dark
@@ -277,11 +256,7 @@ pub fn dim_photons(gpu: &Gpu) -> Check<Complaint> {
 fn light_that_the_ground_scatters_into_a_room_is_said_to_be_missing() {
     let Some(gpu) = device() else { return };
     let mut meshes = room_without_floor(0.0);
-    let pane = |y: [f64; 2], z: [f64; 2]| {
-        Mesh::parallelogram("right", dvec3(2.0, y[0], z[0]), (z[1] - z[0]) * DVec3::Z, (y[1] - y[0]) * DVec3::Y, 0)
-    };
-    let sides = [[-2.0, -0.5], [0.5, 2.0]].map(|z| pane([1.0, 2.0], z));
-    meshes.splice(3..4, [pane([0.0, 1.0], [-2.0, 2.0]), pane([2.0, 3.0], [-2.0, 2.0])].into_iter().chain(sides));
+    open_right_wall(&mut meshes, (0.375, 1.0 / 3.0), (0.625, 2.0 / 3.0));
     meshes.extend([level(0.0, [4.0; 2], true, 0), level(-0.01, [100.0; 2], true, 0)]);
     let scene = scene_of(meshes, vec![matt(0.5)], vec![LightKind::Environment { radiance: Vec3::ONE }]);
     let both = |(x, z): (f64, f64)| [(dvec3(x, 3.0, z), DVec3::NEG_Y), (dvec3(x, 0.0, z), DVec3::Y)];

@@ -6,7 +6,6 @@ use std::process::{Command, Output};
 use crate::common::prelude::*;
 use crate::common::program::on_device;
 use photonmill::oidn::{Denoiser, Guides};
-use photonmill::output::exr_file;
 use photonmill::output::metadata::Metadata;
 
 /// A little more light by the albedo and the normal, or with `DENOISER_LIES` far too much, where everything is set as it should be.
@@ -82,16 +81,7 @@ fn in_its_place(place: &Place, is_old: bool) -> PathBuf {
     folder
 }
 
-fn is_installed() -> bool {
-    Denoiser::open().is_ok()
-}
-
 const SMALL: &str = "--size 24x17 --photons 500 -q";
-
-fn channels(place: &Place, name: &str) -> BTreeMap<String, Vec<f32>> {
-    let (_, channels) = exr_file::decode(&std::fs::read(place.at(name)).unwrap()).unwrap();
-    channels.into_iter().map(|channel| (channel.name, channel.values)).collect()
-}
 
 const NEW: (bool, &str) = (false, "2.5.1");
 const OLD: (bool, &str) = (true, "1.4.3");
@@ -110,24 +100,25 @@ fn direct_light_alone_is_denoised_by_all_versions() {
 /// A scene by libraries of these versions, the new one first.
 fn denoise_by(scene: &str, versions: &[(bool, &str)]) {
     let Some(_) = device() else { return };
-    if cfg!(not(target_os = "linux")) || is_installed() {
+    if cfg!(not(target_os = "linux")) || Denoiser::open().is_ok() {
         eprintln!("SKIPPED: Open Image Denoise itself is in the place of the test's library");
         return;
     }
     let place = Place::new();
     let render = format!("render {scene} {SMALL} --rounds 8 --block 1 -o");
     place.succeed(&format!("{render} plain.exr --error-image plain-error.exr"));
-    let plain = channels(&place, "plain.exr");
+    let plain = place.channels("plain.exr");
     for &(is_old, version) in versions {
         let folder = in_its_place(&place, is_old);
-        let run = |line: &str| -> Output {
-            let output = place.command(&on_device(line)).env("LD_LIBRARY_PATH", &folder).output().unwrap();
+        let run = |line: &str, how: Option<&str>| -> Output {
+            let mut command = place.command(&on_device(line));
+            let output = command.env("LD_LIBRARY_PATH", &folder).envs(how.map(|name| (name, "1"))).output().unwrap();
             assert!(output.status.success(), "{line}: {}", text(&output.stderr));
             output
         };
-        let told = text(&run(&format!("{render} a.exr --denoise --error-image error.exr")).stdout);
+        let told = text(&run(&format!("{render} a.exr --denoise --error-image error.exr"), None).stdout);
         assert!(told.contains(&format!("direct light is denoised by Open Image Denoise {version}; all errors are those")), "{told}");
-        let found = channels(&place, "a.exr");
+        let found = place.channels("a.exr");
         let mut moved = 0;
         for (channel, axis) in [("R", "X"), ("G", "Y"), ("B", "Z")] {
             let layer = |name: &str, channel: &str, pixel: usize| plain[&format!("{name}.{channel}")][pixel];
@@ -135,10 +126,8 @@ fn denoise_by(scene: &str, versions: &[(bool, &str)]) {
                 let (all, direct) = (plain[channel][pixel], layer("direct", channel, pixel));
                 let by = layer("albedo", channel, pixel) / 1024.0 + layer("normal", axis, pixel) / 2048.0;
                 let (change, expected) = (value - all, direct * by);
-                assert!(
-                    (change * by).signum() >= 0.0 && change.abs() <= expected.abs() + 1e-6 * all,
-                    "{channel} of pixel {pixel}: {change}, {expected}"
-                );
+                let is_right = (change * by).signum() >= 0.0 && change.abs() <= expected.abs() + 1e-6 * all;
+                assert!(is_right, "{channel} of pixel {pixel}: {change}, {expected}");
                 // Not of lamps that the eye sees, and not where there is less noise than that.
                 moved += usize::from((change - expected).abs() <= 1e-6 * all && change != 0.0);
             }
@@ -148,29 +137,27 @@ fn denoise_by(scene: &str, versions: &[(bool, &str)]) {
         for (name, values) in plain.iter().filter(|(name, _)| name.len() > 1) {
             assert!(*values == found[name], "{name}");
         }
-        assert!(channels(&place, "error.exr") == channels(&place, "plain-error.exr"));
+        assert!(place.channels("error.exr") == place.channels("plain-error.exr"));
 
         if is_old {
-            let repeated = run("repeat of-new.exr -q");
+            let repeated = run("repeat of-new.exr -q", None);
             let warned = "warning: was denoised by Open Image Denoise 2.5.1, and now by Open Image Denoise 1.4.3";
             assert!(text(&repeated.stderr).contains(warned), "{}", text(&repeated.stderr));
             continue;
         }
         std::fs::copy(place.at("a.exr"), place.at("of-new.exr")).unwrap();
-        run(&format!("{render} a.png --denoise"));
+        run(&format!("{render} a.png --denoise"), None);
         for file in ["a.exr", "a.png"] {
-            let content = std::fs::read(place.at(file)).unwrap();
+            let content = place.content(file);
             let made = Metadata::read(&content).unwrap();
             assert_eq!(made.denoiser, Some(format!("Open Image Denoise {version}")), "{file}");
             assert!(text(&content).contains("Denoised: direct light, by Open Image Denoise") || file == "a.png", "{file}");
-            let repeated = run(&format!("repeat {file} -q"));
+            let repeated = run(&format!("repeat {file} -q"), None);
             assert!(text(&repeated.stdout).contains("repeated, all") && repeated.stderr.is_empty(), "{}", text(&repeated.stderr));
         }
         // Nothing moves farther than its error, whatever the library says.
-        let line = on_device(&format!("{render} lie.exr --denoise"));
-        let output = place.command(&line).env("LD_LIBRARY_PATH", &folder).env("DENOISER_LIES", "1").output().unwrap();
-        assert!(output.status.success(), "{}", text(&output.stderr));
-        let lie = channels(&place, "lie.exr");
+        run(&format!("{render} lie.exr --denoise"), Some("DENOISER_LIES"));
+        let lie = place.channels("lie.exr");
         let farthest = |name: &str| {
             let errors = &plain[&format!("standard_error.{name}")];
             let moves =
@@ -179,15 +166,10 @@ fn denoise_by(scene: &str, versions: &[(bool, &str)]) {
         };
         assert!(["R", "G", "B"].iter().all(|name| (0.5..=1.0).contains(&farthest(name))), "{}", farthest("R"));
         // A library that fails in the end loses no picture.
-        let line = on_device(&format!("{render} failed.exr --denoise"));
-        let output = place.command(&line).env("LD_LIBRARY_PATH", &folder).env("DENOISER_FAILS", "1").output().unwrap();
-        let stderr = text(&output.stderr);
-        assert!(
-            output.status.success() && stderr.contains("--denoise: Open Image Denoise fails: out of luck; the picture is as it was"),
-            "{stderr}"
-        );
-        assert!(channels(&place, "failed.exr")["R"] == plain["R"]);
-        assert_eq!(Metadata::read(&std::fs::read(place.at("failed.exr")).unwrap()).unwrap().denoiser, None);
+        let stderr = text(&run(&format!("{render} failed.exr --denoise"), Some("DENOISER_FAILS")).stderr);
+        assert!(stderr.contains("--denoise: Open Image Denoise fails: out of luck; the picture is as it was"), "{stderr}");
+        assert!(place.channels("failed.exr")["R"] == plain["R"]);
+        assert_eq!(Metadata::read(&place.content("failed.exr")).unwrap().denoiser, None);
     }
 }
 
@@ -200,7 +182,7 @@ fn what_cannot_be_denoised_is_refused_before_the_run() {
         (format!("render cornell {SMALL} -o a.exr --denoise --part caustic"), &of_part[..]),
         (format!("render cornell {SMALL} -o a.exr --denoise --illumination photons"), &of_maps[..]),
     ]);
-    if is_installed() {
+    if Denoiser::open().is_ok() {
         return;
     }
     let absent = ["--denoise: Open Image Denoise is not installed; install", "or omit --denoise"];

@@ -3,10 +3,11 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use crate::common::lit::Viewed;
 use crate::common::prelude::*;
 use photonmill::engine::scene::fill_map::{Filled, fill};
 use photonmill::engine::scene::map_file::{MapFile, MapWriter};
-use photonmill::engine::scene::{self, RunResult, View, trial};
+use photonmill::engine::scene::{self, RunResult};
 use photonmill::engine::watch::Keep;
 use photonmill::settings::scene::Kernel;
 use ply_rs_bw::parser::Parser;
@@ -17,28 +18,10 @@ fn small() -> SceneSettings {
     SceneSettings { photons: 3000, caustic_photons: 2000, rounds: 6, shadow_rays: 2, block: Some(2), ..SceneSettings::default() }
 }
 
-struct Room {
-    scene: Scene,
-    geometry: Geometry,
-    camera: Camera,
-}
-
-impl Room {
-    fn new(scene: Scene) -> Room {
-        Room { geometry: Geometry::new(&scene).unwrap(), camera: scene.first_camera(), scene }
-    }
-
-    fn view(&self) -> View<'_> {
-        View { geometry: &self.geometry, camera: Some(&self.camera), phases: &[] }
-    }
-
-    fn plan(&self, gpu: &Gpu, settings: &SceneSettings) -> ScenePlan {
-        trial::plan(gpu, &self.scene, &self.view(), settings, square_picture(8)).unwrap()
-    }
-
+impl Viewed {
     /// A file of the photons of these settings; cancelled once so many rounds are done.
     fn write(&self, gpu: &Gpu, settings: &SceneSettings, most_rounds: u64) -> (NamedTempFile, Filled) {
-        let plan = self.plan(gpu, settings);
+        let plan = self.tried(gpu, settings, square_picture(8));
         let mut file = NamedTempFile::new().unwrap();
         let mut writer = MapWriter::new(file.as_file_mut(), &self.scene.name, &self.geometry, &plan, "a device").unwrap();
         let cancelled = AtomicBool::new(false);
@@ -54,7 +37,7 @@ impl Room {
         let map = MapFile::open("--map", path)?;
         let settings = map.settings(settings);
         // A plan whose own photons would carry otherwise, as another camera's do: what counts is what those of the file carry.
-        let mut plan = self.plan(gpu, &settings);
+        let mut plan = self.tried(gpu, &settings, square_picture(8));
         for of_run in plan.global.iter_mut().chain(&mut plan.caustic) {
             (of_run.flux_scale, of_run.flux_gain) = (7.0 * of_run.flux_scale, 2.0 * of_run.flux_gain);
         }
@@ -63,8 +46,19 @@ impl Room {
     }
 
     fn traced(&self, gpu: &Gpu, settings: &SceneSettings) -> RunResult {
-        scene::light(gpu, &self.view(), self.plan(gpu, settings), &mut Control::default()).unwrap()
+        self.lit(gpu, self.tried(gpu, settings, square_picture(8)))
     }
+}
+
+/// All photons of a map in one round.
+fn photons_of(map: &MapFile, round: u32, name: &str, planes: usize) -> Vec<MapPhoton> {
+    let mut found = Vec::new();
+    map.photons(round, name, 10, planes, &mut |photons| {
+        found.extend_from_slice(photons);
+        Ok(())
+    })
+    .unwrap();
+    found
 }
 
 fn line_of(error: &Error) -> String {
@@ -98,7 +92,7 @@ fn compare_pictures(layouts: Vec<(Scene, SceneSettings, SceneSettings)>) {
     let Some(gpu) = device() else { return };
     for (scene, settings, of_file) in layouts {
         let name = scene.name.clone();
-        let room = Room::new(scene);
+        let room = Viewed::new(scene);
         let SceneSettings { illumination, bounces, .. } = settings;
         let (file, filled) = room.write(&gpu, &SceneSettings { illumination, bounces, ..of_file }, u64::MAX);
         assert_eq!((filled.rounds, filled.is_cancelled), (6, false));
@@ -116,7 +110,7 @@ fn compare_pictures(layouts: Vec<(Scene, SceneSettings, SceneSettings)>) {
 #[test]
 fn a_file_that_ends_early_holds_whole_rounds() {
     let Some(gpu) = device() else { return };
-    let room = Room::new(scene("cornell"));
+    let room = Viewed::new(scene("cornell"));
     let (file, filled) = room.write(&gpu, &small(), 4);
     assert!(filled.is_cancelled && filled.rounds == 4);
     let found = room.lit_from(&gpu, &SceneSettings { rounds: 4, ..small() }, file.path()).unwrap();
@@ -127,7 +121,7 @@ fn a_file_that_ends_early_holds_whole_rounds() {
 #[test]
 fn damaged_files_are_refused() {
     let Some(gpu) = device() else { return };
-    let room = Room::new(scene("cornell"));
+    let room = Viewed::new(scene("cornell"));
     let settings = SceneSettings { photons: 300, caustic_photons: 300, ..small() };
     let (file, _) = room.write(&gpu, &settings, u64::MAX);
     let whole = std::fs::read(file.path()).unwrap();
@@ -162,7 +156,7 @@ fn damaged_files_are_refused() {
 fn headers_that_contradict_themselves_are_refused() {
     let Some(gpu) = device() else { return };
     use sha2::{Digest, Sha256};
-    let room = Room::new(scene("cornell"));
+    let room = Viewed::new(scene("cornell"));
     let (file, _) = room.write(&gpu, &SceneSettings { photons: 300, rounds: 2, ..small() }, u64::MAX);
     let whole = std::fs::read(file.path()).unwrap();
     let tail = whole.len() - 56;
@@ -214,10 +208,10 @@ fn files_of_more_light_are_taken() {
 
 fn ask_for_other_light(all: bool) {
     let Some(gpu) = device() else { return };
-    let room = Room::new(scene("cornell-spheres"));
+    let room = Viewed::new(scene("cornell-spheres"));
     let few = SceneSettings { photons: 300, caustic_photons: 300, rounds: 2, ..small() };
     let (file, _) = room.write(&gpu, &few, u64::MAX);
-    let other = Room::new(scene("cornell"));
+    let other = Viewed::new(scene("cornell"));
     let line = line_of(&other.lit_from(&gpu, &few, file.path()).unwrap_err());
     assert!(line.contains("of another scene (cornell-spheres"), "{line}");
     // Less is wanted than there is.
@@ -239,26 +233,21 @@ fn photons_know_where_they_came_from() {
     let place = DVec3::new(0.31, 0.62, 0.44);
     let mut closed = scene("furnace");
     (closed.materials[0], closed.lights) = (matt(0.0), vec![lamp(point(place))]);
-    let room = Room::new(closed);
+    let room = Viewed::new(closed);
     let settings = SceneSettings { illumination: Illumination::Photons, ..small() };
     let (file, _) = room.write(&gpu, &settings, u64::MAX);
     let map = MapFile::open("--map", file.path()).unwrap();
-    let (mut count, mut watts) = (0, 0.0);
-    for round in 0..map.rounds() {
-        map.photons(round, "global", 1000, room.geometry.planes.len(), &mut |photons| {
-            for photon in photons {
-                let expected = (place - map.header.position(photon)).normalize();
-                assert!(photon.came_from().as_dvec3().distance(expected) < 2e-4, "{photon:?}: {expected}");
-                assert_eq!(photon.arrival(), photonmill::constants::ARRIVED_DIRECT);
-                watts += f64::from(photon.flux.x) * map.header.maps[0].watts / f64::from(map.rounds());
-                count += 1;
-            }
-            Ok(())
-        })
-        .unwrap();
+    let photons: Vec<MapPhoton> =
+        (0..map.rounds()).flat_map(|round| photons_of(&map, round, "global", room.geometry.planes.len())).collect();
+    for photon in &photons {
+        let expected = (place - map.header.position(photon)).normalize();
+        assert!(photon.came_from().as_dvec3().distance(expected) < 2e-4, "{photon:?}: {expected}");
+        assert_eq!(photon.arrival(), photonmill::constants::ARRIVED_DIRECT);
     }
     // All of them land, with 1 W/sr into all directions.
-    assert_eq!(count, 6 * 3000);
+    assert_eq!(photons.len(), 6 * 3000);
+    let flux: f64 = photons.iter().map(|photon| f64::from(photon.flux.x)).sum();
+    let watts = flux * map.header.maps[0].watts / f64::from(map.rounds());
     assert!((watts / (4.0 * PI) - 1.0).abs() < 1e-5, "{watts} W");
 }
 
@@ -276,22 +265,14 @@ fn the_program_makes_reads_and_exports_files() {
     let common = "--rounds 4 --block 1 --size 8x8 -q";
     place.succeed(&format!("render cornell-spheres --map map.pm -o a.exr {common}"));
     place.succeed(&format!("render cornell-spheres --photons 3000 --caustic-photons 2000 -o b.exr {common}"));
-    let light = |name: &str| image::open(place.at(name)).unwrap().into_rgb32f();
-    assert!(light("a.exr") == light("b.exr"));
+    assert!(place.pixels("a.exr") == place.pixels("b.exr"));
 
     place.succeed("map export map.pm -o some.ply --rounds 2 --only caustic");
     let mut reader = std::io::BufReader::new(std::fs::File::open(place.at("some.ply")).unwrap());
     let ply = Parser::<DefaultElement>::new().read_ply(&mut reader).unwrap();
     let vertices = &ply.payload["vertex"];
     let map = MapFile::open("FILE", &place.at("map.pm")).unwrap();
-    let mut expected = Vec::new();
-    (0..2).for_each(|round| {
-        map.photons(round, "caustic", 10, usize::MAX, &mut |photons| {
-            expected.extend_from_slice(photons);
-            Ok(())
-        })
-        .unwrap();
-    });
+    let expected: Vec<MapPhoton> = (0..2).flat_map(|round| photons_of(&map, round, "caustic", usize::MAX)).collect();
     assert!(vertices.len() == expected.len() && vertices.len() > 500);
     for (vertex, photon) in pairs(vertices, &expected) {
         let Property::Double(x) = vertex["x"] else { panic!("{vertex:?}") };

@@ -3,6 +3,7 @@
 
 use std::process::Command;
 
+use crate::common::layered::row_of_texels;
 use crate::common::prelude::*;
 use crate::common::program::on_device;
 use glam::{dvec3, vec3};
@@ -17,12 +18,12 @@ use serde_json::json;
 const SMALL: &str = "--size 8x8 --photons 500 -q";
 
 impl Place {
-    fn content(&self, name: &str) -> Vec<u8> {
+    pub fn content(&self, name: &str) -> Vec<u8> {
         std::fs::read(self.at(name)).unwrap()
     }
 
     /// Channels by their names.
-    fn channels(&self, name: &str) -> BTreeMap<String, Vec<f32>> {
+    pub fn channels(&self, name: &str) -> BTreeMap<String, Vec<f32>> {
         let (size, channels) = exr_file::decode(&self.content(name)).unwrap();
         assert!(channels.iter().all(|channel| channel.values.len() == (size.0 * size.1) as usize));
         channels.into_iter().map(|channel| (channel.name, channel.values)).collect()
@@ -94,7 +95,7 @@ fn the_error_layer_is_as_large_as_the_report_says() {
         "render caustic-sphere --rounds 8 --block 1 -o a.exr --json a.json --size 8x8 --photons 500 --caustic-photons 100 --aim off -q",
     );
     let all = place.channels("a.exr");
-    let report: serde_json::Value = serde_json::from_str(&place.text("a.json")).unwrap();
+    let report = place.json("a.json");
     let mean_square = |layer: &str| {
         let values = ["R", "G", "B"].map(|channel| &all[&format!("{layer}{channel}")]);
         let finite = || values.into_iter().flatten().map(|value| f64::from(*value)).filter(|value| value.is_finite());
@@ -209,8 +210,7 @@ fn what_is_seen_first_is_what_closed_forms_say() {
 fn albedos_have_textures_and_normals_are_smooth() {
     let mut wall = Mesh::parallelogram("wall", dvec3(-1.0, -1.0, -1.0), 2.0 * DVec3::X, 2.0 * DVec3::Y, 0);
     wall.colours = vec![DVec3::splat(0.5); 4];
-    let texels = Texels::Linear(vec![[255, 0, 0, 255], [0, 255, 0, 255]]);
-    let texture = Texture { name: "two".into(), width: 2, height: 1, texels, wrap: [Wrap::Clamp; 2], filter: Filter::Nearest };
+    let texture = row_of_texels(&[[255, 0, 0, 255], [0, 255, 0, 255]], Filter::Nearest);
     let red_and_green = Material { base_colour: Vec3::ONE, base_colour_texture: Some(TextureUse::of(0, 0)), ..matt(1.0) };
     let scene = Scene { textures: vec![texture], ..scene_of(vec![wall], vec![red_and_green], vec![]) };
     let camera = Camera::looking_at("eye", DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, FRAC_PI_2);

@@ -1,10 +1,11 @@
 //! Cameras: parallel rays and lenses, against closed forms and the path tracer.
 
-use crate::common::gltf_file::set_buffer;
-use crate::common::lit::{means, seen};
+use crate::common::gltf_file::square;
 use crate::common::prelude::*;
+use crate::files::gltf::load;
 use glam::dvec3;
 use photonmill::scene::{Lens, Projection};
+use serde_json::json;
 
 /// Squares of half a metre that shine, two metres and eight metres before the eye, left and right of the middle.
 fn near_and_far() -> Scene {
@@ -88,36 +89,29 @@ fn both_see_what_the_path_tracer_sees() {
         let judged = Judge::new(&scene, 32).image(&camera, 8, 8, 600, 1);
         let settings = SceneSettings { photons: 5_000, caustic_photons: 5_000, rounds: 32, samples: 4, ..by_rounds() };
         let lit = seen(&gpu, &scene, &settings, &camera, [8, 8]);
-        let (mut found, mut expected, mut squares) = (0.0, 0.0, 0.0);
+        let (mut found, mut expected, mut squares) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
         for (pixel, judged) in judged.pixels.iter().enumerate() {
-            found += lit.film.mean(pixel).x;
-            expected += judged.mean.total().x;
-            squares += lit.film.standard_error(pixel).x.powi(2) + judged.total_standard_error.x.powi(2);
+            found += lit.film.mean(pixel);
+            expected += judged.mean.total();
+            squares += lit.film.standard_error(pixel).powf(2.0) + judged.total_standard_error.powf(2.0);
         }
-        let what = format!("{:?}", camera.projection);
-        assert_holds(&what, z_check(&what, found, expected, squares.sqrt().hypot(0.01 * expected)));
+        for channel in 0..3 {
+            let what = format!("{:?}, channel {channel}", camera.projection);
+            let error = squares[channel].sqrt().hypot(0.01 * expected[channel]);
+            assert_holds(&what, z_check(&what, found[channel], expected[channel], error));
+        }
     }
 }
 
 /// A file's orthographic camera sees 2 xmag by 2 ymag, scaled by its node.
 #[test]
 fn a_file_has_orthographic_cameras() {
-    let mut value = serde_json::json!({
-        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1]}],
-        "nodes": [{"mesh": 0}, {"name": "plan", "camera": 0, "scale": [2, 2, 2], "translation": [0, 0, 3]}],
-        "cameras": [{"type": "orthographic", "orthographic": {"xmag": 3, "ymag": 2, "znear": 0.1, "zfar": 10}}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
-        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]}],
-        "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"byteLength": 36}],
-    });
-    let corners: Vec<u8> = [0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].iter().flat_map(|value| value.to_le_bytes()).collect();
-    set_buffer(&mut value, &corners);
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("a.gltf");
-    std::fs::write(&path, value.to_string()).unwrap();
-    let scene = Scene::open(path.to_str().unwrap(), false).unwrap();
+    let mut value = square();
+    value["cameras"][0] = json!({"type": "orthographic", "orthographic": {"xmag": 3, "ymag": 2, "znear": 0.1, "zfar": 10}});
+    value["nodes"][1]["scale"] = json!([2, 2, 2]);
+    let scene = load(&value).unwrap();
     let camera = scene.first_camera();
-    assert_eq!((camera.name.as_str(), camera.projection), ("plan", Projection::Orthographic { half_height: 4.0 }));
-    assert_eq!((camera.aspect, camera.eye, camera.forward), (Some(1.5), dvec3(0.0, 0.0, 3.0), DVec3::NEG_Z));
+    assert_eq!((camera.name.as_str(), camera.projection), ("eye", Projection::Orthographic { half_height: 4.0 }));
+    assert_eq!((camera.aspect, camera.eye, camera.forward), (Some(1.5), dvec3(0.0, 0.0, 5.0), DVec3::NEG_Z));
     assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
 }

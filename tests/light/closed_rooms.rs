@@ -3,7 +3,6 @@
 
 use crate::common::known::kept;
 use crate::common::prelude::*;
-use photonmill::ledger::Fates;
 
 /// A sphere of 1 m of flat triangles, seen from inside.
 fn hollow_sphere(segments: u32) -> Mesh {
@@ -131,19 +130,7 @@ fn parallel_plates_send_light_to_and_fro_in_either_way() {
     plates_send_light_to_and_fro(&BOTH);
 }
 
-/// Photons that survive bounce k of a closed room: rho^k of all, and none escapes.
-fn expect_geometric(family: &mut Family, what: &str, fates: &Fates, rho: f64) {
-    for (bounce, counts) in fates.bounces.iter().enumerate() {
-        assert_eq!(counts.escaped, 0, "{what}");
-        let chance = rho.powi(bounce as i32 + 1);
-        let error = (chance * (1.0 - chance) / fates.emitted as f64).sqrt();
-        // Where few survive, few tell: 2 % must be seven errors for a test to notice it beside its own.
-        let bright = if 0.02 * chance > 7.0 * error { "bright: " } else { "" };
-        family.expect_count(format!("{bright}{what}, albedo {rho:.2}, bounce {}", bounce + 1), counts.stored, fates.emitted, chance);
-    }
-}
-
-/// In a closed sphere albedo^k of the photons are stored at bounce k. Where fewer than half of the 131 072 photons are left, more than
+/// In a closed sphere albedo^k of the photons are stored at bounce k, and none escapes. Where fewer than half of the 131 072 photons are left, more than
 /// 2 % goes unnoticed. `tests/light/extremes.rs` has the paper's box with a sixth wall.
 #[test]
 fn bounces_in_a_sphere_are_a_geometric_series() {
@@ -153,7 +140,15 @@ fn bounces_in_a_sphere_are_a_geometric_series() {
     for rho in [0.5f32, 0.9, 0.99] {
         let scene = scene_of(vec![hollow_sphere(12)], vec![matt(rho)], vec![lamp.clone()]);
         let lit = received(&gpu, &scene, &kept(flights(1 << 17, 15)), &[(DVec3::ZERO, DVec3::Y)]);
-        expect_geometric(&mut family, "sphere", &lit.fates[0], f64::from(rho));
+        for (bounce, counts) in lit.fates[0].bounces.iter().enumerate() {
+            assert_eq!(counts.escaped, 0, "albedo {rho}");
+            let chance = f64::from(rho).powi(bounce as i32 + 1);
+            let error = (chance * (1.0 - chance) / lit.fates[0].emitted as f64).sqrt();
+            // Where few survive, few tell: 2 % must be seven errors for a test to notice it beside its own.
+            let bright = if 0.02 * chance > 7.0 * error { "bright: " } else { "" };
+            let what = format!("{bright}sphere, albedo {rho:.2}, bounce {}", bounce + 1);
+            family.expect_count(what, counts.stored, lit.fates[0].emitted, chance);
+        }
     }
     family.assert_tells(0.02, |what| what.starts_with("bright"));
 }

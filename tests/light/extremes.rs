@@ -6,9 +6,9 @@ use crate::common::lit::received_within;
 use crate::common::prelude::*;
 use glam::EulerRot;
 use photonmill::cpu::bsdf::phong_lobe;
-use photonmill::engine::film::{BlockSums, LatestBlocks};
+use photonmill::engine::film::BlockSums;
 use photonmill::engine::room::film::{RoomFilm, estimate_walls};
-use photonmill::engine::scene::{RunResult, SceneFilm};
+use photonmill::engine::scene::RunResult;
 use photonmill::ledger::Fates;
 use photonmill::plan::scene::SEGMENT_BOUNCES;
 use photonmill::records::Tally;
@@ -89,10 +89,6 @@ fn light_is_linear_in_power_over_24_decades() {
             assert_holds(exponent, relative_check("irradiance", *found, one * watts, 8.0 * f64::EPSILON));
         }
     }
-    for refused in [[1e-13, 1.0], [1.0, 1e13], [1.0, 0.999e-6]] {
-        let error = RoomSettings { light_power: refused, ..RoomSettings::default() }.validate().unwrap_err().to_string();
-        assert!(error.starts_with("--light-power "), "{refused:?}: {error}");
-    }
 }
 
 /// Phong weights that differ by many decades, and fluxes of lamps as different as is allowed, mixed in one texel: a sum
@@ -155,37 +151,21 @@ fn standard_errors_survive_a_mean_far_above_them() {
     let furnace = scene("furnace");
     let settings = SceneSettings { rounds: 1_000_000, ..by_rounds() };
     let plan = scene_plan_within(&Limits::of_host(), &furnace, &settings, square_picture(1)).unwrap();
-    let units = |value: f64| (value * plan.film.scale).round() as u64;
-    let (low, high) = (units(999.9), units(1000.1));
-    let half = u64::from(settings.rounds) / 2;
-    let square = |value: u64| u128::from(value) * u128::from(value);
-    let squares = u128::from(half) * (square(low) + square(high));
-    let of_blocks =
-        BlockSums { rounds: settings.rounds, blocks: settings.rounds, sums: vec![half * (low + high); 3], squares: vec![squares; 3] };
-    let film = SceneFilm {
-        plan: plan.film.clone(),
-        of_blocks,
-        of_surfaces: None,
-        differences: Default::default(),
-        latest: LatestBlocks::default(),
-        one_hits: vec![0; 3],
-        part_totals: Vec::new(),
-        parts: None,
-        anomalies: Default::default(),
-        class_counts: Vec::new(),
-        stored: [0; 3],
-    };
-    let exact = 0.1 / (f64::from(settings.rounds) - 1.0).sqrt();
-    assert_holds("mean", relative_check("mean", film.mean(0).x, 1000.0, 1e-6));
-    assert_holds("error", relative_check("standard error", film.standard_error(0).x, exact, 1e-3));
+    let mut light = BlockSums { sums: vec![0], squares: vec![0], ..BlockSums::default() };
     // As f32 would have it: nothing is left of the variance, or it is negative.
     let (mut sum, mut sum_of_squares) = (0.0f32, 0.0f32);
-    for value in [999.9f32, 1000.1].repeat(half as usize) {
-        sum += value;
-        sum_of_squares += value * value;
+    for value in [999.9f64, 1000.1].repeat(settings.rounds as usize / 2) {
+        light.end_block(1, &[(value * plan.film.scale).round() as u64]);
+        sum += value as f32;
+        sum_of_squares += value as f32 * value as f32;
     }
+    let rounds = f64::from(light.rounds);
+    let [mean, error] = [light.sums[0] as f64, light.variance(0).sqrt()].map(|of_sum| of_sum / rounds / plan.film.scale);
+    let exact = 0.1 / (rounds - 1.0).sqrt();
+    assert_holds("mean", relative_check("mean", mean, 1000.0, 1e-6));
+    assert_holds("error", relative_check("standard error", error, exact, 1e-3));
     let n = settings.rounds as f32;
-    let naive = (f64::from(sum_of_squares / n - (sum / n) * (sum / n)) / f64::from(settings.rounds)).sqrt();
+    let naive = (f64::from(sum_of_squares / n - (sum / n) * (sum / n)) / rounds).sqrt();
     assert_complains("sums in f32", relative_check("standard error", naive, exact, 1e-3));
 }
 
@@ -241,7 +221,9 @@ fn phong_weights_are_powers_of_the_cosine() {
 #[test]
 fn phong_weights_have_their_mean_and_vanish_behind() {
     let count = 400_000u32;
-    let draws: Vec<f32> = first_draws(count);
+    // Numbers in [0, 1), drawn as photons draw them.
+    let streams = streams_of(&RoomSettings { rng: Rng::Philox, photons: count, ..RoomSettings::default() });
+    let draws: Vec<f32> = (0..count).map(|photon| draws_of(streams, 0, photon, 0)[0]).collect();
     for shininess in [0.0f32, 0.01, 0.5, 2.0, 5.0, 1e4] {
         let n = f64::from(shininess);
         let (mean, square) = (2.0 / (n + 2.0), 2.0 / (2.0 * n + 2.0));
@@ -269,12 +251,6 @@ fn phong_weights_have_their_mean_and_vanish_behind() {
     }
     let narrow = weights(1e4);
     assert!(pairs(&ones, &narrow).all(|(one, weight)| weight <= one) && narrow.iter().any(|weight| *weight > 0.0));
-}
-
-/// Numbers in [0, 1), drawn as photons draw them.
-fn first_draws(count: u32) -> Vec<f32> {
-    let settings = RoomSettings { rng: Rng::Philox, photons: count, ..RoomSettings::default() };
-    (0..count).map(|photon| draws_of(streams_of(&settings), 0, photon, 0)[0]).collect()
 }
 
 /// From a photon's own place there is no direction to the eye, and from an eye in the wall's plane none but along it.
@@ -390,7 +366,7 @@ fn kernels_integrate_to_one(rows: &[(Kernel, &[f64])]) {
 
 #[test]
 fn every_kernel_of_every_radius_integrates_to_one() {
-    kernels_integrate_to_one(&[(Kernel::Box, &[2.0, 0.3, 0.002]), (Kernel::Cone, &[2.0]), (Kernel::Epanechnikov, &[2.0])]);
+    kernels_integrate_to_one(&[(Kernel::Box, &[2.0, 0.3, 0.002]), (Kernel::Cone, &[2.0, 0.1]), (Kernel::Epanechnikov, &[2.0])]);
 }
 
 #[test]
@@ -414,14 +390,6 @@ fn radii_beyond_what_positions_allow_are_refused() {
     // Where no photon is in reach of any point there is nothing, and no division by it.
     let lit = received(&gpu, &furnace, &furnace_settings(least), &[(DVec3::new(0.5, 0.0, 0.5), DVec3::Y)]);
     assert!(lit.film.mean(0).is_finite());
-    // The paper's box, at both ends of what it allows.
-    for radius in [0.5, 0.5 / 65_536.0] {
-        RoomSettings { radius, ..RoomSettings::default() }.validate().unwrap();
-    }
-    for radius in [0.5f64.next_up(), (0.5f64 / 65_536.0).next_down(), f64::NAN] {
-        let error = RoomSettings { radius, ..RoomSettings::default() }.validate().unwrap_err().to_string();
-        assert!(error.starts_with("--radius "), "{radius}: {error}");
-    }
 }
 
 /// Without correction an estimate at an edge is dark by the share of the disc beyond it, a half on the edge and
@@ -445,10 +413,6 @@ fn edges_and_corners_are_dark_by_what_lies_beyond_them() {
         assert_complains("a share 0.1 % larger", relative_check("share", 1.001 * ratio, share, 3e-4));
     }
     println!("covered shares off by {worst:.1e} at most");
-    for (place, expected) in [(0, 0.5), (1, 0.6575), (2, 0.8045), (3, 0.9279), (4, 1.0), (6, 0.25), (7, 0.63408), (8, 0.89591)] {
-        let share = red(&without, place).0 / red(&with, place).0;
-        assert!((share - expected).abs() < 3e-4, "place {place}: {share} where {expected} is right");
-    }
 }
 
 /// r_n / r_1 of the schedule with alpha = 2/3, from Gamma(n + alpha) / (Gamma(1 + alpha) n!).
@@ -478,12 +442,10 @@ fn vast() -> Limits {
         buffer_bytes: u64::MAX / 4,
         memory_bytes: u64::MAX / 4,
         pair_tests_per_submission: u64::MAX / 1024,
-        group_size: 1024,
         busy_invocations: 1 << 17,
         loop_iterations: 1 << 14,
         lanes: 32,
-        counters: 1,
-        votes_in_loops: true,
+        ..Limits::of_host()
     }
 }
 
@@ -728,9 +690,7 @@ fn walls_light_what_touches_them(textured: bool) {
     let lamp = Material { emission: Vec3::ONE, emission_texture: textured.then(|| TextureUse::of(0, 0)), ..matt(0.0) };
     let wall = Mesh::parallelogram("wall", DVec3::ZERO, turn * DVec3::Y, turn * DVec3::Z, 1);
     let floor = Mesh::parallelogram("floor", turn * DVec3::NEG_X, turn * DVec3::Z, turn * (DVec3::X * 2.0), 0);
-    let texels = vec![Vec3::ONE].into();
-    let texture = Texture { name: "white".into(), width: 1, height: 1, texels, wrap: [Wrap::Clamp; 2], filter: Default::default() };
-    let textures = if textured { vec![texture] } else { vec![] };
+    let textures = if textured { vec![texture(1, vec![Vec3::ONE], [Wrap::Clamp; 2])] } else { vec![] };
     let room = Scene { textures, ..scene_of(vec![wall, floor], vec![matt(0.0), lamp], vec![]) };
     let points = distances.map(|distance| (turn * DVec3::new(distance, 0.0, 0.4), turn * DVec3::Y));
     let exact = |point: DVec3| {
@@ -798,31 +758,27 @@ fn channels_a_millionth_as_bright_are_right() {
 #[test]
 fn channels_below_the_films_unit_are_right() {
     let Some(gpu) = device() else { return };
-    for (rounds, done) in [(64, 64), (1 << 20, 4)] {
-        a_channel_below_the_films_unit_is_right(&gpu, rounds, done);
-    }
-}
-
-fn a_channel_below_the_films_unit_is_right(gpu: &Gpu, rounds: u32, done: u32) {
     let tint = DVec3::new(1.0, 2e-7, 3e-8);
     let mut plane = scene("sky-over-plane");
     plane.materials[0].base_colour = tint.as_vec3();
     let camera = Camera::looking_at("above", DVec3::Y * 1.5, DVec3::ZERO, DVec3::Z, 0.1);
-    let stop = Stop { photons: Some(u64::from(done)), ..Stop::default() };
-    let settings = SceneSettings { photons: 1, rounds, shadow_rays: 1, samples: 1, stop, ..kept(by_rounds()) };
-    let lit = seen(gpu, &plane, &settings, &camera, [16, 16]);
-    assert_eq!(lit.film.rounds, done);
-    let pixels = lit.film.pixels();
-    for channel in 0..3 {
-        let (exact, means) = (tint[channel], means(&lit));
-        let errors: Vec<f64> = (0..pixels).map(|pixel| lit.film.standard_error(pixel)[channel]).collect();
-        let found = means.iter().map(|mean| mean[channel]).sum::<f64>() / pixels as f64;
-        let error = errors.iter().map(|error| error.powi(2)).sum::<f64>().sqrt() / pixels as f64;
-        println!("channel {channel}: {found:e} +- {error:e}, {exact:e} is right, a unit is {:e}", 1.0 / lit.plan.film.scale);
-        assert!(rounds > done || error < 0.05 * exact);
-        assert_holds(channel, z_check("radiance", found, exact, error.max(1e-6 * exact)));
-        let off = means.iter().zip(&errors).map(|(mean, error)| (mean[channel] - exact).abs() / error.max(1e-6 * exact));
-        let most_off = off.fold(0.0, f64::max);
-        assert!(most_off < 6.0, "channel {channel}: a pixel is {most_off} stated errors off");
+    for (rounds, done) in [(64, 64), (1 << 20, 4)] {
+        let stop = Stop { photons: Some(u64::from(done)), ..Stop::default() };
+        let settings = SceneSettings { photons: 1, rounds, shadow_rays: 1, samples: 1, stop, ..kept(by_rounds()) };
+        let lit = seen(&gpu, &plane, &settings, &camera, [16, 16]);
+        assert_eq!(lit.film.rounds, done);
+        let pixels = lit.film.pixels();
+        for channel in 0..3 {
+            let (exact, means) = (tint[channel], means(&lit));
+            let errors: Vec<f64> = (0..pixels).map(|pixel| lit.film.standard_error(pixel)[channel]).collect();
+            let found = means.iter().map(|mean| mean[channel]).sum::<f64>() / pixels as f64;
+            let error = errors.iter().map(|error| error.powi(2)).sum::<f64>().sqrt() / pixels as f64;
+            println!("channel {channel}: {found:e} +- {error:e}, {exact:e} is right, a unit is {:e}", 1.0 / lit.plan.film.scale);
+            assert!(rounds > done || error < 0.05 * exact);
+            assert_holds(channel, z_check("radiance", found, exact, error.max(1e-6 * exact)));
+            let off = means.iter().zip(&errors).map(|(mean, error)| (mean[channel] - exact).abs() / error.max(1e-6 * exact));
+            let most_off = off.fold(0.0, f64::max);
+            assert!(most_off < 6.0, "channel {channel}: a pixel is {most_off} stated errors off");
+        }
     }
 }

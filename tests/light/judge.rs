@@ -1,8 +1,12 @@
 //! The judge, judged: scenes whose light is known in closed form.
 
+use crate::common::layered::{lobes_at, map_of, mapped_normal, metal, plastic, row_of_texels};
+use crate::common::lit::sides;
+use crate::common::plates::Place;
 use crate::common::prelude::*;
-use photonmill::scene::material::{Coverage, Layers, Medium, NormalMap};
-use photonmill::verify::judge::{Estimate, Image, fresnel, lobes, random};
+use photonmill::scene::material::{Coverage, Layers, Medium};
+use photonmill::scene::texture::Filter;
+use photonmill::verify::judge::{Estimate, Image, fresnel, lobes};
 
 const NO_LIMIT: u32 = u32::MAX;
 
@@ -23,10 +27,6 @@ fn environment() -> LightKind {
 
 const SKY: DVec3 = DVec3::new(1.0, 2.0, 4.0);
 
-fn texture_of(width: u32, texels: Texels) -> Texture {
-    Texture { name: "texture".into(), width, height: 1, texels, wrap: [Wrap::Clamp; 2], filter: Default::default() }
-}
-
 /// A horizontal square of side 2 `half` around the axis z, at this height; its front looks up, or down.
 fn square(height: f64, half: f64, up: bool, material: usize) -> Mesh {
     let corner = DVec3::new(-half, -half, height);
@@ -39,16 +39,9 @@ fn plate_under(material: Material, light: LightKind) -> Scene {
     scene_of(vec![square(0.0, 1.0, true, 0)], vec![material], vec![light])
 }
 
-/// The faces of a box from -half to half: bottom, top, then the sides; fronts look in or out.
-fn faces(half: DVec3, inwards: bool, materials: [usize; 6]) -> Vec<Mesh> {
-    let (x, y, z) = (2.0 * half.x * DVec3::X, 2.0 * half.y * DVec3::Y, 2.0 * half.z * DVec3::Z);
-    // Origin and edges, with u x v inwards.
-    let sides = [(-half, x, y), (half, -y, -x), (-half, y, z), (half, -z, -y), (-half, z, x), (half, -x, -z)];
-    let face = |((origin, u, v), material)| {
-        let (u, v) = if inwards { (u, v) } else { (v, u) };
-        Mesh::parallelogram("face", origin, u, v, material)
-    };
-    sides.into_iter().zip(materials).map(face).collect()
+/// A box from -half to half that faces outwards.
+fn cuboid(half: DVec3, material: usize) -> Vec<Mesh> {
+    sides(-half, 2.0 * half, false, [material; 6])
 }
 
 /// Whether an estimate meets what is expected, within 4.5 standard errors and a few roundings.
@@ -93,13 +86,17 @@ fn disc_irradiance(distance: f64, law: EmissionLaw) -> DVec3 {
 
 #[test]
 fn a_disc_lights_the_point_on_its_axis() {
-    for law in [EmissionLaw::Cosine, EmissionLaw::Uniform] {
+    for (law, other) in [(EmissionLaw::Cosine, EmissionLaw::Uniform), (EmissionLaw::Uniform, EmissionLaw::Cosine)] {
         let lit = scene_of(vec![], vec![], vec![disc(1.5, -DVec3::Z, law)]);
         let estimate = irradiance(&lit, DVec3::ZERO, DVec3::Z, 20_000);
         assert_total("front", &estimate, disc_irradiance(1.5, law));
         assert_eq!(estimate.mean.total(), estimate.mean.direct);
         assert_eq!(irradiance(&lit, DVec3::Z * 3.0, -DVec3::Z, 100).mean.total(), DVec3::ZERO, "back");
+        // The check complains about one per cent, about the other law, and about what is no number.
+        let (mean, error) = (estimate.mean.total(), estimate.total_standard_error);
+        assert!(!meets(1.01 * mean, error, disc_irradiance(1.5, law)) && !meets(mean, error, disc_irradiance(1.5, other)));
     }
+    assert!(!meets(DVec3::NAN, DVec3::NAN, DVec3::ONE) && !meets(DVec3::INFINITY, DVec3::INFINITY, DVec3::ONE));
 }
 
 #[test]
@@ -110,9 +107,8 @@ fn point_lights_fall_off_with_distance_and_cosine_and_add_up() {
     assert_total("alone", &irradiance(&lit, DVec3::ZERO, DVec3::Z, 2), expected);
     // A plate blocks it from either side; the receiver itself, a surface, does not.
     let plates = |height| vec![square(0.0, 9.0, true, 0), square(height, 9.0, true, 0)];
-    let black = || vec![Material::lambert("black", Vec3::ZERO)];
-    assert_total("lit", &irradiance(&scene_of(plates(5.0), black(), vec![bulb.clone()]), DVec3::ZERO, DVec3::Z, 2), expected);
-    assert_total("shadow", &irradiance(&scene_of(plates(2.0), black(), vec![bulb]), DVec3::ZERO, DVec3::Z, 2), DVec3::ZERO);
+    assert_total("lit", &irradiance(&scene_of(plates(5.0), vec![matt(0.0)], vec![bulb.clone()]), DVec3::ZERO, DVec3::Z, 2), expected);
+    assert_total("shadow", &irradiance(&scene_of(plates(2.0), vec![matt(0.0)], vec![bulb]), DVec3::ZERO, DVec3::Z, 2), DVec3::ZERO);
     // Two, whatever their power.
     let bulb = |x: f64, intensity: f32| LightKind::Point { position: DVec3::new(x, 0.0, 1.0), intensity: Vec3::splat(intensity) };
     let both = irradiance(&scene_of(vec![], vec![], vec![bulb(0.0, 1.0), bulb(1.0, 30.0)]), DVec3::ZERO, DVec3::Z, 20_000);
@@ -157,17 +153,14 @@ fn the_sky_lights_an_open_plane() {
     assert_total("both sides", &radiance(&lit, below, spot, 100), COLOUR.as_dvec3() * SKY);
 }
 
-/// A box of these walls, all of which shine alike.
-fn furnace(walls: [Material; 6]) -> Scene {
-    let shining = |material: Material| Material { emission: Vec3::new(1.0, 2.0, 3.0), ..material };
-    scene_of(faces(DVec3::new(1.0, 0.7, 0.5), true, [0, 1, 2, 3, 4, 5]), walls.map(shining).to_vec(), vec![])
-}
-
-/// The same of equal walls but for some of them.
+/// A box of walls that all shine alike and are equal but for some of them, by their numbers: 2 is the floor, 3 the ceiling, 4 is on
+/// the left.
 fn furnace_of(wall: &Material, others: &[(usize, Material)]) -> Scene {
-    let mut walls = [(); 6].map(|()| wall.clone());
+    let mut walls = vec![wall.clone(); 6];
     others.iter().for_each(|(number, material)| walls[*number] = material.clone());
-    furnace(walls)
+    walls.iter_mut().for_each(|wall| wall.emission = EMITTED.as_vec3());
+    let half = DVec3::new(1.0, 0.7, 0.5);
+    scene_of(sides(-half, 2.0 * half, true, [0, 1, 2, 3, 4, 5]), walls, vec![])
 }
 
 const EMITTED: DVec3 = DVec3::new(1.0, 2.0, 3.0);
@@ -194,7 +187,7 @@ fn furnaces_glow_evenly_and_in_the_right_parts() {
 
     // With mirrors the same light comes in all parts, and none of it twice.
     let mirror = material(Surface::Mirror, COLOUR);
-    let shiny = furnace_of(&rough, &[(1, mirror.clone()), (2, mirror)]);
+    let shiny = furnace_of(&rough, &[(3, mirror.clone()), (4, mirror)]);
     let seen = radiance(&shiny, eye, floor, 40_000);
     assert_total("floor", &seen, expected);
     let above = radiance(&shiny, eye, ceiling, 20_000);
@@ -202,8 +195,8 @@ fn furnaces_glow_evenly_and_in_the_right_parts() {
     assert_meets("specular", above.mean.specular, above.standard_error.specular, expected - EMITTED);
     assert_total("irradiance", &irradiance(&shiny, floor, DVec3::Z, 40_000), PI * expected);
     // Metal reflects its base colour along the normal alone: a smooth wall of F0 = F90 comes from an ior of 0.
-    let layered_mirror = layered(Vec3::ZERO, &Layers { ior: 0.0, specular_colour: COLOUR, specular: 1.0, ..dielectric(0.0) });
-    let layered_shiny = furnace_of(&plain(COLOUR), &[(1, layered_mirror)]);
+    let layered_mirror = layered(Vec3::ZERO, &Layers { ior: 0.0, specular_colour: COLOUR, specular: 1.0, ..plastic(0.0) });
+    let layered_shiny = furnace_of(&plain(COLOUR), &[(3, layered_mirror)]);
     for (seen, above) in [(seen, above), (radiance(&layered_shiny, eye, floor, 10_000), radiance(&layered_shiny, eye, ceiling, 2000))] {
         assert!(seen.mean.caustic.min_element() > 0.01 && seen.mean.indirect.min_element() > 0.01, "{seen:?}");
         assert_eq!((seen.mean.specular, above.mean.direct), (DVec3::ZERO, EMITTED));
@@ -212,7 +205,7 @@ fn furnaces_glow_evenly_and_in_the_right_parts() {
 
     // Rough lobes of the same kinds: what is sharp and what is not.
     for (roughness, is_sharp) in [(0.499f32, true), (0.5, false)] {
-        let lit = furnace_of(&plain(COLOUR), &[(0, layered(COLOUR, &metal(roughness)))]);
+        let lit = furnace_of(&plain(COLOUR), &[(2, layered(COLOUR, &metal(roughness)))]);
         let seen = radiance(&lit, eye, floor, 2000).mean;
         assert_eq!(seen.direct == EMITTED, is_sharp, "{seen:?}");
         assert_eq!(seen.specular == DVec3::ZERO, !is_sharp, "{seen:?}");
@@ -248,19 +241,16 @@ fn bounces_are_a_geometric_series() {
 
 #[test]
 fn a_lamp_is_seen_in_a_mirror_and_lights_through_it() {
-    let materials = || vec![material(Surface::Mirror, COLOUR), lamp_of(Vec3::new(1.0, 2.0, 3.0))];
-    let lit = scene_of(vec![square(0.0, 5.0, true, 0), square(2.0, 1.0, false, 1)], materials(), vec![]);
+    let materials = vec![material(Surface::Mirror, COLOUR), lamp_of(Vec3::new(1.0, 2.0, 3.0)), matt(0.0)];
+    let lit = scene_of(vec![square(0.0, 5.0, true, 0), square(2.0, 1.0, false, 1)], materials.clone(), vec![]);
     let seen = radiance(&lit, DVec3::new(3.0, 0.0, 2.0), DVec3::new(1.5, 0.1, 0.0), 2);
     assert_total("lamp", &seen, COLOUR.as_dvec3() * EMITTED);
     assert_eq!(seen.mean.specular, seen.mean.total());
 
     for law in [EmissionLaw::Cosine, EmissionLaw::Uniform] {
         // It lies in the very plane of a black ceiling.
-        let lit = scene_of(
-            vec![square(0.0, 5.0, true, 0), square(1.0, 5.0, false, 2)],
-            [materials(), vec![matt(0.0)]].concat(),
-            vec![disc(1.0, -DVec3::Z, law)],
-        );
+        let meshes = vec![square(0.0, 5.0, true, 0), square(1.0, 5.0, false, 2)];
+        let lit = scene_of(meshes, materials.clone(), vec![disc(1.0, -DVec3::Z, law)]);
         assert_total("direct", &irradiance(&lit, DVec3::ZERO, DVec3::Z, 20_000), disc_irradiance(1.0, law));
         // From below its lamp a receiver sees the lamp's image only, as far below the mirror.
         let estimate = irradiance(&lit, DVec3::Z * 0.5, -DVec3::Z, 200_000);
@@ -295,13 +285,11 @@ fn refraction_obeys_snell() {
     // A lamp no wider than a pencil at the bottom of a pool, seen where Snell's law says.
     let water = material(Surface::Dielectric { ior: 1.25 }, Vec3::ONE);
     let lit = scene_of(vec![square(0.0, 5.0, true, 0), square(-1.0, 0.01, true, 1)], vec![water, lamp_of(Vec3::ONE)], vec![]);
-    let eye_at = |sine: f64| {
+    for sine in [0.1, 0.5, 0.9f64] {
+        let cosine = (1.0 - sine * sine).sqrt();
         let surface = DVec3::X * (sine / 1.25 / (1.0 - (sine / 1.25).powi(2)).sqrt());
-        (surface + DVec3::new(sine, 0.0, (1.0 - sine * sine).sqrt()), surface)
-    };
-    for sine in [0.1, 0.5, 0.9] {
-        let (eye, surface) = eye_at(sine);
-        let reflectance = fresnel((1.0 - sine * sine).sqrt(), 1.0, f64::from(1.25f32));
+        let eye = surface + DVec3::new(sine, 0.0, cosine);
+        let reflectance = fresnel(cosine, 1.0, f64::from(1.25f32));
         let expected = DVec3::splat((1.0 - reflectance) / (1.25 * 1.25));
         assert_total("lamp", &radiance(&lit, eye, surface, 20_000), expected);
         assert_total("beside", &radiance(&lit, eye, surface + DVec3::X * 0.05, 100), DVec3::ZERO);
@@ -336,7 +324,7 @@ fn sampling_lobes_and_sampling_lights_agree() {
     let open_and_closed = |surface, eye, samples| {
         let open = plate_under(material(surface, COLOUR), environment());
         let mut closed = open.clone();
-        closed.meshes.extend(faces(DVec3::splat(2.0), false, [1; 6]));
+        closed.meshes.extend(cuboid(DVec3::splat(2.0), 1));
         closed.materials.push(material(Surface::Dielectric { ior: 1.0 }, Vec3::ONE));
         [open, closed].map(|scene| radiance(&scene, eye, DVec3::ZERO, samples))
     };
@@ -361,7 +349,7 @@ fn sampling_lobes_and_sampling_lights_agree() {
 
 #[test]
 fn textures_shade_lamps_and_walls() {
-    let ramp = || texture_of(2, vec![Vec3::ZERO, Vec3::ONE].into());
+    let ramp = || texture(2, vec![Vec3::ZERO, Vec3::ONE], [Wrap::Clamp; 2]);
     let textured = Some(TextureUse::of(0, 0));
     let plain = |material| scene_of(vec![square(0.0, 1.0, true, 0)], vec![material], vec![]);
     let mut lit = plain(Material { emission_texture: textured, ..lamp_of(Vec3::new(1.0, 2.0, 3.0)) });
@@ -428,11 +416,6 @@ fn results_depend_on_the_seed_and_not_on_threads() {
     let parts = Part::EACH.map(|part| one.pixels.iter().map(|pixel| pixel.mean[part]).sum::<DVec3>());
     assert!(parts.iter().all(|part| part.min_element() > 0.0), "{parts:?}");
     assert_meets("total", parts.iter().sum(), DVec3::ZERO, one.pixels.iter().map(|pixel| pixel.mean.total()).sum());
-    // A single sample, too, has nothing but its parts.
-    let camera = &scene.cameras[0];
-    let judge = Judge::new(&scene, 10);
-    let sample = judge.radiance(camera.eye, camera.forward, &mut random(1, 2));
-    assert_eq!(sample.total(), sample.direct + sample.specular + sample.caustic + sample.indirect);
 }
 
 #[test]
@@ -461,18 +444,6 @@ fn standard_errors_are_what_means_scatter_by() {
     assert_eq!(single.total_standard_error, DVec3::INFINITY);
 }
 
-#[test]
-fn the_checks_complain_about_one_percent() {
-    let lit = scene_of(vec![], vec![], vec![disc(1.5, -DVec3::Z, EmissionLaw::Uniform)]);
-    let estimate = irradiance(&lit, DVec3::ZERO, DVec3::Z, 20_000);
-    let (mean, error) = (estimate.mean.total(), estimate.total_standard_error);
-    assert!(meets(mean, error, disc_irradiance(1.5, EmissionLaw::Uniform)));
-    assert!(!meets(1.01 * mean, error, disc_irradiance(1.5, EmissionLaw::Uniform)));
-    assert!(!meets(mean, error, disc_irradiance(1.5, EmissionLaw::Cosine)));
-    assert!(!meets(DVec3::NAN, DVec3::NAN, DVec3::ONE));
-    assert!(!meets(DVec3::INFINITY, DVec3::INFINITY, DVec3::ONE));
-}
-
 /// What scatters as Lambert does: a dielectric that reflects nothing.
 fn plain(base_colour: Vec3) -> Material {
     layered(base_colour, &Layers { metallic: 0.0, specular: 0.0, ..Layers::default() })
@@ -482,16 +453,8 @@ fn layered(base_colour: Vec3, layers: &Layers) -> Material {
     Material { two_sided: true, ..Material::layered("layered", base_colour, *layers) }
 }
 
-fn metal(roughness: f32) -> Layers {
-    Layers { roughness, ..Layers::default() }
-}
-
-fn dielectric(roughness: f32) -> Layers {
-    Layers { metallic: 0.0, roughness, ..Layers::default() }
-}
-
 fn clear(roughness: f32, ior: f32) -> Layers {
-    Layers { transmission: 1.0, ior, ..dielectric(roughness) }
+    Layers { transmission: 1.0, ior, ..plastic(roughness) }
 }
 
 fn solid(roughness: f32, ior: f32, transmittance: Vec3) -> Layers {
@@ -515,13 +478,13 @@ fn layered_plates_return_their_albedo_of_the_sky() {
         assert_eq!(seen.mean.total(), part);
     }
     // White plastic returns all of it, whatever its roughness; so does what is smoothly coated, and smooth glass.
-    for layers in [dielectric(0.0), dielectric(0.3), dielectric(1.0), Layers { coat: 1.0, ..dielectric(0.0) }, clear(0.0, 1.5)] {
+    for layers in [plastic(0.0), plastic(0.3), plastic(1.0), Layers { coat: 1.0, ..plastic(0.0) }, clear(0.0, 1.5)] {
         for cosine in [0.9, 0.3] {
             let seen = plate(layered(Vec3::ONE, &layers), environment(), cosine, 40_000);
             assert_meets("white", seen.mean.total(), seen.total_standard_error + 1e-4, SKY);
         }
     }
-    let smooth = plate(layered(Vec3::ONE, &dielectric(0.0)), environment(), 1.0, 40_000);
+    let smooth = plate(layered(Vec3::ONE, &plastic(0.0)), environment(), 1.0, 40_000);
     assert_meets("reflected", smooth.mean.specular, smooth.standard_error.specular, 0.04 * SKY);
     let tinted = plate(layered(COLOUR, &clear(0.0, 1.5)), environment(), 1.0, 40_000);
     // What passes a thin wall is seen as if nothing were there.
@@ -538,32 +501,10 @@ fn lamps_of_all_sizes_light_lobes_of_all_widths() {
             let centre = DVec3::new(-0.75, 0.0, 1.0);
             let corner = centre - DVec3::new(half, half, 0.0);
             let above = Mesh::parallelogram("lamp", corner, 2.0 * half * DVec3::Y, 2.0 * half * DVec3::X, 1);
-            let lit = scene_of(
-                vec![square(0.0, 0.1, true, 0), above],
-                vec![layered(COLOUR, &metal(roughness)), lamp_of(emitted.as_vec3())],
-                vec![],
-            );
+            let plate = layered(COLOUR, &metal(roughness));
+            let lobe = lobes_at(&plate, &Place::of_normal(DVec3::Z, wo), DVec3::Z);
+            let lit = scene_of(vec![square(0.0, 0.1, true, 0), above], vec![plate, lamp_of(emitted.as_vec3())], vec![]);
             let seen = radiance(&lit, 0.5 * wo, DVec3::ZERO, samples);
-            let alpha = f64::from(roughness) * f64::from(roughness);
-            let inputs = lobes::Inputs {
-                base_colour: COLOUR.as_dvec3(),
-                metalness: 1.0,
-                alpha,
-                stretch: None,
-                ior: 1.5,
-                specular: 1.0,
-                specular_colour: DVec3::ONE,
-                transmission: 0.0,
-                diffuse_transmission: 0.0,
-                diffuse_transmission_colour: DVec3::ONE,
-                film: lobes::Film::NONE,
-                wall: lobes::Wall::Thin,
-                coat: 0.0,
-                coat_alpha: 0.0,
-                sheen_colour: DVec3::ZERO,
-                sheen_s: 0.01,
-            };
-            let lobe = lobes::Lobes::new(inputs, lobes::Frame { wo, ng: DVec3::Z, n: DVec3::Z, coat_n: DVec3::Z });
             let mut sum = DVec3::ZERO;
             for place in 0..count * count {
                 let [x, y] = [place % count, place / count].map(|at| (f64::from(at) + 0.5) / f64::from(count));
@@ -571,14 +512,10 @@ fn lamps_of_all_sizes_light_lobes_of_all_widths() {
                 sum += lobe.evaluate(lobes::Kind::Reflection, wi) * wi.z * wi.z / (distance * distance);
             }
             let expected = sum * emitted * (2.0 * half / f64::from(count)).powi(2);
-            assert_meets(
-                &format!("roughness {roughness}, lamp {half}"),
-                seen.mean.total(),
-                seen.total_standard_error + 1e-3 * expected,
-                expected,
-            );
+            let what = format!("roughness {roughness}, lamp {half}");
+            assert_meets(&what, seen.mean.total(), seen.total_standard_error + 1e-3 * expected, expected);
             let noise = (seen.total_standard_error / expected).max_element() * f64::from(samples).sqrt();
-            assert!(noise < 3.0, "roughness {roughness}, lamp {half}: a sample scatters by {noise}");
+            assert!(noise < 3.0, "{what}: a sample scatters by {noise}");
         }
     }
 }
@@ -602,11 +539,8 @@ fn thin_walls_let_shadow_rays_pass() {
 
     // The sky behind a rough pane comes by its lobe, whose light is caustic; nothing is lost where nothing is reflected.
     let under = |layers| {
-        let lit = scene_of(
-            vec![square(0.01, 90.0, true, 0), square(-0.1, 90.0, true, 1)],
-            vec![layered(Vec3::ONE, &layers), plain(Vec3::ZERO)],
-            vec![environment()],
-        );
+        let meshes = vec![square(0.01, 90.0, true, 0), square(-0.1, 90.0, true, 1)];
+        let lit = scene_of(meshes, vec![layered(Vec3::ONE, &layers), plain(Vec3::ZERO)], vec![environment()]);
         irradiance(&lit, DVec3::ZERO, DVec3::Z, 40_000)
     };
     let rough = under(Layers { specular: 0.0, ..clear(0.3, 1.5) });
@@ -616,7 +550,7 @@ fn thin_walls_let_shadow_rays_pass() {
 }
 
 fn slab(half_thickness: f64, material: usize) -> Vec<Mesh> {
-    faces(DVec3::new(50.0, 50.0, half_thickness), false, [material; 6])
+    cuboid(DVec3::new(50.0, 50.0, half_thickness), material)
 }
 
 /// Above a lamp that fills the plane below, through what lies between, at this sine.
@@ -685,11 +619,8 @@ fn nested_media_see_each_other() {
     let rough = layered(Vec3::ONE, &solid(0.6, 1.5, tinted));
     assert_total("rough within", &nested([glass(Vec3::ONE), rough], [0.2, 0.1]), slab_transmits(reflectance, kept(0.2)));
     // Where two lie partly in one another, the smaller one fills the place, on the way down and on the way up.
-    let mut meshes = slab(0.15, 0);
-    meshes.iter_mut().flat_map(|mesh| &mut mesh.positions).for_each(|at| at.z -= 0.05);
-    meshes.extend(
-        slab(0.25, 1).into_iter().map(|mesh| Mesh { positions: mesh.positions.iter().map(|at| at + 0.15 * DVec3::Z).collect(), ..mesh }),
-    );
+    let lifted = |slab: Vec<Mesh>, by: f64| moved(scene_of(slab, vec![], vec![]), |at| at + by * DVec3::Z).meshes;
+    let meshes = [lifted(slab(0.15, 0), -0.05), lifted(slab(0.25, 1), 0.15)].concat();
     assert_total("overlapping", &through(meshes, vec![glass(tinted), glass(Vec3::ONE)], 0.0), slab_transmits(reflectance, kept(0.3)));
     // Glass of 1.5 in a liquid of 1.2: the outer and the inner boundaries reflect by the media on both sides.
     let liquid = layered(Vec3::ONE, &solid(0.0, 1.2, Vec3::ONE));
@@ -704,19 +635,19 @@ fn eyes_and_receivers_know_what_they_are_in() {
     let tinted = Vec3::new(1.0, 0.3, 0.05);
     let kept = |way: f64| tinted.as_dvec3().map(|share| share.powf(way));
     // A lamp within the solid, and within another one of the same index in it.
-    let mut meshes = faces(DVec3::splat(2.0), false, [0; 6]);
+    let mut meshes = cuboid(DVec3::splat(2.0), 0);
     meshes.push(square(-1.0, 0.5, true, 2));
     let glass = |transmittance| layered(Vec3::ONE, &solid(0.0, 1.5, transmittance));
     let materials = vec![glass(tinted), glass(Vec3::ONE), lamp_of(Vec3::ONE)];
     let lit = scene_of(meshes.clone(), materials.clone(), vec![]);
     assert_total("one", &radiance(&lit, DVec3::ZERO, -DVec3::Z, 2), kept(1.0));
-    meshes.extend(faces(DVec3::splat(0.25), false, [1; 6]));
+    meshes.extend(cuboid(DVec3::splat(0.25), 1));
     let lit = scene_of(meshes, materials, vec![]);
     let seen = radiance(&lit, DVec3::new(0.01, 0.02, 0.0), DVec3::new(0.01, 0.02, -1.0), 2);
     assert_total("two", &seen, kept(0.75));
 
     // Shadow rays within a medium lose light on their way.
-    let mut meshes = faces(DVec3::splat(2.0), false, [0; 6]);
+    let mut meshes = cuboid(DVec3::splat(2.0), 0);
     meshes.push(square(-1.0, 1.0, true, 1));
     let bulb = LightKind::Point { position: DVec3::Z * 0.5, intensity: Vec3::ONE };
     let lit = scene_of(meshes, vec![glass(tinted), plain(Vec3::ZERO)], vec![bulb]);
@@ -729,10 +660,9 @@ fn alpha_covers_its_share() {
     let sheet = |coverage: Coverage| Material { coverage, two_sided: true, ..plain(Vec3::ZERO) };
     let stack = |coverage, count: u32| {
         let sheets = (0..count).map(|index| square(0.5 + 0.1 * f64::from(index), 5.0, index % 2 == 0, 0));
-        let mut lit = scene_of(sheets.collect(), vec![sheet(coverage), lamp_of(Vec3::new(1.0, 2.0, 3.0))], vec![]);
-        lit.meshes.push(square(-1.0, 5.0, true, 1));
-        lit.lights.push(lamp(LightKind::Directional { direction: -DVec3::Z, irradiance: Vec3::new(1.0, 2.0, 3.0) }));
-        lit
+        let meshes = sheets.chain([square(-1.0, 5.0, true, 1)]).collect();
+        let sun = LightKind::Directional { direction: -DVec3::Z, irradiance: Vec3::new(1.0, 2.0, 3.0) };
+        scene_of(meshes, vec![sheet(coverage), lamp_of(Vec3::new(1.0, 2.0, 3.0))], vec![sun])
     };
     for count in [1, 3, 6] {
         for alpha in [0.0f32, 0.25, 0.5, 1.0] {
@@ -751,7 +681,7 @@ fn alpha_covers_its_share() {
     }
     // Factors, textures and vertices multiply.
     let mut lit = stack(Coverage::Blend { alpha: 0.8 }, 1);
-    lit.textures.push(texture_of(1, Texels::Srgb(vec![[255, 255, 255, 51]])));
+    lit.textures.push(row_of_texels(&[[255, 255, 255, 51]], Filter::Bilinear));
     lit.materials[0].base_colour_texture = Some(TextureUse::of(0, 0));
     lit.meshes[0].alphas = vec![0.5; 4];
     assert_total("all", &irradiance(&lit, DVec3::ZERO, DVec3::Z, 2), (1.0 - 0.8f32 as f64 * 0.2 * 0.5) * EMITTED);
@@ -769,13 +699,11 @@ fn alpha_covers_its_share() {
 fn backs_are_not_there_for_the_eye_alone() {
     let one_sided = Material { two_sided: false, emission: Vec3::ONE, ..plain(COLOUR) };
     // Seen from below, its back; a mirror below shows it to an eye above.
-    let sky = environment();
-    let lit = scene_of(vec![square(0.0, 5.0, true, 0)], vec![one_sided.clone()], vec![sky.clone()]);
+    let lit = scene_of(vec![square(0.0, 5.0, true, 0)], vec![one_sided.clone()], vec![environment()]);
     assert_eq!(radiance(&lit, -DVec3::Z, DVec3::ZERO, 2).mean.direct, SKY);
     assert_total("receiver", &irradiance(&lit, -DVec3::Z, DVec3::Z, 200), DVec3::ZERO);
-    let mut lit =
-        scene_of(vec![square(0.0, 500.0, true, 0), square(-1.0, 5.0, true, 1)], vec![one_sided, layered(Vec3::ONE, &metal(0.0))], vec![]);
-    lit.lights.push(lamp(sky));
+    let meshes = vec![square(0.0, 500.0, true, 0), square(-1.0, 5.0, true, 1)];
+    let mut lit = scene_of(meshes, vec![one_sided, layered(Vec3::ONE, &metal(0.0))], vec![environment()]);
     assert_total("mirrored", &radiance(&lit, DVec3::Z * -0.5, -DVec3::Z, 2), SKY);
     // The same for a lobe that is sampled by lamps and by itself: white metal loses nothing at such a roughness.
     lit.materials[1].layers.roughness = 0.1;
@@ -813,31 +741,22 @@ fn unlit_surfaces_are_seen_and_light_nothing() {
     assert_eq!(irradiance(&with(metal(1.0), vec![sun]), DVec3::Z * 0.5, DVec3::Z, 2).mean.total(), DVec3::ZERO);
 }
 
-fn texture(texel: [u8; 4]) -> Texture {
-    texture_of(1, Texels::Linear(vec![texel]))
-}
-
 #[test]
 fn normal_maps_turn_the_light() {
     let sun = DVec3::new(0.48, -0.36, -0.8);
     let code = [204u8, 153, 230, 255];
-    let [x, y, z] = [code[0], code[1], code[2]].map(|code| 2.0 * f64::from(code) / 255.0 - 1.0);
     let tangents = |tangent: DVec3, sign: f64| vec![[tangent.extend(sign); 3]; 2];
     for (tangent, sign, scale) in [(DVec3::X, 1.0, 1.0f32), (DVec3::X, -1.0, 1.0), (DVec3::new(0.6, 0.8, 0.0), 1.0, 0.5)] {
         for above in [1.0, -1.0] {
-            let mut lit = scene_of(
-                vec![Mesh { tangents: tangents(tangent, sign), ..square(0.0, 1.0, true, 0) }],
-                vec![Material { normal_map: Some(NormalMap { texture: TextureUse::of(0, 0), scale }), ..plain(COLOUR) }],
-                vec![LightKind::Directional { direction: above * sun, irradiance: Vec3::ONE }],
-            );
-            lit.textures.push(texture(code));
-            let bitangent = sign * DVec3::Z.cross(tangent);
-            let turned = (f64::from(scale) * (x * tangent + y * bitangent) + z * DVec3::Z).normalize();
+            let plate = Material { normal_map: Some(map_of(0, scale)), ..plain(COLOUR) };
+            let mut lit = plate_under(plate, LightKind::Directional { direction: above * sun, irradiance: Vec3::ONE });
+            lit.meshes[0].tangents = tangents(tangent, sign);
+            lit.textures.push(row_of_texels(&[code], Filter::Bilinear));
+            let frame = (above * tangent, above * sign * DVec3::Z.cross(tangent), above * DVec3::Z);
             // Seen from behind, the plate has the same shape; seen from where its normal faces away, that is moved to the eye.
             for eye in [DVec3::Z, DVec3::new(-0.96, 0.0, 0.28), DVec3::new(0.0, 0.96, 0.28)] {
                 let eye = eye * DVec3::new(1.0, 1.0, above);
-                let n = above * turned;
-                let n = (n + (0.01 - n.dot(eye)).max(0.0) * eye).normalize();
+                let n = mapped_normal(code, f64::from(scale), frame, eye);
                 let expected = COLOUR.as_dvec3() / PI * (-above * sun).dot(n).max(0.0);
                 let target = DVec3::new(0.1, 0.2, 0.0);
                 let seen = radiance(&lit, target + 3.0 * eye, target, 2);
@@ -846,55 +765,30 @@ fn normal_maps_turn_the_light() {
         }
     }
     // A coat's map turns the coat alone, and the coat without one keeps the normals of the mesh.
-    let coat = Layers { coat: 1.0, ..metal(0.0) };
-    let with = |coat_map: bool| {
-        let map = Some(NormalMap { texture: TextureUse::of(0, 0), scale: 1.0 });
-        let mut plate = Material::layered("coated", Vec3::ZERO, Layers { specular: 0.0, metallic: 0.0, ..coat });
-        if coat_map {
-            plate.layers.coat_normal_map = map;
-        } else {
-            plate.normal_map = map;
-        }
+    for coat_map in [true, false] {
+        let coat_normal_map = coat_map.then(|| map_of(0, 1.0));
+        let layers = Layers { coat: 1.0, specular: 0.0, coat_normal_map, ..plastic(0.0) };
+        let plate = Material { normal_map: (!coat_map).then(|| map_of(0, 1.0)), ..Material::layered("coated", Vec3::ZERO, layers) };
         let mesh = Mesh { tangents: tangents(DVec3::X, 1.0), coat_tangents: tangents(DVec3::X, 1.0), ..square(0.0, 1.0, true, 0) };
-        let n = DVec3::new(x, y, z).normalize();
-        let n = if coat_map { n } else { DVec3::Z };
+        let n = if coat_map { mapped_normal(code, 1.0, (DVec3::X, DVec3::Y, DVec3::Z), DVec3::Z) } else { DVec3::Z };
         let wi = 2.0 * n.z * n - DVec3::Z;
-        let (u, v) = (0.02 * wi).any_orthonormal_pair();
-        let (u, v) = (u.normalize() * 0.02, v.normalize() * 0.02);
-        let lamp_mesh = Mesh::parallelogram("lamp", 0.5 * wi - 0.5 * (u + v), u, v, 1);
+        let (u, v) = wi.any_orthonormal_pair();
+        let lamp_mesh = Mesh::parallelogram("lamp", 0.5 * wi - 0.01 * (u + v), 0.02 * u, 0.02 * v, 1);
         let mut lit = scene_of(vec![mesh, lamp_mesh], vec![plate, Material { two_sided: true, ..lamp_of(Vec3::ONE) }], vec![]);
-        lit.textures.push(texture(code));
+        lit.textures.push(row_of_texels(&[code], Filter::Bilinear));
         let expected = 0.04 + 0.96 * (1.0 - n.z).powi(5);
         let eye = if coat_map { DVec3::Z } else { DVec3::Z * 0.4 };
         let seen = radiance(&lit, eye, DVec3::ZERO, 2).mean;
         // Texels are f32.
         assert_meets("coat", seen.specular, DVec3::splat(1e-7), DVec3::splat(expected));
-    };
-    with(true);
-    with(false);
+    }
 }
 
 #[test]
 fn textures_of_layers_have_their_channels() {
     // 51, 102 and 153 are 0.2, 0.4 and 0.6 of 255. A texture is the same as factors; channels that do not count are 255.
-    type SetTexture = fn(&mut Layers, Option<TextureUse>);
-    type Scale = fn(&mut Layers);
-    macro_rules! cases {
-        ($([$($texel:expr),*] of $texture:ident is $factor:ident * $share:expr,)*) => {
-            [$((stringify!($texture), [$($texel),*], |of, map| of.$texture = map, |of| of.$factor *= $share)),*]
-        };
-    }
-    let cases: [(&str, [u8; 4], SetTexture, Scale); 9] = cases![
-        [255, 102, 255, 255] of metallic_roughness_texture is roughness * 0.4,
-        [255, 255, 51, 255] of metallic_roughness_texture is metallic * 0.2,
-        [255, 255, 255, 51] of specular_texture is specular * 0.2,
-        [51, 102, 153, 255] of specular_colour_texture is specular_colour * Vec3::new(0.2, 0.4, 0.6),
-        [51, 255, 255, 255] of transmission_texture is transmission * 0.2,
-        [51, 255, 255, 255] of coat_texture is coat * 0.2,
-        [255, 102, 255, 255] of coat_roughness_texture is coat_roughness * 0.4,
-        [51, 102, 153, 255] of sheen_colour_texture is sheen_colour * Vec3::new(0.2, 0.4, 0.6),
-        [255, 255, 255, 102] of sheen_roughness_texture is sheen_roughness * 0.4,
-    ];
+    const TINT: Vec3 = Vec3::new(0.2, 0.4, 0.6);
+    let map = Some(TextureUse::of(0, 0));
     let all = Layers {
         metallic: 0.5,
         roughness: 0.9,
@@ -909,17 +803,24 @@ fn textures_of_layers_have_their_channels() {
     let seen = |layers: Layers, texel: [u8; 4]| {
         let sun = LightKind::Directional { direction: DVec3::new(0.6, 0.0, -0.8), irradiance: Vec3::ONE };
         let mut lit = scene_of(vec![square(0.0, 1.0, true, 0)], vec![layered(COLOUR, &layers)], vec![environment(), sun]);
-        lit.textures.push(texture(texel));
+        lit.textures.push(row_of_texels(&[texel], Filter::Bilinear));
         radiance(&lit, DVec3::new(0.3, 0.0, 0.5), DVec3::ZERO, 4000).mean.total()
     };
     let plain = seen(all, [255; 4]);
-    for (what, texel, set_texture, set_factor) in cases {
-        let (mut textured, mut scaled) = (all, all);
-        set_texture(&mut textured, Some(TextureUse::of(0, 0)));
-        set_factor(&mut scaled);
+    for (texel, textured, scaled) in [
+        ([255, 102, 255, 255], Layers { metallic_roughness_texture: map, ..all }, Layers { roughness: 0.4 * 0.9, ..all }),
+        ([255, 255, 51, 255], Layers { metallic_roughness_texture: map, ..all }, Layers { metallic: 0.2 * 0.5, ..all }),
+        ([255, 255, 255, 51], Layers { specular_texture: map, ..all }, Layers { specular: 0.2, ..all }),
+        ([51, 102, 153, 255], Layers { specular_colour_texture: map, ..all }, Layers { specular_colour: 2.0 * TINT, ..all }),
+        ([51, 255, 255, 255], Layers { transmission_texture: map, ..all }, Layers { transmission: 0.2 * 0.5, ..all }),
+        ([51, 255, 255, 255], Layers { coat_texture: map, ..all }, Layers { coat: 0.2 * 0.8, ..all }),
+        ([255, 102, 255, 255], Layers { coat_roughness_texture: map, ..all }, Layers { coat_roughness: 0.4 * 0.8, ..all }),
+        ([51, 102, 153, 255], Layers { sheen_colour_texture: map, ..all }, Layers { sheen_colour: 0.7 * TINT, ..all }),
+        ([255, 255, 255, 102], Layers { sheen_roughness_texture: map, ..all }, Layers { sheen_roughness: 0.4 * 0.8, ..all }),
+    ] {
         // The same random numbers make the same paths.
         let (by_texture, by_factor) = (seen(textured, texel), seen(scaled, texel));
-        assert_meets(what, by_texture, 1e-5 * by_factor, by_factor);
-        assert!((by_factor - plain).abs().max_element() >= 1e-3, "{what} changes nothing: {plain}, {by_factor}");
+        assert_meets(&format!("{textured:?}"), by_texture, 1e-5 * by_factor, by_factor);
+        assert!((by_factor - plain).abs().max_element() >= 1e-3, "{scaled:?} changes nothing: {plain}, {by_factor}");
     }
 }

@@ -5,7 +5,10 @@ use photonmill::bake::{self, Layout};
 use photonmill::output::destination::Folder;
 
 /// A glass ball of a million triangles over a plane, lit by a lamp.
-fn million() -> Scene {
+#[test]
+#[ignore = "long: a million triangles take seconds"]
+fn a_million_triangles_load_and_render() {
+    let Some(gpu) = device() else { return };
     let ball = Mesh::sphere("ball", 0.6 * DVec3::Y, 0.5, 1002, 2);
     let mut scene = scene_of(
         vec![level(0.0, [4.0; 2], true, 0), level(2.0, [0.6; 2], false, 1), ball],
@@ -13,15 +16,7 @@ fn million() -> Scene {
         vec![],
     );
     scene.cameras.push(Camera::looking_at("front", DVec3::new(0.6, 1.4, 3.0), 0.3 * DVec3::Y, DVec3::Y, 0.8));
-    scene
-}
-
-#[test]
-#[ignore = "long: a million triangles take seconds"]
-fn a_million_triangles_load_and_render() {
-    let Some(gpu) = device() else { return };
     let folder = tempfile::tempdir().unwrap();
-    let scene = million();
     let layout = Layout::new(&scene, 8.0).unwrap();
     let maps = layout.maps(&vec![bake::TexelEstimate::default(); layout.texel_count()], Default::default());
     bake::write(&Folder::open("-o", folder.path()).unwrap(), &scene, &layout, &maps, 1.0).unwrap();

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::common::estimate_check;
+use crate::common::lit::around_hole;
 use crate::common::prelude::*;
 use crate::common::rectangles::{self, Rectangle};
 use crate::engine::unseen_light::room_without_floor;
@@ -24,12 +25,9 @@ fn room_under_an_even_sky() -> Scene {
     room_under(0.5, LightKind::Environment { radiance: Vec3::ONE })
 }
 
-/// Irradiance on the floor below the middle of the hole, at a quarter of it from each side: four corners of a rectangle that is parallel
-/// (Howell's catalogue of radiation configuration factors, B-3).
-fn below_the_hole(half: f64, height: f64) -> f64 {
-    let a = half / height;
-    let root = (1.0 + a * a).sqrt();
-    4.0 * PI * (1.0 / TAU) * 2.0 * (a / root) * (a / root).atan()
+/// What shines with 1 W/m2/sr, as an even sky does in an opening.
+fn opening(origin: DVec3, u: DVec3, v: DVec3) -> Rectangle {
+    Rectangle { origin, u, v, albedo: DVec3::ZERO, emission: DVec3::ONE, blocks: false }
 }
 
 /// Mean of scattered light over the points, by the path tracer with 40 000 samples of each.
@@ -110,7 +108,8 @@ fn lights_through_a_window(gpu: &Gpu, sky: &str, albedo: f32, picture: Sky, part
 pub fn light_through_a_window(gpu: &Gpu) -> Check<Complaint> {
     let scene = room_under_an_even_sky();
     let direct = lit(gpu, &scene, &SceneSettings { shadow_rays: 64, ..settings(Part::Direct, true) });
-    let ((found, error), exact) = (red(&direct, 7), below_the_hole(HALF, 3.0));
+    let hole = opening(dvec3(-HALF, 3.0, -HALF), 2.0 * HALF * DVec3::X, 2.0 * HALF * DVec3::Z);
+    let ((found, error), exact) = (red(&direct, 7), rectangles::direct(&[hole], DVec3::ZERO, DVec3::Y).x);
     assert!(error < 0.02 * found, "{found} +- {error}");
     estimate_check("below the hole", found, exact, error)?;
     let indirect = lit(gpu, &scene, &settings(Part::Indirect, true));
@@ -127,11 +126,9 @@ pub fn second_opening(gpu: &Gpu) -> Check<Complaint> {
     let sheet = |origin: DVec3, u: DVec3, v: DVec3| Mesh::parallelogram("sheet", origin, u, v, 0);
     let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
     // The wall about a hole of 3 cm, and a screen before it.
+    let hole = [DVec2::new(1.985 / 4.0, 0.11 / 3.0), DVec2::new(2.015 / 4.0, 0.14 / 3.0)];
+    room.meshes.extend(around_hole(dvec3(2.0, 0.0, -2.0), z * 4.0, y * 3.0, hole, 0));
     room.meshes.extend([
-        sheet(dvec3(2.0, 0.0, -2.0), y * 0.11, z * 4.0),
-        sheet(dvec3(2.0, 0.14, -2.0), y * 2.86, z * 4.0),
-        sheet(dvec3(2.0, 0.11, -2.0), y * 0.03, z * 1.985),
-        sheet(dvec3(2.0, 0.11, 0.015), y * 0.03, z * 1.985),
         sheet(dvec3(1.7, 0.0, -0.3), y * 0.2, z * 0.6),
         sheet(dvec3(1.7, 0.0, -0.3), x * 0.3, y * 0.2),
         sheet(dvec3(1.7, 0.0, 0.3), x * 0.3, y * 0.2),
@@ -190,34 +187,27 @@ pub fn sun_through_a_small_window(gpu: &Gpu) -> Check<Complaint> {
     let sheet = |origin: DVec3, u: DVec3, v: DVec3| Mesh::parallelogram("sheet", origin, u, v, 0);
     let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
     let hole = dvec3(-0.5, 3.0, -0.3);
-    let meshes = vec![
+    let mut meshes = vec![
         sheet(dvec3(-2.0, 0.0, -2.0), 4.0 * x, 4.0 * z),
         sheet(dvec3(-2.0, 0.0, -2.0), 4.0 * x, 3.0 * y),
         sheet(dvec3(-2.0, 0.0, 2.0), 4.0 * x, 3.0 * y),
         sheet(dvec3(-2.0, 0.0, -2.0), 4.0 * z, 3.0 * y),
-        // About the window.
-        sheet(dvec3(2.0, 0.0, -2.0), 4.0 * z, 0.8 * y),
-        sheet(dvec3(2.0, 2.2, -2.0), 4.0 * z, 0.8 * y),
-        sheet(dvec3(2.0, 0.8, -2.0), 1.0 * z, 1.4 * y),
-        sheet(dvec3(2.0, 0.8, 1.0), 1.0 * z, 1.4 * y),
-        // About the skylight.
-        sheet(dvec3(-2.0, 3.0, -2.0), (hole.x - 0.1 + 2.0) * x, 4.0 * z),
-        sheet(dvec3(hole.x + 0.1, 3.0, -2.0), (2.0 - hole.x - 0.1) * x, 4.0 * z),
-        sheet(dvec3(hole.x - 0.1, 3.0, -2.0), 0.2 * x, (hole.z - 0.1 + 2.0) * z),
-        sheet(dvec3(hole.x - 0.1, 3.0, hole.z + 0.1), 0.2 * x, (2.0 - hole.z - 0.1) * z),
     ];
+    let window = [DVec2::new(0.25, 0.8 / 3.0), DVec2::new(0.75, 2.2 / 3.0)];
+    let skylight = [-0.1, 0.1].map(|half| (DVec2::new(hole.z, hole.x) + 2.0 + half) / 4.0);
+    meshes.extend(around_hole(dvec3(2.0, 0.0, -2.0), 4.0 * z, 3.0 * y, window, 0));
+    meshes.extend(around_hole(dvec3(-2.0, 3.0, -2.0), 4.0 * z, 4.0 * x, skylight, 0));
     // 20 degrees from the vertical, away from the window.
     let picture = sky(2048, 1024, |i, j| Vec3::splat(if (i, j) == (0, 114) { 1.3e6 } else { 1.0 }));
     let (angle, turn) = (PI * 114.5 / 1024.0, TAU * (0.5 / 2048.0 - 0.5));
     let patch = hole - 3.0 * dvec3(angle.tan() * turn.cos(), 1.0, angle.tan() * turn.sin());
-    let near = |a: i32| (-1..=1).map(move |b| patch + 0.02 * dvec3(f64::from(a), 0.0, f64::from(b)));
+    let near = grid(0.0, DVec3::Y, 3).into_iter().map(|(at, _)| patch + 0.06 * at);
     // All of the sun shines on the first ten.
     let others = [patch + dvec3(0.085, 0.0, 0.085), dvec3(1.0, 0.0, 1.0), dvec3(-1.0, 0.0, 1.0), dvec3(1.5, 0.0, -1.0)];
-    let points: Vec<_> = (-1..=1).flat_map(near).chain(others).map(|place| (place, DVec3::Y)).collect();
+    let points: Vec<_> = near.chain(others).map(|place| (place, DVec3::Y)).collect();
     // Of its texel's tent, over the sky around; and of an even sky in both openings.
     let towards = dvec3(angle.sin() * turn.cos(), angle.cos(), angle.sin() * turn.sin());
     let sun = (picture.radiance(towards).x - 1.0) * (PI / 1024.0).powi(2) * angle.sin() * angle.cos();
-    let opening = |origin: DVec3, u: DVec3, v: DVec3| Rectangle { origin, u, v, albedo: DVec3::ZERO, emission: DVec3::ONE, blocks: false };
     let openings = [opening(dvec3(2.0, 0.8, -1.0), 2.0 * z, 1.4 * y), opening(hole - 0.1 * (x + z), 0.2 * x, 0.2 * z)];
     let black = Material { two_sided: true, ..matt(0.0) };
     let scene = scene_of(meshes, vec![black], vec![LightKind::Sky(Arc::new(picture))]);

@@ -3,6 +3,7 @@
 
 use crate::common::known::kept;
 use crate::common::prelude::*;
+use photonmill::verify::judge::fresnel;
 
 const IOR: f64 = 1.5;
 
@@ -11,25 +12,14 @@ fn refracted(angle: f64, ior: f64) -> f64 {
     (angle.sin() / ior).asin()
 }
 
-/// Reflectance of unpolarised light, the mean of sin^2(i - t) / sin^2(i + t) and tan^2(i - t) / tan^2(i + t) (Fresnel;
-/// Born and Wolf 1.5.2); from the inside `ior` is the reciprocal.
+/// Reflectance of unpolarised light (Fresnel; `tests/light/judge.rs` has its special values); from the inside `ior` is the reciprocal.
 fn reflectance(angle: f64, ior: f64) -> f64 {
-    if angle.sin() >= ior {
-        return 1.0;
-    }
-    if angle == 0.0 {
-        return ((ior - 1.0) / (ior + 1.0)).powi(2);
-    }
-    let other = refracted(angle, ior);
-    let (difference, sum) = (angle - other, angle + other);
-    0.5 * ((difference.sin() / sum.sin()).powi(2) + (difference.tan() / sum.tan()).powi(2))
+    fresnel(angle.cos(), 1.0, ior)
 }
 
-/// A ray from above in the plane z = 0, at this angle to the vertical: where it starts, to pass the origin, and its
-/// direction.
-fn slanting(angle: f64, distance: f64) -> (DVec3, DVec3) {
-    let direction = DVec3::new(angle.sin(), -angle.cos(), 0.0);
-    (-distance * direction, direction)
+/// Where a ray from above in the plane z = 0, at this angle to the vertical, starts to pass the origin.
+fn slanting(angle: f64, distance: f64) -> DVec3 {
+    distance * DVec3::new(-angle.sin(), angle.cos(), 0.0)
 }
 
 /// Kernels for all scenes here: what a scene lacks changes no bit (`tests/light/transport.rs`).
@@ -71,7 +61,7 @@ fn glass_reflects_by_fresnel_up_to_the_horizon() {
     let mut family = Family::default();
     for (degrees, ior) in [(0.0, 2.0), (0.0, IOR), (60.0, IOR), (80.0, IOR), (89.0, IOR), (89.9, IOR), (89.99, IOR)] {
         let angle = f64::to_radians(degrees);
-        let found = along(&gpu, &over_glass(ior, 0.25, 0.0), slanting(angle, 1.0).0, 16);
+        let found = along(&gpu, &over_glass(ior, 0.25, 0.0), slanting(angle, 1.0), 16);
         expect_exactly(&mut family, format!("reflected, index {ior}, {degrees} degrees"), &found, 1, reflectance(angle, ior));
     }
     family.assert_tells_one_per_cent();
@@ -85,7 +75,7 @@ fn total_reflection_begins_at_the_critical_angle() {
     let mut family = Family::default();
     for degrees in [0.0, 30.0, 41.0, 41.8, 41.809, 41.82, 45.0, 60.0, 85.0] {
         let angle = f64::to_radians(degrees);
-        let eye = slanting(angle, 0.2).0 * DVec3::new(1.0, -1.0, 1.0);
+        let eye = slanting(angle, 0.2) * DVec3::new(1.0, -1.0, 1.0);
         let found = along(&gpu, &over_glass(IOR, 1.0, 1.0), eye, 16);
         let reflected = reflectance(angle, 1.0 / IOR);
         assert_eq!(degrees > 41.8103, reflected == 1.0);
@@ -105,7 +95,7 @@ fn total_reflection_begins_at_the_critical_angle() {
 fn an_index_of_one_reflects_nothing_at_any_angle() {
     let Some(gpu) = device() else { return };
     for degrees in [0.0, 60.0, 89.0, 89.9, 89.99, 89.999] {
-        let found = along(&gpu, &over_glass(1.0, 1.0 / 4096.0, 0.0), slanting(f64::to_radians(degrees), 1.0).0, 16);
+        let found = along(&gpu, &over_glass(1.0, 1.0 / 4096.0, 0.0), slanting(f64::to_radians(degrees), 1.0), 16);
         assert!(found.iter().all(|seen| seen.y == 0.0), "{degrees} degrees: the sky is reflected");
     }
 }
@@ -135,8 +125,7 @@ fn slabs_shift_slanting_rays(side: u32, told: f64, told_inside: f64) {
         meshes.extend((0..5).map(|k| strip(ends[k], ends[k + 1], 1 + [0, 1, 0, 2, 0][k])));
         let lamps = [Vec3::X, Vec3::Y, Vec3::Z].map(|emission| Material { emission, ..matt(0.0) });
         let scene = scene_of(meshes, [vec![glass(IOR as f32)], lamps.to_vec()].concat(), vec![]);
-        let (eye, _) = slanting(angle, 3.0);
-        let found = along(&gpu, &scene, eye, side);
+        let found = along(&gpu, &scene, slanting(angle, 3.0), side);
         let of = |seen: &dyn Fn(&DVec3) -> f64| found.iter().map(seen).collect::<Vec<f64>>();
         let all = (1.0 - f) / (1.0 + f);
         let [once, twice] = [(1.0 - f).powi(2), ((1.0 - f) * f).powi(2)];
@@ -371,8 +360,7 @@ fn an_eye_in_the_focus_looks_in_parallel() {
         let angle = f64::to_radians(degrees);
         let off = 2.0 * FOCUS * (0.5 * angle).tan();
         let see = |middle: f64| {
-            let mut lamp = level(distance, [0.02, 2.0], false, 1);
-            lamp.positions.iter_mut().for_each(|position| position.x += middle);
+            let lamp = Mesh::parallelogram("lamp", DVec3::new(middle - 0.01, distance, -1.0), DVec3::X * 0.02, DVec3::Z * 2.0, 1);
             let scene = scene_of(vec![paraboloid(0), lamp], vec![mirror(0.9), shining(0.0)], vec![]);
             let eye = DVec3::Y * FOCUS;
             radiances(&gpu, &scene, &rays(1), eye, eye + DVec3::new(angle.sin(), -angle.cos(), 0.0), 32)

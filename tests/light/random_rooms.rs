@@ -134,11 +134,8 @@ impl Room {
                 let largest = DVec3::new(to - from, 0.7 * size.y, size.z);
                 let box_size = largest * DVec3::new(random.decades(-1.5, -0.4), random.decades(-1.5, -0.4), random.decades(-1.5, -0.4));
                 let room_left = largest - box_size;
-                let mut corner = DVec3::new(
-                    from + random.within(0.15, 0.85) * room_left.x,
-                    random.within(0.15, 0.85) * room_left.y,
-                    random.within(0.15, 0.85) * room_left.z,
-                );
+                let share = DVec3::from_array([(); 3].map(|()| random.within(0.15, 0.85)));
+                let mut corner = DVec3::X * from + share * room_left;
                 if random.chance(0.6) {
                     corner.y = 0.0;
                 }
@@ -420,14 +417,6 @@ fn seeds(all: std::ops::Range<u64>) -> (Vec<u64>, bool) {
     }
 }
 
-fn show(seed: u64, found: &[Found]) {
-    for room in rooms(seed) {
-        room.shown.iter().for_each(|rectangle| println!("{rectangle:?}"));
-        room.points.iter().for_each(|point| println!("{point:?}"));
-    }
-    found.iter().for_each(|found| print!("{}", found.line()));
-}
-
 #[test]
 #[ignore = "long: most of a minute of radiosity on the host"]
 fn seven_random_rooms_are_right_within_their_errors() {
@@ -437,7 +426,11 @@ fn seven_random_rooms_are_right_within_their_errors() {
     let single = seeds.into_iter().filter(|seed| is_shown || rooms(*seed).len() == 1).take(7);
     let found: Vec<Found> = single.flat_map(|seed| lit_rooms(&gpu, seed, false)).collect();
     if is_shown {
-        show(found[0].seed, &found);
+        for room in rooms(found[0].seed) {
+            room.shown.iter().for_each(|rectangle| println!("{rectangle:?}"));
+            room.points.iter().for_each(|point| println!("{point:?}"));
+        }
+        found.iter().for_each(|found| print!("{}", found.line()));
         assert!(found.iter().all(|found| found.z().abs() < MOST), "a point of this room is off by more than {MOST}");
         return;
     }
@@ -482,11 +475,8 @@ fn two_hundred_random_rooms_are_right_within_their_errors() {
     let beside = of(Place::Beside, &plain).into_iter().map(|found| Found { noise: found.noise.hypot(found.unseen), ..found });
     let z: Vec<f64> = beside.map(|found| found.z()).collect();
     let beyond = z.iter().filter(|z| z.abs() > 3.0).count();
-    assert!(
-        z.iter().all(|z| z.abs() < MOST) && beyond as f64 <= 0.02 * z.len() as f64,
-        "rooms beside rooms: {beyond} of {} beyond 3",
-        z.len()
-    );
+    let holds = z.iter().all(|z| z.abs() < MOST) && beyond as f64 <= 0.02 * z.len() as f64;
+    assert!(holds, "rooms beside rooms: {beyond} of {} beyond 3", z.len());
     assert!(found.iter().all(|found| found.place == Place::Beside || found.noise.is_finite()), "light of a single room is not found");
     assert_complains("light of 1.04", judge(&spoiled(&clear, 1.04, 1.0)));
     assert_complains("noise of 0.75", judge(&spoiled(&clear, 1.0, 0.75)));

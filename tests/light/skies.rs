@@ -168,8 +168,7 @@ pub fn a_patch_of_sun_keeps_its_rays(gpu: &Gpu, albedo: f32) {
     let mut scene = room_under(albedo, LightKind::Sky(Arc::new(sky(4, 2, |_, _| Vec3::splat(300.0)))));
     scene.lights.push(lamp(LightKind::Directional { direction: way, irradiance: Vec3::splat(100.0) }));
     // Too few lie in the sun to make a region of their own.
-    let along = |k: u32| -1.9 + 3.8 * (f64::from(k) + 0.5) / 9.0;
-    let points: Vec<_> = (0..9 * 9).map(|k| (dvec3(along(k % 9), 0.0, along(k / 9)), DVec3::Y)).collect();
+    let points: Vec<_> = grid(0.0, DVec3::Y, 9).into_iter().map(|(at, up)| (3.8 * at, up)).collect();
     let lit = render(gpu, &scene, &direct(true), Target::Points(&points)).unwrap();
     let error = lit.film.relative_error();
     println!("{:.2} %", 100.0 * error);

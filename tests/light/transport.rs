@@ -1,14 +1,15 @@
 //! Lighting scenes of triangles: bits that no split, builder or unused effect may change, parts that add
-//! up, radiometry, leaks, and plans that the device's work is counted against.
+//! up, effects that are missed, and plans that the device's work is counted against.
 
-use crate::common::lit::{light, run};
+use crate::common::layered::{self, map_of, row_of_texels};
+use crate::common::lit::{Viewed, light};
 use crate::common::pairwise::pairwise;
 use crate::common::prelude::*;
 use photonmill::constants::GATHER_SLICE;
 use photonmill::engine::scene::{self, RunResult, Target, View};
 use photonmill::scene::Projection;
-use photonmill::scene::material::{Coverage, Layers, Medium, NormalMap};
-use photonmill::settings::scene::Kernel;
+use photonmill::scene::material::{Coverage, Layers, Medium};
+use photonmill::scene::texture::Filter;
 use photonmill::verify::judge::Verdict;
 use photonmill::verify::selfcheck::Estimate;
 
@@ -19,23 +20,13 @@ fn small() -> SceneSettings {
 }
 
 fn picture(gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> RunResult {
-    picture_of(SIZE, gpu, scene, settings)
-}
-
-fn picture_of(side: u32, gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> RunResult {
-    lit(gpu, scene, settings, Target::Picture(&scene.first_camera(), [side; 2]))
+    lit(gpu, scene, settings, Target::Picture(&scene.first_camera(), [SIZE; 2]))
 }
 
 /// A run of a scene without what the settings leave out.
 fn lit(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, target: Target) -> RunResult {
     let (geometry, plan) = scene_plan(gpu, scene, settings, target.sensor()).unwrap();
     light(gpu, &View { geometry: &geometry, camera: target.camera(), phases: &target.phases(&geometry) }, plan)
-}
-
-/// Mean and standard error of the irradiance at points, W/m2.
-fn irradiance(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, points: &[(DVec3, DVec3)]) -> Vec<(DVec3, DVec3)> {
-    let lit = lit(gpu, scene, settings, Target::Points(points));
-    pairs(means(&lit), standard_errors(&lit)).collect()
 }
 
 fn same_film(what: &str, found: &RunResult, expected: &RunResult) -> Check<Complaint> {
@@ -45,11 +36,10 @@ fn same_film(what: &str, found: &RunResult, expected: &RunResult) -> Check<Compl
 
 /// Lists of survivors in any order give the same picture. What a list without a survivor shows may be odd in any way.
 pub fn appends_agree(gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> Check<Complaint> {
-    let camera = scene.first_camera();
+    let viewed = Viewed::new(scene.clone());
     let of = |builder| {
         let settings = SceneSettings { builder: Some(builder), ..settings.clone() };
-        let (geometry, plan) = scene_plan(gpu, scene, &settings, square_picture(SIZE)).unwrap();
-        run(gpu, &View { geometry: &geometry, camera: Some(&camera), phases: &[] }, plan)
+        viewed.lit(gpu, viewed.planned(gpu, &settings, square_picture(SIZE)))
     };
     let ballot = of(Builder::Ballot);
     let mut others = Builder::ON_GPU.into_iter().filter(|builder| *builder != Builder::Ballot);
@@ -190,20 +180,6 @@ fn each_part_alone_and_parts_of_photons_and_of_a_final_gather_add_up() {
     parts_add_up(&gpu, &SceneSettings { illumination: Illumination::Photons, ..small() }, &Part::EACH);
 }
 
-/// Effects of layered materials: the larger part of any kernel that has them.
-const OF_LAYERS: [Effect; 10] = [
-    Effect::Layers,
-    Effect::Transmission,
-    Effect::DiffuseTransmission,
-    Effect::Iridescence,
-    Effect::Anisotropy,
-    Effect::Media,
-    Effect::Dispersion,
-    Effect::ClearCoat,
-    Effect::Sheen,
-    Effect::NormalMaps,
-];
-
 /// Effects that a scene does not need change nothing where some of them are forced on, in each of these ways.
 fn unneeded_effects_change_no_bit(gpu: &Gpu, name: &str, ways: impl Fn(&[Effect]) -> Vec<Vec<Effect>>) {
     let scene = scene(name);
@@ -222,7 +198,8 @@ fn unneeded_effects_change_no_bit(gpu: &Gpu, name: &str, ways: impl Fn(&[Effect]
 #[test]
 fn an_effect_that_the_scene_lacks_changes_no_bit() {
     let Some(gpu) = device() else { return };
-    let plain = |effect: &Effect| !OF_LAYERS.contains(effect);
+    // Effects of layered materials, which stand together, are the larger part of any kernel that has them.
+    let plain = |effect: &Effect| !(Effect::Layers..=Effect::NormalMaps).contains(effect);
     unneeded_effects_change_no_bit(&gpu, "cornell", |all| vec![all.iter().copied().filter(plain).collect()]);
 }
 
@@ -246,12 +223,7 @@ fn pairs_of_effects_that_the_scene_lacks_change_no_bit() {
 
 /// Plates of 1 m in rows of five before a wall and under a sun: each shows an effect, and a pixel sees it alone.
 fn plates() -> (Scene, Vec<Effect>) {
-    let texture = |name: &str, texel| {
-        let (texels, wrap) = (Texels::Linear(vec![texel]), [Wrap::Repeat; 2]);
-        Texture { name: name.into(), width: 1, height: 1, texels, wrap, filter: Default::default() }
-    };
-    let map = NormalMap { texture: TextureUse::of(1, 0), scale: 1.0 };
-    let plastic = Layers { metallic: 0.0, roughness: 0.7, ..Layers::default() };
+    let plastic = layered::plastic(0.7);
     let pane = Layers { roughness: 0.0, transmission: 1.0, ior: 1.0, ..plastic };
     let layered = |albedo: f32, layers| Material::layered("plate", Vec3::splat(albedo), layers);
     let plates = [
@@ -264,7 +236,7 @@ fn plates() -> (Scene, Vec<Effect>) {
         (Effect::ClearCoat, layered(0.0, Layers { coat: 1.0, coat_roughness: 0.6, specular: 0.0, ..plastic })),
         (Effect::Sheen, layered(0.0, Layers { sheen_colour: Vec3::ONE, sheen_roughness: 0.6, specular: 0.0, ..plastic })),
         (Effect::Alpha, Material { coverage: Coverage::Blend { alpha: 0.3 }, ..layered(0.6, plastic) }),
-        (Effect::NormalMaps, Material { normal_map: Some(map), ..layered(0.6, plastic) }),
+        (Effect::NormalMaps, Material { normal_map: Some(map_of(1, 1.0)), ..layered(0.6, plastic) }),
         (Effect::DiffuseTransmission, layered(0.6, Layers { diffuse_transmission: 1.0, specular: 0.0, ..plastic })),
         (Effect::Iridescence, layered(0.0, Layers { iridescence: 1.0, film_ior: 2.0, film_thickness: [0.0, 300.0], ..plastic })),
         (Effect::Anisotropy, layered(1.0, Layers { metallic: 1.0, anisotropy: 1.0, ..plastic })),
@@ -281,7 +253,7 @@ fn plates() -> (Scene, Vec<Effect>) {
     let below_the_mirror = Mesh::parallelogram("floor", DVec3::new(-2.6, -2.5, -0.5), 2.0 * z, 1.2 * x, 1);
     let unlit = layered(1.0, Layers { is_unlit: true, ..Layers::default() });
     let mut scene = scene_of(vec![wall, below_the_mirror], vec![unlit, matt(1.0)], vec![sun(DVec3::new(0.0, -0.6, -0.8))]);
-    scene.textures = vec![texture("grey", [80, 80, 80, 255]), texture("bump", [230, 128, 190, 255])];
+    scene.textures = [[80, 80, 80, 255], [230, 128, 190, 255]].map(|texel| row_of_texels(&[texel], Filter::Bilinear)).into();
     for (place, (effect, material)) in plates.iter().enumerate() {
         let number = scene.materials.len();
         let corner = DVec3::new((place % 5) as f64 - 2.5, 1.0 - (place / 5) as f64, 0.0);
@@ -436,16 +408,12 @@ fn each_effect_that_the_scene_needs_is_missed_by_itself() {
     // Of a group none takes part in what shows another, but layers in most.
     plates_are_missed(&gpu, &[&[Glossy, Textures, VertexColours, TwoSided, SmoothNormals, ClearCoat, Sheen, Iridescence, Transmission]]);
     lights_are_missed(&gpu, &[&[PointLights], &[SpotLights], &[DiscLights], &[MeshLights], &[DirectionalLights], &[Environment]]);
-    maps_are_missed(&gpu, &[(Part::Indirect, Indirect), (Part::Caustic, ReflectiveCaustics), (Part::Caustic, RefractiveCaustics)]);
-}
-
-/// Without what makes photons of a kind the spheres look otherwise: over the whole picture, or somewhere.
-fn maps_are_missed(gpu: &Gpu, effects: &[(Part, Effect)]) {
+    // Without what makes photons of a kind the spheres look otherwise: over the whole picture, or somewhere.
     let spheres = scene("cornell-spheres");
-    for (part, effect) in effects {
-        let settings = SceneSettings { part: *part, rounds: 24, caustic_photons: 30_000, ..small() };
-        let run = |settings: &SceneSettings| picture(gpu, &spheres, settings);
-        let (before, after) = (run(&settings), without(&[*effect], &settings, run));
+    for (part, effect) in [(Part::Indirect, Indirect), (Part::Caustic, ReflectiveCaustics), (Part::Caustic, RefractiveCaustics)] {
+        let settings = SceneSettings { part, rounds: 24, caustic_photons: 30_000, ..small() };
+        let run = |settings: &SceneSettings| picture(&gpu, &spheres, settings);
+        let (before, after) = (run(&settings), without(&[effect], &settings, run));
         let of_all = same_light(effect.name(), estimate(&after), estimate(&before)).is_err();
         assert!(of_all || (0..before.film.pixels()).any(|place| differs(&before, &after, place)), "{}", effect.name());
     }
@@ -495,92 +463,6 @@ fn samples_of_a_pixel_leave_little_noise() {
     assert_holds("samples", same_light("samples", same, light));
     println!("64 paths a pixel: {:.2} % of error by rounds, {:.2} % by samples", 100.0 * by_chance, 100.0 * even);
     assert!(2.0 * even < by_chance, "{even} and {by_chance}");
-}
-
-fn furnace_by(edge_correction: bool) {
-    let Some(gpu) = device() else { return };
-    let points = [
-        (DVec3::new(0.5, 0.0, 0.5), DVec3::Y),
-        (DVec3::new(0.002, 0.0, 0.5), DVec3::Y),
-        (DVec3::new(0.001, 0.0, 0.002), DVec3::Y),
-        (DVec3::new(0.0, 0.37, 0.998), DVec3::X),
-        (DVec3::new(0.31, 0.44, 0.52), DVec3::new(0.6, 0.0, 0.8)),
-    ];
-    let settings = SceneSettings { rounds: 32, photons: 20_000, bounces: 200, ..by_rounds() };
-    let settings = SceneSettings { kernel: Kernel::Cone, illumination: Illumination::Photons, edge_correction, ..settings };
-    let exact = PI / (1.0 - 0.5);
-    let found = irradiance(&gpu, &scene("furnace"), &settings, &points);
-    if !edge_correction {
-        let (mean, error) = found[1];
-        return assert_complains("an edge without correction", z_check("edge", mean.x, exact, error.x));
-    }
-    for ((point, _), (mean, error)) in pairs(&points, &found) {
-        assert!(error.x < 0.1 * exact, "{point}: error {error}");
-        assert_holds(point, z_check("irradiance", mean.x, exact, error.x));
-    }
-}
-
-#[test]
-fn a_furnace_is_equally_bright_everywhere() {
-    furnace_by(true);
-}
-
-#[test]
-#[ignore = "long: kernels that correct no edges"]
-fn an_edge_without_correction_is_dark_in_a_furnace() {
-    furnace_by(false);
-}
-
-/// L = rho E / pi on one wall, by camera and by receiver.
-fn radiance_and_irradiance_agree(final_gather: bool) {
-    let Some(gpu) = device() else { return };
-    let mut scene = scene("cornell");
-    let albedo = scene.materials[0].base_colour.as_dvec3();
-    // One pixel that looks at a small patch of the back wall.
-    let target = DVec3::new(0.8, 0.75, 0.0);
-    scene.cameras = vec![Camera::looking_at("patch", DVec3::new(0.6, 0.5, 2.0), target, DVec3::Y, 0.002)];
-    let settings = SceneSettings { final_gather, rounds: 60, photons: 4000, shadow_rays: 8, ..by_rounds() };
-    let lit = picture_of(1, &gpu, &scene, &settings);
-    let (radiance, radiance_error) = (lit.film.mean(0), lit.film.standard_error(0));
-    let other = SceneSettings { seed: 9, ..settings };
-    let (irradiance, irradiance_error) = irradiance(&gpu, &scene, &other, &[(target, DVec3::Z)])[0];
-    for channel in 0..3 {
-        let share = albedo[channel] / PI;
-        let error = radiance_error[channel].hypot(share * irradiance_error[channel]);
-        assert!(error < 0.08 * radiance[channel], "error {error} of {radiance}");
-        let what = format!("channel {channel}");
-        assert_holds(&what, z_check(&what, radiance[channel], share * irradiance[channel], error));
-        let doubled = z_check(&what, radiance[channel], 2.0 * share * irradiance[channel], error);
-        assert_complains("twice the irradiance", doubled);
-    }
-}
-
-#[test]
-fn radiance_and_irradiance_of_a_wall_agree() {
-    radiance_and_irradiance_agree(false);
-}
-
-#[test]
-#[ignore = "long: minutes of compiling"]
-fn radiance_and_irradiance_of_a_final_gather_agree() {
-    radiance_and_irradiance_agree(true);
-}
-
-/// The radii of Knaus and Zwicker's schedule, and their mean over a million passes where it is known.
-#[test]
-fn radii_shrink_as_published() {
-    let settings = SceneSettings { radius: Some(0.25), ..small() };
-    let planned = |settings: &SceneSettings| scene_plan_within(&Limits::of_host(), &scene("cornell"), settings, square_picture(4)).unwrap();
-    let plan = planned(&settings);
-    let map = plan.global.as_ref().unwrap();
-    let mut squared = map.radius * map.radius;
-    for round in 0..40 {
-        let found = plan.radius(map, round);
-        assert!((found * found / squared - 1.0).abs() < 1e-9, "round {round}");
-        let i = f64::from(round + 1);
-        squared *= (i + 2.0 / 3.0) / (i + 1.0);
-    }
-    assert_eq!(planned(&SceneSettings { alpha: 1.0, ..settings }).radius(map, 39), map.radius);
 }
 
 #[test]

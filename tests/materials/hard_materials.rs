@@ -1,18 +1,18 @@
 //! Hard cases of materials: lobes of any width, glass of the air's own index, textures, coarse mirrors and glass. `tests/light/optics.rs`
 //! has the laws of glass; the table in `tests/common/cases.rs` names all by case.
 
+use super::scattering::{ALBEDOS, INCIDENCES};
 use crate::common::known::{self, mean_irradiance};
 use crate::common::prelude::*;
 use crate::light::hard_cases::{POINTS, settings};
 use photonmill::verify::selfcheck::Estimate;
-use photonmill::verify::selfcheck::measure::{estimate_of, irradiance};
+use photonmill::verify::selfcheck::measure::irradiance;
 
 fn behind_a_pane(ior: Option<f32>) -> Scene {
     let mut scene = scene("cornell");
     if let Some(ior) = ior {
-        scene.materials.push(Material { surface: Surface::Dielectric { ior }, ..Material::lambert("pane", Vec3::ONE) });
-        let pane = scene.materials.len() - 1;
-        let (x, z) = (DVec3::X, DVec3::Z);
+        let (x, z, pane) = (DVec3::X, DVec3::Z, scene.materials.len());
+        scene.materials.push(glass(ior));
         scene.meshes.push(Mesh::parallelogram("above", DVec3::new(0.0, 0.97, 0.0), z, x, pane));
         scene.meshes.push(Mesh::parallelogram("below", DVec3::new(0.0, 0.96, 0.0), x, z, pane));
     }
@@ -51,10 +51,7 @@ fn glass_of_nearly_the_air_s_own_index_is_not_there_and_other_glass_is() {
 }
 
 fn plate(surface: Surface, lights: Vec<LightKind>) -> Scene {
-    let mut plate = scene("sky-over-plane");
-    plate.materials[0] = Material { surface, ..Material::lambert("plate", Vec3::ONE) };
-    plate.lights = lights.into_iter().map(lamp).collect();
-    plate
+    scene_of(vec![level(0.0, [4.0; 2], true, 0)], vec![Material { surface, ..matt(1.0) }], lights)
 }
 
 fn towards(angle: f64) -> DVec3 {
@@ -66,29 +63,20 @@ fn towards(angle: f64) -> DVec3 {
 #[test]
 fn lobes_reflect_what_lies_above_the_horizon() {
     let Some(gpu) = device() else { return };
-    let table = [
-        (0.01, [1.0, 0.9318, 0.7472, 0.5835]),
-        (0.5, [1.0, 0.8956, 0.6560, 0.4711]),
-        (2.0, [1.0, 0.8705, 0.5625, 0.3444]),
-        (5.0, [1.0, 0.8663, 0.5194, 0.2693]),
-    ];
-    let sky = || vec![LightKind::Environment { radiance: Vec3::ONE }];
-    for (exponent, albedos) in table {
-        for (degrees, albedo) in [0.0f64, 30.0, 60.0, 80.0].into_iter().zip(albedos) {
-            let settings = SceneSettings { rounds: 2, shadow_rays: 32, part: Part::Direct, ..settings() };
-            let eye = towards(degrees.to_radians());
-            let found = radiances(&gpu, &plate(Surface::Glossy { exponent }, sky()), &settings, eye, DVec3::ZERO, 32);
-            let found = estimate_of(&found);
+    let settings = SceneSettings { rounds: 2, shadow_rays: 32, part: Part::Direct, ..settings() };
+    for &(exponent, albedos) in &ALBEDOS[..4] {
+        let glossy = plate(Surface::Glossy { exponent: exponent as f32 }, vec![LightKind::Environment { radiance: Vec3::ONE }]);
+        for (degrees, albedo) in INCIDENCES.into_iter().zip(albedos).take(4) {
+            let what = format!("exponent {exponent}, {degrees} degrees");
+            let (found, error) = mean_and_error(&radiances(&gpu, &glossy, &settings, towards(degrees.to_radians()), DVec3::ZERO, 32));
+            println!("{what}: {found:.4} +- {error:.4}, expected {albedo}");
+            assert!(error < 0.01, "{what}: {error}");
             // The table has four digits.
-            let error = found.standard_error.hypot(5e-5);
-            println!("exponent {exponent}, {degrees} degrees: {:.4} +- {:.4}, expected {albedo}", found.mean, found.standard_error);
-            assert!(found.standard_error < 0.01, "{found:?}");
-            assert_holds(format!("exponent {exponent}, {degrees} degrees"), z_check("albedo", found.mean, albedo, error));
-            assert!(found.mean <= 1.0 + 5.0 * error, "more light than there is");
-            assert_complains(
-                "(n + 1) in place of (n + 2)",
-                z_check("albedo", found.mean, albedo * f64::from((exponent + 1.0) / (exponent + 2.0)), error),
-            );
+            let error = error.hypot(5e-5);
+            assert_holds(&what, z_check("albedo", found, *albedo, error));
+            assert!(found <= 1.0 + 5.0 * error, "more light than there is");
+            let of_other_factor = z_check("albedo", found, albedo * (exponent + 1.0) / (exponent + 2.0), error);
+            assert_complains("(n + 1) in place of (n + 2)", of_other_factor);
         }
     }
 }
@@ -106,7 +94,7 @@ fn lobes_throw_their_share(illumination: Illumination, exponents: &[f32]) {
         let h = (1.0 - cosine * cosine).sqrt() / cosine;
         let (beam, watts) = beam(DVec3::Y * 0.9, DVec3::NEG_Y);
         let mut bench = plate(Surface::Glossy { exponent }, vec![beam]);
-        bench.materials.push(Material::lambert("screen", Vec3::ZERO));
+        bench.materials.push(matt(0.0));
         bench.meshes.push(Mesh::parallelogram("screen", DVec3::new(-2.0, 1.0, -2.0), DVec3::X * 4.0, DVec3::Z * 4.0, 1));
         let settings = SceneSettings { illumination, photons: 10_000, rounds: 8, bounces: 2, radius: Some(h), alpha: 1.0, ..settings() };
         let found = mean_irradiance(&gpu, &bench, &settings, &[(DVec3::Y, DVec3::NEG_Y)]);
@@ -192,11 +180,10 @@ fn a_sun_in_a_plate_is_every_power_of_the_cosine() {
 #[test]
 fn textures_go_on_beyond_their_edges_as_their_wrapping_says() {
     let Some(gpu) = device() else { return };
-    for u in [Wrap::Repeat, Wrap::MirroredRepeat, Wrap::Clamp] {
-        for v in [Wrap::Repeat, Wrap::MirroredRepeat, Wrap::Clamp] {
-            // Turned where both axes wrap in the same way.
-            assert_holds("the picture", known::wrapped_texture(&gpu, [u, v], u == v));
-        }
+    let each = [Wrap::Repeat, Wrap::MirroredRepeat, Wrap::Clamp];
+    for (u, v) in each.into_iter().flat_map(|u| each.map(|v| (u, v))) {
+        // Turned where both axes wrap in the same way.
+        assert_holds("the picture", known::wrapped_texture(&gpu, [u, v], u == v));
     }
 }
 
@@ -210,16 +197,7 @@ fn twenty_large_textures_are_read_each_from_its_own_buffer() {
     for k in 0..20 {
         wall.meshes.push(Mesh::parallelogram("square", DVec3::X * k as f64, DVec3::X, DVec3::Y, k));
         wall.materials.push(Material { base_colour_texture: Some(TextureUse::of(k, 0)), ..matt(1.0) });
-        let texels = Texels::Srgb(vec![code(k); side * side]);
-        let texture = Texture {
-            name: format!("picture {k}"),
-            width: side as u32,
-            height: side as u32,
-            texels,
-            wrap: [Wrap::Repeat; 2],
-            filter: Default::default(),
-        };
-        wall.textures.push(texture);
+        wall.textures.push(texture(side as u32, Texels::Srgb(vec![code(k); side * side]), [Wrap::Repeat; 2]));
     }
     // What a matt wall returns of a sun straight before it is its colour.
     wall.lights.push(lamp(LightKind::Directional { direction: DVec3::NEG_Z, irradiance: Vec3::splat(PI as f32) }));
@@ -241,34 +219,30 @@ fn shading_normals_turn_light_and_no_more() {
 }
 
 /// Of spheres so coarse that smooth normals send rays to the wrong side of their triangles, no light is lost, nor does any of it stay
-/// in glass for long; on the ground about them it is what the judge finds with this many paths a point.
-fn coarse_spheres_lose_no_light(material: &Material, in_furnace: &[u32], in_sun: &[u32], on_ground: (u32, u32)) {
-    let Some(gpu) = device() else { return };
-    for &segments in in_furnace {
-        assert_holds("in a furnace", known::coarse_sphere_in_a_furnace(&gpu, material.clone(), segments));
-    }
-    for &segments in in_sun {
-        assert_holds("in the sun", known::coarse_sphere_in_the_sun(&gpu, material.clone(), segments));
-    }
-    let (segments, paths) = on_ground;
-    assert_holds("the ground", known::ground_by_a_coarse_sphere(&gpu, material.clone(), segments, paths));
-}
-
-/// In a furnace `tests/engine/planted_faults.rs` asks for spheres of 8 segments, of both, in the long run.
+/// in glass for long; on the ground about them it is what the judge finds. In a furnace `tests/engine/planted_faults.rs` asks for
+/// spheres of 8 segments, of both, in the long run.
 #[test]
 fn coarse_mirrors_with_smooth_normals_lose_no_light() {
-    coarse_spheres_lose_no_light(&mirror(1.0), &[], &[], (32, 4000));
+    let Some(gpu) = device() else { return };
+    assert_holds("the ground", known::ground_by_a_coarse_sphere(&gpu, mirror(1.0), 32, 4000));
 }
 
 #[test]
 fn coarse_glass_with_smooth_normals_loses_no_light() {
-    coarse_spheres_lose_no_light(&glass(1.5), &[], &[16], (16, 4000));
+    let Some(gpu) = device() else { return };
+    assert_holds("in the sun", known::coarse_sphere_in_the_sun(&gpu, glass(1.5), 16));
+    assert_holds("the ground", known::ground_by_a_coarse_sphere(&gpu, glass(1.5), 16, 4000));
 }
 
 #[test]
 #[ignore = "long: half a minute on a software device"]
 fn coarse_spheres_of_any_number_of_segments_lose_no_light() {
+    let Some(gpu) = device() else { return };
     for (material, of_ground) in [(mirror(1.0), 32), (glass(1.5), 16)] {
-        coarse_spheres_lose_no_light(&material, &[8, 16, 32], &[8, 16, 32], (of_ground, 40_000));
+        for segments in [8, 16, 32] {
+            assert_holds("in a furnace", known::coarse_sphere_in_a_furnace(&gpu, material.clone(), segments));
+            assert_holds("in the sun", known::coarse_sphere_in_the_sun(&gpu, material.clone(), segments));
+        }
+        assert_holds("the ground", known::ground_by_a_coarse_sphere(&gpu, material, of_ground, 40_000));
     }
 }

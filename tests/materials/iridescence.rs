@@ -1,9 +1,8 @@
 //! Thin films against closed forms.
 
-use crate::common::layered::plastic;
+use crate::common::layered;
 use crate::common::prelude::*;
 use photonmill::scene::film;
-use photonmill::scene::material::Layers;
 
 /// Without thickness, or of the index of air, a film is nothing; a thick one reflects what both of its boundaries do without
 /// interference, R = R1 + T1^2 R2 / (1 - R1 R2); a quarter of a wave thick, of the root of the base's index, it reflects
@@ -33,7 +32,7 @@ fn films_reflect_as_their_closed_forms_say() {
 #[test]
 fn bounds_hold_for_every_angle() {
     for (ior, nanometres) in [(1.0, 0.0), (1.3, 400.0), (1.33, 1200.0), (2.0, 250.0), (2.4, 5000.0), (100.0, 30.0)] {
-        let bound = Layers { iridescence: 1.0, film_ior: ior, film_thickness: [0.0, nanometres], ..plastic(0.5) }.film_bound();
+        let bound = layered::film(ior, nanometres, &layered::plastic(0.5)).film_bound();
         for k in 1..2000 {
             let cosine = f64::from(k) / 2000.0;
             let found = film::reflectance(DVec3::splat(0.04), ior.into(), nanometres.into(), cosine).max_element();

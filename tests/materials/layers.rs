@@ -1,6 +1,8 @@
 //! Layered materials: pictures against the path tracer, and the closed forms that no question of `tests/engine/planted_faults.rs` has.
 
-use crate::common::layered::{self, CLEAR, Mixtures, Returns, in_each_sun, inputs, layered, lobes_at, metal, plastic, row_of_texels};
+use crate::common::layered::{
+    self, CLEAR, Returns, SHEEN, film, in_each_sun, inputs, layered, lobes_at, metal, mixtures_of, plastic, row_of_texels,
+};
 use crate::common::plates::{Place, Plates};
 use crate::common::prelude::*;
 use crate::common::{estimate_check, known, planted, sheets};
@@ -48,9 +50,9 @@ struct Runs {
 
 const SEEDS: u32 = 4;
 
-fn runs(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, camera: &Camera, size: [u32; 2]) -> Runs {
+fn runs(gpu: &Gpu, scene: &Scene, rounds: u32, camera: &Camera, size: [u32; 2]) -> Runs {
     let of = |seed: u32| {
-        let settings = SceneSettings { seed: u64::from(seed), ..settings.clone() };
+        let settings = SceneSettings { seed: seed.into(), photons: 10_000, caustic_photons: 10_000, rounds, ..by_rounds() };
         scene::render(gpu, scene, &settings, Target::Picture(camera, size)).unwrap()
     };
     let all: Vec<RunResult> = (1..=SEEDS).map(of).collect();
@@ -64,7 +66,7 @@ fn runs(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, camera: &Camera, siz
             |lit: &RunResult| lit.film.part_totals[part] as f64 / (lit.plan.film.scale * f64::from(lit.film.rounds) * pixels as f64);
         mean_and_error(&all.iter().map(of_run).collect::<Vec<f64>>())
     });
-    Runs { means, errors, parts, rounds: SEEDS * settings.rounds }
+    Runs { means, errors, parts, rounds: SEEDS * rounds }
 }
 
 /// Whether a picture is the path tracer's, as a whole and part by part.
@@ -98,8 +100,6 @@ fn coloured(layers: &Layers) -> Material {
     layered(Vec3::new(0.8, 0.5, 0.2), layers)
 }
 
-const SHEEN: Vec3 = Vec3::new(0.2, 0.4, 0.9);
-
 fn glass(roughness: f32) -> Layers {
     Layers { transmission: 1.0, medium: CLEAR, ..plastic(roughness) }
 }
@@ -131,7 +131,6 @@ fn lobes() -> Vec<(&'static str, Material)> {
 fn mixtures() -> Vec<(&'static str, Material)> {
     let (coat, coat_roughness) = (1.0, 0.55);
     let (sheen_colour, sheen_roughness) = (SHEEN, 0.5);
-    let film = |film_ior, nanometres, layers| Layers { iridescence: 1.0, film_ior, film_thickness: [0.0, nanometres], ..layers };
     let paper = |share, diffuse_transmission_colour, medium| Layers {
         diffuse_transmission: share,
         diffuse_transmission_colour,
@@ -158,9 +157,9 @@ fn mixtures() -> Vec<(&'static str, Material)> {
             Material { normal_map: bumpy, ..coloured(&Layers { anisotropy: 0.9, anisotropy_rotation: 1.0, ..plastic(0.3) }) },
         ),
         ("brushed glass", coloured(&Layers { anisotropy: 0.5, ..glass(0.3) })),
-        ("a film on metal", coloured(&film(1.8, 300.0, metal(0.6)))),
-        ("a film on plastic", coloured(&film(1.4, 420.0, plastic(0.4)))),
-        ("a bubble", coloured(&film(1.33, 350.0, glass(0.0)))),
+        ("a film on metal", coloured(&film(1.8, 300.0, &metal(0.6)))),
+        ("a film on plastic", coloured(&film(1.4, 420.0, &plastic(0.4)))),
+        ("a bubble", coloured(&film(1.33, 350.0, &glass(0.0)))),
         ("paper", coloured(&paper(0.6, Vec3::new(0.5, 0.9, 0.2), None))),
         ("wax", coloured(&paper(0.8, Vec3::ONE, tint(Vec3::new(0.9, 0.4, 0.1))))),
         ("a dispersive ball", layered(Vec3::ONE, &dispersive(Layers { medium: tint(Vec3::new(0.3, 0.6, 0.9)), ..glass(0.0) }))),
@@ -184,8 +183,7 @@ fn all_mixtures() -> Scene {
     scene.materials.extend([layered(Vec3::ONE, &water), Material { emission: Vec3::splat(5.0), ..matt(0.0) }]);
     let [water, lamp] = [2, 1].map(|before| scene.materials.len() - before);
     scene.meshes.extend(media::cuboid("water", DVec3::new(-1.4, 0.03, 0.6), DVec3::new(-0.5, 0.8, 1.5), water));
-    let bulb = Mesh::parallelogram("bulb", DVec3::new(-1.0, 0.7, 0.85), DVec3::X * 0.1, DVec3::Z * 0.1, lamp);
-    scene.meshes.push(bulb);
+    scene.meshes.push(Mesh::parallelogram("bulb", DVec3::new(-1.0, 0.7, 0.85), DVec3::X * 0.1, DVec3::Z * 0.1, lamp));
     scene
 }
 
@@ -197,26 +195,8 @@ fn cameras() -> [Camera; 2] {
     ]
 }
 
-/// An effect that is taken from a material.
-type Lacking = (&'static str, fn(&mut Layers));
-
-/// A picture of all mixtures.
-fn picture_of_all(gpu: &Gpu, scene: &Scene, camera: &Camera, size: [u32; 2], rounds: u32) -> Runs {
-    let settings = SceneSettings { photons: 10_000, caustic_photons: 10_000, rounds, ..by_rounds() };
-    runs(gpu, scene, &settings, camera, size)
-}
-
-fn all_mixtures_agree(gpu: &Gpu) {
-    let scene = all_mixtures();
-    // Paths that meet the lamp in the water are few and bright.
-    for (camera, (size, samples)) in cameras().into_iter().zip([([96, 72], 256), ([48, 36], 1024)]) {
-        let found = picture_of_all(gpu, &scene, &camera, size, 8);
-        assert_holds(&camera.name, compare(&camera.name, &found, &judged(&scene, &camera, size, samples)));
-    }
-}
-
 /// Effects whose absence the picture from before the stage shows; plates show those of a coat and of a stretch.
-const LACKING: [Lacking; 5] = [
+const LACKING: [(&str, fn(&mut Layers)); 5] = [
     ("no coat and no sheen", |layers| (layers.coat, layers.sheen_colour) = (0.0, Vec3::ZERO)),
     ("no sheen", |layers| layers.sheen_colour = Vec3::ZERO),
     ("no films", |layers| layers.iridescence = 0.0),
@@ -224,48 +204,40 @@ const LACKING: [Lacking; 5] = [
     ("clear media", |layers| layers.medium = layers.medium.map(|_| Medium::CLEAR)),
 ];
 
-fn mixtures_that_lack_an_effect_disagree(gpu: &Gpu) {
-    let (scene, [camera, _], size) = (all_mixtures(), cameras(), [64, 48]);
-    let found = picture_of_all(gpu, &scene, &camera, size, 32);
-    for (what, change) in LACKING {
-        let mut other = scene.clone();
-        other.materials.iter_mut().for_each(|material| change(&mut material.layers));
-        assert_complains(what, compare(what, &found, &judged(&other, &camera, size, 256)));
-    }
-}
-
 #[test]
 #[ignore = "long: each lobe and mixture by itself, all in one picture, and each effect left out"]
 fn pictures_of_each_lobe_agree_with_the_judge() {
     let Some(gpu) = device() else { return };
-    all_mixtures_agree(&gpu);
-    mixtures_that_lack_an_effect_disagree(&gpu);
-    let only = std::env::var("BALL").ok();
+    let (all, [in_air, in_water]) = (all_mixtures(), cameras());
+    // Paths that meet the lamp in the water are few and bright.
+    for (camera, size, samples) in [(&in_air, [96, 72], 256), (&in_water, [48, 36], 1024)] {
+        assert_holds(&camera.name, compare(&camera.name, &runs(&gpu, &all, 8, camera, size), &judged(&all, camera, size, samples)));
+    }
+    let found = runs(&gpu, &all, 32, &in_air, [64, 48]);
+    for (what, change) in LACKING {
+        let mut other = all.clone();
+        other.materials.iter_mut().for_each(|material| change(&mut material.layers));
+        assert_complains(what, compare(what, &found, &judged(&other, &in_air, [64, 48], 256)));
+    }
     let mut wrong = Vec::new();
-    for (name, material) in lobes().into_iter().chain(mixtures()).filter(|(name, _)| only.as_ref().is_none_or(|only| only == name)) {
-        let scene = stage(vec![(material, DVec3::new(0.0, 0.45, 0.1), 0.4)]);
-        let settings = SceneSettings { photons: 10_000, caustic_photons: 10_000, rounds: 16, ..by_rounds() };
-        let [camera, _] = cameras();
-        let found = runs(&gpu, &scene, &settings, &camera, [24; 2]);
-        wrong.extend(compare(name, &found, &judged(&scene, &camera, [24; 2], 512)).err());
+    for (name, material) in lobes().into_iter().chain(mixtures()) {
+        let ball = stage(vec![(material, DVec3::new(0.0, 0.45, 0.1), 0.4)]);
+        wrong.extend(compare(name, &runs(&gpu, &ball, 16, &in_air, [24; 2]), &judged(&ball, &in_air, [24; 2], 512)).err());
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-}
-
-/// A plate alone under one lamp or an even sky, seen along the reflection of light from above.
-fn seen_alone(gpu: &Gpu, material: Material, light: LightKind) -> RunResult {
-    let scene = scene_of(vec![level(0.0, [1.0; 2], true, 0)], vec![material], vec![light]);
-    let camera = Camera::looking_at("above", DVec3::Y * 3.0, DVec3::ZERO, DVec3::NEG_Z, 0.01);
-    let settings = SceneSettings { photons: 1000, caustic_photons: 1000, rounds: 8, block: Some(1), ..SceneSettings::default() };
-    seen(gpu, &scene, &settings, &camera, [4, 4])
 }
 
 /// Rays towards lamps count for each lobe that has a width, also where no surface keeps photons.
 #[test]
 fn a_sharp_metal_alone_has_highlights() {
     let Some(gpu) = device() else { return };
-    let sun = LightKind::Directional { direction: DVec3::NEG_Y, irradiance: Vec3::ONE };
-    let seen = |roughness| mean_red(&seen_alone(&gpu, layered(Vec3::ONE, &metal(roughness)), sun.clone()));
+    let camera = Camera::looking_at("above", DVec3::Y * 3.0, DVec3::ZERO, DVec3::NEG_Z, 0.01);
+    let settings = SceneSettings { photons: 1000, caustic_photons: 1000, rounds: 8, ..by_rounds() };
+    let seen = |roughness| {
+        let plate = layered(Vec3::ONE, &metal(roughness));
+        let scene = scene_of(vec![level(0.0, [1.0; 2], true, 0)], vec![plate], vec![sun(DVec3::NEG_Y)]);
+        mean_red(&seen(&gpu, &scene, &settings, &camera, [4, 4]))
+    };
     // GGX along the normal is 1 / (4 pi alpha^2), at a roughness of .4 (Walter et al. 2007).
     let expected = 1.0 / (4.0 * PI * 0.16f64.powi(2));
     assert!((seen(0.4) / expected - 1.0).abs() < 0.02, "{}, {expected}", seen(0.4));
@@ -282,7 +254,7 @@ fn light_that_is_clamped_at_a_plate_alone_is_little() {
     scene.textures = vec![row_of_texels(&[layered::LEANS[1]], Filter::Nearest)];
     scene.meshes[0].tangents = vec![[DVec3::X.extend(1.0); 3]; 2];
     let camera = Camera::looking_at("aside", DVec3::new(3.0, 1.0, 0.0), DVec3::ZERO, DVec3::Y, 0.1);
-    let settings = SceneSettings { photons: 4000, caustic_photons: 1000, rounds: 8, block: Some(1), ..SceneSettings::default() };
+    let settings = SceneSettings { photons: 4000, caustic_photons: 1000, rounds: 8, ..by_rounds() };
     let lit = seen(&gpu, &scene, &settings, &camera, [4, 4]);
     assert!(lit.losses.clamped > 0.0 && lit.losses.relative < 1e-3, "{:?}", lit.losses);
 }
@@ -302,18 +274,17 @@ fn plates_in_the_sun_have_the_lobes_of_the_guide() {
         Layers { anisotropy: 0.5, anisotropy_rotation: -2.0, ..metal(0.7) },
         Layers { anisotropy: 0.8, anisotropy_rotation: 0.4, anisotropy_texture: Some(TextureUse::of(1, 0)), ..plastic(0.4) },
         Layers { anisotropy: 0.7, anisotropy_texture: Some(TextureUse::of(0, 0)), coat: 0.5, coat_roughness: 0.4, ..metal(0.5) },
-        Layers { anisotropy: 0.7, iridescence: 0.8, film_ior: 1.7, film_thickness: [0.0, 300.0], ..metal(0.4) },
+        Layers { anisotropy: 0.7, iridescence: 0.8, ..film(1.7, 300.0, &metal(0.4)) },
         Layers { anisotropy: 0.6, transmission: 0.7, ..plastic(0.4) },
         Layers { anisotropy: 0.6, ..glass(0.4) },
     ];
-    let covered = Mixtures::CoveredTransmissive.materials();
+    let covered = mixtures_of(true, true);
     let mut plates = Plates::new(4 * of.len() + covered.len() + 1, Vec::new());
     plates.scene.textures = TEXELS.map(|texel| row_of_texels(&[texel], Filter::Bilinear)).to_vec();
     let mut expected = Vec::new();
     for row in 0..4 {
-        for (layers, (sign, is_back)) in
-            of.iter().flat_map(|layers| [(1.0, false), (-1.0, false), (1.0, true), (-1.0, true)].map(|side| (layers, side)))
-        {
+        let from_all = |layers| [(layers, 1.0, false), (layers, -1.0, false), (layers, 1.0, true), (layers, -1.0, true)];
+        for (layers, sign, is_back) in of.iter().flat_map(from_all) {
             // A solid seen from behind is seen from within.
             let is_back = is_back && layers.medium.is_none();
             let material = Material { two_sided: true, ..coloured(layers) };
@@ -323,13 +294,10 @@ fn plates_in_the_sun_have_the_lobes_of_the_guide() {
                 mesh.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
             }
             let across = if is_back { -sign } else { sign } * place.y;
-            let [red, green, blue] = layers.anisotropy_texture.map_or([1.0, 0.5, 1.0], |used| {
-                let [red, green, blue, _] = TEXELS[used.texture];
-                [red, green, blue].map(|code| f64::from(code) / 255.0)
-            });
-            let (sine, cosine) = f64::from(layers.anisotropy_rotation).sin_cos();
-            let (x, y) = (2.0 * red - 1.0, 2.0 * green - 1.0);
-            let tangent = ((cosine * x - sine * y) * place.x + (sine * x + cosine * y) * across).normalize();
+            let [red, green, blue, _] =
+                layers.anisotropy_texture.map_or([1.0, 0.5, 1.0, 1.0], |used| TEXELS[used.texture].map(|code| f64::from(code) / 255.0));
+            let way = DVec2::from_angle(layers.anisotropy_rotation.into()).rotate(DVec2::new(2.0 * red - 1.0, 2.0 * green - 1.0));
+            let tangent = (way.x * place.x + way.y * across).normalize();
             let alpha = f64::from(layers.roughness).powi(2);
             let along = alpha + (f64::from(layers.anisotropy) * blue).powi(2) * (1.0 - alpha);
             let inputs = Inputs { stretch: Some((tangent, along)), ..inputs(&material) };
@@ -415,27 +383,19 @@ const BRUSHED_METALS: [(f32, f32, f32, [f64; 5]); 3] = [
 #[test]
 fn plates_return_what_the_sky_sends() {
     let Some(gpu) = device() else { return };
-    let film = |film_ior, nanometres, layers| Layers { iridescence: 1.0, film_ior, film_thickness: [0.0, nanometres], ..layers };
     let white = [plastic(0.0), plastic(0.3), plastic(0.6), plastic(1.0), Layers { coat: 1.0, ..plastic(0.0) }];
     let films =
-        [film(1.4, 380.0, plastic(0.2)), film(2.0, 250.0, plastic(0.8)), film(1.8, 300.0, Layers { metallic: 0.5, ..plastic(0.4) })];
-    let brushed = |(roughness, anisotropy, degrees, albedos): (f32, f32, f32, [f64; 5])| -> Returns {
+        [film(1.4, 380.0, &plastic(0.2)), film(2.0, 250.0, &plastic(0.8)), film(1.8, 300.0, &Layers { metallic: 0.5, ..plastic(0.4) })];
+    let mixed = mixtures_of(false, false).into_iter().filter(|material| material.layers.metallic == 0.5);
+    let unknown = mixed.chain(mixtures_of(true, false)).chain(films.map(|layers| layered(Vec3::ONE, &layers)));
+    let mut materials: Vec<Returns> = unknown.map(|material| (material, None)).collect();
+    materials.extend(white.map(|layers| (layered(Vec3::ONE, &layers), Some([1.0; 5]))));
+    materials.extend(layered::white_metals());
+    materials.extend(BRUSHED_METALS.map(|(roughness, anisotropy, degrees, albedos)| {
         // The eye is in the plane of the normal and y.
         let anisotropy_rotation = (90.0 - degrees).to_radians();
         (layered(Vec3::ONE, &Layers { anisotropy, anisotropy_rotation, ..metal(roughness) }), Some(albedos))
-    };
-    let mut materials: Vec<Returns> = layered::mixtures()
-        .into_iter()
-        .filter(|Material { layers, .. }| {
-            let is_opaque = layers.transmission == 0.0 && layers.diffuse_transmission == 0.0;
-            is_opaque && (layers.coat > 0.0 || layers.sheen_colour != Vec3::ZERO || layers.metallic == 0.5)
-        })
-        .chain(films.map(|layers| layered(Vec3::ONE, &layers)))
-        .map(|material| (material, None))
-        .collect();
-    materials.extend(white.map(|layers| (layered(Vec3::ONE, &layers), Some([1.0; 5]))));
-    materials.extend(layered::white_metals());
-    materials.extend(BRUSHED_METALS.map(brushed));
+    }));
     assert_holds("the sky", layered::furnace(&gpu, &materials, true));
 }
 

@@ -6,17 +6,16 @@ use std::cell::Cell;
 
 use crate::common::chi_square::{Grid, counts_check, density_check, even};
 use crate::common::densities::{AXIS, ULP, angles, frame, hemisphere_check, is_unit, on_sphere, polar};
-use crate::common::planted;
+use crate::common::plates::COSINES;
 use crate::common::prelude::*;
-use crate::common::share_check;
+use crate::common::{layered, planted, share_check};
 use photonmill::constants::NONE;
-use photonmill::gpu::kernels::{self, CheckLobes};
+use photonmill::engine::scene::resources::SceneResources;
+use photonmill::gpu::kernels::CheckLobes;
 use photonmill::records::{LobeCase, LobeSample};
-use photonmill::scene::albedo;
 use photonmill::verify::judge::lobes::{Class, Film, Frame, Inputs, Kind, Lobes, Wall};
 use photonmill::verify::judge::{Random, random};
 
-const COSINES: [f64; 5] = [1.0, 0.8, 0.5, 0.2, 0.05];
 /// In the order of the kernels' numbers.
 const KINDS: [Kind; 6] = [Kind::Diffuse, Kind::Reflection, Kind::Coat, Kind::Transmission, Kind::Sheen, Kind::DiffuseTransmission];
 /// Of each case.
@@ -34,29 +33,33 @@ fn alphas(count: i32) -> Vec<f32> {
 /// Enough for the test of all samples together to notice facets of an alpha 2 % too large.
 const ALPHAS: i32 = 10;
 
-/// A dielectric, seen at a cosine. Its normal has no special direction.
-fn plastic(alpha: f32, cosine: f64) -> LobeCase {
-    let sine = (1.0 - cosine * cosine).sqrt();
-    let wo = frame(AXIS, DVec3::X) * DVec3::new(0.6 * sine, 0.8 * sine, cosine);
-    let normal = AXIS.normalize().as_vec3();
+/// A white and matt dielectric, without anything that it need not have.
+pub(super) fn white(wo: Vec3, normal: Vec3) -> LobeCase {
     LobeCase {
-        wo: wo.normalize().as_vec3(),
+        wo,
         ng: normal,
         ns: normal,
         coat_normal: normal,
-        base_colour: Vec3::new(0.9, 0.4, 0.1),
-        alpha,
+        base_colour: Vec3::ONE,
+        alpha: 1.0,
         ior: 1.5,
         specular: 1.0,
         eta: 1.0,
         coat_alpha: 1.0,
         sheen_alpha: 1.0,
         coverage: 1.0,
+        film_ior: 1.0,
         lobe: NONE,
-        seed: 100,
-        carries_radiance: 1,
         ..LobeCase::default()
     }
+}
+
+/// A dielectric, seen at a cosine. Its normal has no special direction.
+fn plastic(alpha: f32, cosine: f64) -> LobeCase {
+    let sine = (1.0 - cosine * cosine).sqrt();
+    let wo = (frame(AXIS, DVec3::X) * DVec3::new(0.6 * sine, 0.8 * sine, cosine)).normalize().as_vec3();
+    let base_colour = Vec3::new(0.9, 0.4, 0.1);
+    LobeCase { base_colour, alpha, seed: 100, carries_radiance: 1, ..white(wo, AXIS.normalize().as_vec3()) }
 }
 
 /// The same as a thin wall of glass.
@@ -110,6 +113,7 @@ fn number(kind: Kind) -> u32 {
 /// What the judge has for a case.
 pub(super) fn judged(case: &LobeCase) -> Lobes {
     let wall = if case.is_solid == 0 { Wall::Thin } else { Wall::Solid { from: f64::from(case.eta), to: 1.0 } };
+    let [share, ior, thickness, bound] = [case.iridescence, case.film_ior, case.film_thickness, case.film_bound].map(f64::from);
     let inputs = Inputs {
         base_colour: case.base_colour.as_dvec3(),
         metalness: case.metallic.into(),
@@ -121,12 +125,7 @@ pub(super) fn judged(case: &LobeCase) -> Lobes {
         transmission: case.transmission.into(),
         diffuse_transmission: case.diffuse_transmission.into(),
         diffuse_transmission_colour: case.diffuse_transmission_colour.as_dvec3(),
-        film: Film {
-            share: case.iridescence.into(),
-            ior: case.film_ior.into(),
-            thickness: case.film_thickness.into(),
-            bound: case.film_bound.into(),
-        },
+        film: Film { share, ior, thickness, bound },
         wall,
         coat: case.coat.into(),
         coat_alpha: case.coat_alpha.into(),
@@ -270,9 +269,8 @@ fn cells_check(what: &str, counts: &[u64], probabilities: &[f64]) -> Check {
     let alive = trials - counts[counts.len() - 1];
     let expected = trials as f64 * (1.0 - probabilities[probabilities.len() - 1]);
     if expected < 20.0 {
-        return require(alive as f64 <= expected + 6.0 * expected.sqrt() + 6.0, || {
-            format!("{what}: {alive} samples instead of {expected}")
-        });
+        let most = expected + 6.0 * expected.sqrt() + 6.0;
+        return require(alive as f64 <= most, || format!("{what}: {alive} samples instead of {expected}"));
     }
     counts_check(what, counts, probabilities)
 }
@@ -293,34 +291,11 @@ const ROUNDINGS: f64 = 24.0;
 /// Radians that packing turns the normal of a matt coat by.
 const PACKED_NORMAL: f64 = 7e-5;
 
-/// The largest relative differences, in units of [`ULP`] times what the geometry multiplies them by, from the judge: of weights, of
-/// densities; and of their product from the kernel's own BRDF times cosine.
-#[derive(Debug, Default, Clone, Copy)]
-struct Worst {
-    weight: f64,
-    density: f64,
-    own: f64,
-    /// Next to the horizon nothing can be said.
-    left_out: usize,
-}
-
-impl Worst {
-    fn add(&mut self, other: Worst) {
-        self.weight = self.weight.max(other.weight);
-        self.density = self.density.max(other.density);
-        self.own = self.own.max(other.own);
-        self.left_out += other.left_out;
-    }
-}
-
 fn relative_error(found: f64, expected: f64) -> f64 {
-    let error = (found - expected).abs() / found.abs().max(expected.abs());
-    if found == expected {
-        0.0
-    } else if error.is_nan() {
-        f64::INFINITY
-    } else {
-        error
+    match (found - expected).abs() / found.abs().max(expected.abs()) {
+        _ if found == expected => 0.0,
+        error if error.is_nan() => f64::INFINITY,
+        error => error,
     }
 }
 
@@ -329,8 +304,10 @@ fn largest_relative_error(found: Vec3, expected: DVec3) -> f64 {
     (0..3).map(|channel| relative_error(found[channel].into(), expected[channel])).fold(0.0, f64::max)
 }
 
-/// A living sample of a lobe of GGX.
-fn value_errors(case: &LobeCase, of: &Facets, sample: &LobeSample) -> Worst {
+/// Relative differences of a living sample of a lobe of GGX, in units of [`ULP`] times what the geometry multiplies them by, from the
+/// judge: of its weight, of its density; and of their product from the kernel's own BRDF times cosine. Next to the horizon nothing can be
+/// said.
+fn value_errors(case: &LobeCase, of: &Facets, sample: &LobeSample) -> Option<[f64; 3]> {
     let wi = sharpened(sample.direction);
     let half = of.half(wi);
     let v_h = of.wo.dot(half) / half.length();
@@ -341,7 +318,7 @@ fn value_errors(case: &LobeCase, of: &Facets, sample: &LobeSample) -> Worst {
     // The half vector has the error of the kernel's frame, and that of the direction over its own length.
     let sharp = smooth + (1.0 + 1.0 / half.length()) / of.alpha;
     if smooth * ULP > 1e-3 {
-        return Worst { left_out: 1, ..Worst::default() };
+        return None;
     }
     let chance = f64::from(sample.chance);
     let (density, value) = (of.lobes.density(of.kind, wi), of.lobes.evaluate(of.kind, wi) * wi.dot(of.lobes.axis(of.kind)));
@@ -350,55 +327,23 @@ fn value_errors(case: &LobeCase, of: &Facets, sample: &LobeSample) -> Worst {
     let is_matt = sample.is_sharp == 0;
     let own = if is_matt { sample.matt } else { sample.sharp };
     let own_unit = if is_matt && of.kind == Kind::Coat { PACKED_NORMAL } else { ULP };
-    Worst {
-        weight: largest_relative_error(sample.weight, value * flux / (density * chance)) / (smooth * ULP),
-        density: relative_error(sample.density.into(), density * chance) / (sharp * ULP),
-        own: largest_relative_error(own, sample.weight.as_dvec3() * f64::from(sample.density) / flux) / (sharp * own_unit),
-        left_out: 0,
-    }
+    Some([
+        largest_relative_error(sample.weight, value * flux / (density * chance)) / (smooth * ULP),
+        relative_error(sample.density.into(), density * chance) / (sharp * ULP),
+        largest_relative_error(own, sample.weight.as_dvec3() * f64::from(sample.density) / flux) / (sharp * own_unit),
+    ])
 }
 
-/// On a scene of nothing but the table of albedos; of all lobes and gaps, or of those of facets alone.
+/// On a scene whose table of albedos alone is read; of all lobes and gaps, or of those of facets alone.
 pub(super) fn ask(gpu: &Gpu, math: Math, all: bool, cases: &[LobeCase], samples: usize) -> Vec<LobeSample> {
-    let constants = Constants::new(128)
-        .set("STRICT_MATH", math as u32)
-        .set("HAS_LAYERS", 1)
-        .set("HAS_TRANSMISSION", 1)
-        .set("HAS_COATS", 1)
-        .set("HAS_SHEEN", all.into())
-        .set("HAS_DIFFUSE_TRANSMISSION", all.into())
-        .set("HAS_IRIDESCENCE", all.into())
-        .set("HAS_ANISOTROPY", 1)
-        .set("HAS_PASSING", all.into());
+    let always = ["HAS_LAYERS", "HAS_TRANSMISSION", "HAS_COATS", "HAS_ANISOTROPY"].map(|name| (name, true));
+    let others = ["HAS_SHEEN", "HAS_DIFFUSE_TRANSMISSION", "HAS_IRIDESCENCE", "HAS_PASSING"].map(|name| (name, all));
+    let constants = always.into_iter().chain(others).fold(Constants::new(128), |set, (name, has)| set.set(name, has.into()));
+    let constants = constants.set("STRICT_MATH", math as u32);
     let commands = &mut Commands::new(gpu, constants, Instant::now()).unwrap();
-    fn one<T: bytemuck::Pod>(gpu: &Gpu) -> photonmill::gpu::Buffer<T> {
-        gpu.buffer("nothing", 1, Memory::Device).unwrap()
-    }
-    let albedos = gpu.buffer("albedos", albedo::TABLE.len() as u64, Memory::Device).unwrap();
-    commands.upload(&albedos, &albedo::TABLE).unwrap();
-    let scene = &kernels::Scene {
-        nodes: one(gpu),
-        triangles: one(gpu),
-        normals: one(gpu),
-        uvs: one(gpu),
-        materials: one(gpu),
-        textures: one(gpu),
-        texels: one(gpu),
-        emitters: one(gpu),
-        caustic_targets: one(gpu),
-        planes: one(gpu),
-        light_nodes: one(gpu),
-        light_regions: one(gpu),
-        light_shares: one(gpu),
-        openings: one(gpu),
-        colours: one(gpu),
-        texels_1: one(gpu),
-        texels_2: one(gpu),
-        texels_3: one(gpu),
-        triangle_layers: one(gpu),
-        layered_materials: one(gpu),
-        albedos,
-    };
+    let plate = scene_of(vec![level(0.0, [1.0; 2], true, 0)], vec![layered::dull(0.5)], vec![sun(DVec3::NEG_Y)]);
+    let (geometry, plan) = scene_plan(gpu, &plate, &flights(100, 1), square_picture(1)).unwrap();
+    let SceneResources { scene, .. } = &SceneResources::new(gpu, commands, &geometry, &plan, &[]).unwrap();
     let inputs = gpu.buffer("lobe cases", cases.len() as u64, Memory::Device).unwrap();
     commands.upload(&inputs, cases).unwrap();
     let count = cases.len() * samples;
@@ -414,27 +359,30 @@ fn subject_check(gpu: &Gpu, subject: usize, alphas: &[f32]) -> Check {
     let with = |alpha: f32| cosines.iter().map(move |cosine| LobeCase { seed, lobe, ..case(alpha, *cosine) });
     let cases: Vec<LobeCase> = alphas.iter().flat_map(|alpha| with(*alpha)).collect();
     let samples = ask(gpu, Math::Fast, false, &cases, SAMPLES);
-    let (mut worst, mut all_counts, mut all_probabilities) = (Worst::default(), Vec::new(), Vec::new());
+    let (mut worst, mut left_out, mut all_counts, mut all_probabilities) = ([0.0f64; 3], 0u32, Vec::new(), Vec::new());
     let mut rng = random(subject as u64, 1);
     for (case, samples) in pairs(&cases, samples.chunks(SAMPLES)) {
         let lobes = judged(case);
         let of = Facets::new(case, &lobes, *kind);
         let what = format!("{what}, alpha {:.3e}, cosine {:.2}", of.alpha, of.wo.dot(of.n));
-        let mut of_case = Worst::default();
+        let mut of_case = [0.0f64; 3];
         for (k, sample) in samples.iter().enumerate() {
             require(sample.lobe == lobe && sample.passes == 0, || format!("{what}: {sample:?} is of another lobe"))?;
             require((sample.is_sharp != 0) == (lobes.class(*kind) == Class::Sharp), || format!("{what}: {sample:?} is of another class"))?;
             if sample.is_alive != 0 {
                 is_unit(&what, sample.direction, 32.0 * ULP)?;
                 if k.is_multiple_of(VALUES) {
-                    of_case.add(value_errors(case, &of, sample));
+                    match value_errors(case, &of, sample) {
+                        Some(errors) => of_case = std::array::from_fn(|which| of_case[which].max(errors[which])),
+                        None => left_out += 1,
+                    }
                 }
             }
         }
-        worst.add(of_case);
-        require(of_case.weight <= ROUNDINGS, || format!("{what}: weights are off, {of_case:?}"))?;
-        require(of_case.density <= ROUNDINGS, || format!("{what}: densities are off, {of_case:?}"))?;
-        require(of_case.own <= ROUNDINGS, || format!("{what}: the BRDF is off, {of_case:?}"))?;
+        worst = std::array::from_fn(|which| worst[which].max(of_case[which]));
+        for (error, values) in of_case.into_iter().zip(["weights are", "densities are", "the BRDF is"]) {
+            require(error <= ROUNDINGS, || format!("{what}: {values} off, {of_case:?}"))?;
+        }
         let counts = of.counts(SAMPLES, alive(samples.iter()))?;
         let probabilities = of.probabilities();
         cells_check(&what, &counts, &probabilities)?;
@@ -445,8 +393,8 @@ fn subject_check(gpu: &Gpu, subject: usize, alphas: &[f32]) -> Check {
         all_counts.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
         all_probabilities.iter_mut().zip(probabilities).for_each(|(sum, share)| *sum += share / cases.len() as f64);
     }
-    println!("{what}: {worst:?}");
-    let share = worst.left_out as f64 / (cases.len() * SAMPLES / VALUES) as f64;
+    println!("{what}: {worst:?}, {left_out} left out");
+    let share = f64::from(left_out) / (cases.len() * SAMPLES / VALUES) as f64;
     require(share < 1e-4, || format!("{what}: {share} of all samples lie too near the horizon"))?;
     cells_check(&format!("{what}, all together"), &all_counts, &all_probabilities)
 }
@@ -478,19 +426,10 @@ fn tilted(normal: Vec3, aside: Vec3) -> Vec3 {
 
 /// Surfaces of many lobes.
 fn mixtures() -> [(&'static str, LobeCase); 4] {
-    let sheen = Vec3::new(0.3, 0.25, 0.1);
-    let all = LobeCase {
-        coat: 0.7,
-        coat_alpha: 0.2,
-        metallic: 0.3,
-        transmission: 0.4,
-        sheen,
-        sheen_alpha: 0.3,
-        diffuse_transmission: 0.4,
-        diffuse_transmission_colour: Vec3::new(0.2, 0.7, 0.5),
-        coverage: 0.7,
-        ..plastic(0.1, 0.6)
-    };
+    let covered = LobeCase { coat: 0.7, coat_alpha: 0.2, sheen: Vec3::new(0.3, 0.25, 0.1), sheen_alpha: 0.3, ..plastic(0.1, 0.6) };
+    let beyond = Vec3::new(0.2, 0.7, 0.5);
+    let paper = LobeCase { diffuse_transmission: 0.4, diffuse_transmission_colour: beyond, ..covered };
+    let all = LobeCase { metallic: 0.3, transmission: 0.4, coverage: 0.7, ..paper };
     [
         ("a thin wall of all lobes", LobeCase { ng: tilted(all.ng, Vec3::X), coat_normal: tilted(all.ns, Vec3::Z), ..all }),
         ("matt lobes", LobeCase { alpha: 0.5, coat_alpha: 0.4, transmission: 0.0, sheen_alpha: 0.1, coverage: 0.2, ..all }),

@@ -1,33 +1,15 @@
 //! The lobes of layered materials in f64, as the path tracer has them: albedos and reciprocity. Densities are `lobe_sampling`'s.
 
-use crate::common::layered;
+use super::furnace::Draws;
+use crate::common::layered::{self, LOBES, inputs, layered, sampled};
+use crate::common::plates::COSINES;
 use crate::common::prelude::*;
 use photonmill::verify::judge::lobes::{Film, Frame, Inputs, Kind, Lobes, Wall};
-use photonmill::verify::judge::{Random, random};
-
-const COSINES: [f64; 5] = [1.0, 0.8, 0.5, 0.2, 0.05];
-const KINDS: [Kind; 6] = [Kind::Diffuse, Kind::Reflection, Kind::Transmission, Kind::Coat, Kind::Sheen, Kind::DiffuseTransmission];
+use photonmill::verify::judge::random;
 
 /// A white dielectric without anything else, of this roughness.
 fn plastic(roughness: f64) -> Inputs {
-    Inputs {
-        base_colour: DVec3::ONE,
-        metalness: 0.0,
-        alpha: roughness * roughness,
-        stretch: None,
-        ior: 1.5,
-        specular: 1.0,
-        specular_colour: DVec3::ONE,
-        transmission: 0.0,
-        diffuse_transmission: 0.0,
-        diffuse_transmission_colour: DVec3::ONE,
-        film: Film::NONE,
-        wall: Wall::Thin,
-        coat: 0.0,
-        coat_alpha: 0.0,
-        sheen_colour: DVec3::ZERO,
-        sheen_s: 0.01,
-    }
+    Inputs { alpha: roughness * roughness, ..inputs(&layered(Vec3::ONE, &layered::plastic(0.0))) }
 }
 
 fn metal(roughness: f64) -> Inputs {
@@ -50,9 +32,8 @@ fn wo(cosine: f64) -> DVec3 {
     DVec3::new((1.0 - cosine * cosine).sqrt(), 0.0, cosine)
 }
 
-#[expect(clippy::large_types_passed_by_value, reason = "the lobes keep it")]
-fn lobes(inputs: Inputs, wo: DVec3) -> Lobes {
-    Lobes::new(inputs, Frame { wo, ng: DVec3::Z, n: DVec3::Z, coat_n: DVec3::Z })
+fn lobes(inputs: &Inputs, wo: DVec3) -> Lobes {
+    Lobes::new(*inputs, Frame { wo, ng: DVec3::Z, n: DVec3::Z, coat_n: DVec3::Z })
 }
 
 /// Of every lobe alone and of mixtures.
@@ -118,8 +99,7 @@ fn albedo(lobes: &Lobes, kind: Kind, count: usize) -> DVec3 {
 }
 
 /// The same of reflection, over half vectors, for the sharpest lobes.
-#[expect(clippy::large_types_passed_by_value, reason = "the lobes keep it")]
-fn reflection_albedo(inputs: Inputs, cosine: f64, count: usize) -> DVec3 {
+fn reflection_albedo(inputs: &Inputs, cosine: f64, count: usize) -> DVec3 {
     let (wo, alpha) = (wo(cosine), inputs.alpha);
     let lobes = lobes(inputs, wo);
     let step = |index: usize| (index as f64 + 0.5) / count as f64;
@@ -145,49 +125,41 @@ fn reflection_has_the_albedos_of_the_table() {
     // Below 1e-4 it is a delta.
     for (alpha, expected) in layered::METALS.into_iter().filter(|(alpha, _)| *alpha > 0.0) {
         for (cosine, expected) in COSINES.into_iter().zip(expected) {
-            let found = reflection_albedo(Inputs { alpha, ..metal(0.0) }, cosine, 400).x;
+            let found = reflection_albedo(&Inputs { alpha, ..metal(0.0) }, cosine, 400).x;
             assert_holds(format!("alpha {alpha} at {cosine}"), relative_check("albedo", found, expected, 1e-3));
         }
     }
 }
 
-/// Means of the three channels of a lobe's samples, and their standard errors.
-fn sampled(lobes: &Lobes, kind: Kind, count: u32, rng: &mut Random) -> (DVec3, DVec3) {
-    let (mut sum, mut squares) = (DVec3::ZERO, DVec3::ZERO);
-    for _ in 0..count {
-        let weight = lobes.sample(kind, rng).map_or(DVec3::ZERO, |scattered| scattered.weight);
-        sum += weight;
-        squares += weight * weight;
+/// What refraction does not change is the radiance over the squared index.
+fn flux_scale(wall: Wall, kind: Kind) -> f64 {
+    match wall {
+        Wall::Solid { from, to } if kind == Kind::Transmission => (to / from).powi(2),
+        _ => 1.0,
     }
-    let n = f64::from(count);
-    (sum / n, ((squares / n - (sum / n) * (sum / n)).max(DVec3::ZERO) / n).map(f64::sqrt))
 }
 
 /// Each material has every `step`th cosine.
 fn samples_have_the_albedo_of_their_lobe(step: usize) {
     let mut rng = random(1, 1);
     for (number, (what, inputs)) in materials().into_iter().enumerate() {
-        // Radiance over the squared index is what refraction leaves as it is.
-        let scale = match inputs.wall {
-            Wall::Solid { from, to } => (to / from).powi(2),
-            Wall::Thin => 1.0,
-        };
         for cosine in COSINES.into_iter().skip(number % step).step_by(step) {
-            let lobes = lobes(inputs, wo(cosine));
+            let lobes = lobes(&inputs, wo(cosine));
             let mut total = DVec3::ZERO;
-            for kind in KINDS {
+            for kind in LOBES {
                 // Finds 2 % of most lobes. That samples follow their density is `lobe_sampling`'s.
-                let (mean, error) = sampled(&lobes, kind, 5000, &mut rng);
+                let (mean, squared) = sampled(&lobes, kind, 5000, &mut rng, |_| 1.0);
+                let error = squared.map(f64::sqrt);
                 let expected = match kind {
                     kind if lobes.is_delta(kind) => mean,
-                    Kind::Reflection => reflection_albedo(inputs, cosine, 100),
+                    Kind::Reflection => reflection_albedo(&inputs, cosine, 100),
                     // Refraction ends at an edge.
                     Kind::Transmission => albedo(&lobes, kind, 200),
                     kind => albedo(&lobes, kind, 100),
                 };
                 let off = (mean - expected).abs();
                 assert!(off.cmple(4.5 * error + 1e-3).all(), "{what}, {kind:?} at {cosine}: {mean} +- {error}, expected {expected}");
-                total += expected * if kind == Kind::Transmission { scale } else { 1.0 };
+                total += expected * flux_scale(inputs.wall, kind);
                 let is_chosen = lobes.chances().any(|(chosen, _)| chosen == kind);
                 assert!(is_chosen || expected.max_element() < 1e-12, "{what}: {kind:?} is never chosen at {cosine}, albedo {expected}");
             }
@@ -213,69 +185,44 @@ fn samples_have_the_albedo_of_their_lobe_at_every_cosine() {
 #[test]
 fn white_surfaces_return_all_that_single_scattering_leaves() {
     let whole = |inputs: Inputs, cosine: f64| -> f64 {
-        let lobes = lobes(inputs, wo(cosine));
+        let lobes = lobes(&inputs, wo(cosine));
         let of = |kind| match lobes.is_delta(kind) {
             true => lobes.sample(kind, &mut random(1, 1)).map_or(0.0, |scattered| scattered.weight.x),
             // It may be sharp.
-            false if kind == Kind::Reflection => reflection_albedo(inputs, cosine, 400).x,
+            false if kind == Kind::Reflection => reflection_albedo(&inputs, cosine, 400).x,
             false => albedo(&lobes, kind, 100).x,
         };
-        KINDS.into_iter().map(of).sum()
+        LOBES.into_iter().map(|kind| flux_scale(inputs.wall, kind) * of(kind)).sum()
     };
-    for cosine in COSINES {
-        for roughness in [0.0, 0.3, 0.6, 1.0] {
-            let returned = whole(plastic(roughness), cosine);
-            assert!((returned - 1.0).abs() < 3e-4, "plastic of roughness {roughness} at {cosine}: {returned}");
-        }
-        let returned = whole(Inputs { coat: 1.0, ..plastic(0.0) }, cosine);
-        assert!((returned - 1.0).abs() < 3e-4, "smooth coat at {cosine}: {returned}");
-        let returned = whole(Inputs { metalness: 1.0, coat: 1.0, ..plastic(0.0) }, cosine);
-        assert!((returned - 1.0).abs() < 1e-9, "coated mirror at {cosine}: {returned}");
-        // Lossless thin walls, smooth ones, and solids.
-        for (inputs, scale) in [(glass(0.0, Wall::Thin), 1.0), (solid(0.0, 1.0, 1.5), 2.25), (solid(0.0, 1.5, 1.0), 1.0 / 2.25)] {
-            let lobes = lobes(inputs, wo(cosine));
-            let of = |kind| lobes.sample(kind, &mut random(1, 1)).map_or(0.0, |scattered| scattered.weight.x);
-            let returned = of(Kind::Reflection) + scale * of(Kind::Transmission);
-            assert!((returned - 1.0).abs() < 1e-12, "{inputs:?} at {cosine}: {returned}");
+    let plastics = [0.0, 0.3, 0.6, 1.0].map(|roughness| (plastic(roughness), 3e-4));
+    let coated = [(Inputs { coat: 1.0, ..plastic(0.0) }, 3e-4), (Inputs { coat: 1.0, ..metal(0.0) }, 1e-9)];
+    // Lossless thin walls, smooth ones, and solids.
+    let clear = [glass(0.0, Wall::Thin), solid(0.0, 1.0, 1.5), solid(0.0, 1.5, 1.0)].map(|inputs| (inputs, 1e-12));
+    for (inputs, tolerance) in plastics.into_iter().chain(coated).chain(clear) {
+        for cosine in COSINES {
+            let returned = whole(inputs, cosine);
+            assert!((returned - 1.0).abs() < tolerance, "{inputs:?} at {cosine}: {returned}");
         }
     }
 }
 
-/// A direction on a side of the plane of x and y.
-fn direction(side: f64, rng: &mut Random) -> DVec3 {
-    let mut uniform = || (rand_word(rng) as f64 + 0.5) / 4_294_967_296.0;
-    let (height, azimuth) = (uniform(), TAU * uniform());
-    let sine = (1.0 - height * height).sqrt();
-    DVec3::new(sine * azimuth.cos(), sine * azimuth.sin(), side * height)
-}
-
-fn rand_word(rng: &mut Random) -> u32 {
-    rand_pcg::rand_core::Rng::next_u32(rng)
-}
-
 #[test]
 fn lobes_are_reciprocal() {
-    let mut rng = random(2, 1);
+    let mut draws = Draws(random(2, 1));
     let mut tested = 0;
     for (what, inputs) in materials() {
         for _ in 0..200 {
-            for kind in KINDS {
+            for kind in LOBES {
                 let side = if kind.is_beyond() { -1.0 } else { 1.0 };
-                let (v, l) = (direction(1.0, &mut rng), direction(side, &mut rng));
-                let there = lobes(inputs, v).evaluate(kind, l);
-                let (swapped, scale) = match inputs.wall {
-                    Wall::Solid { from, to } => {
-                        let scale = if kind == Kind::Transmission { (to / from).powi(2) } else { 1.0 };
-                        (
-                            if kind == Kind::Transmission { Inputs { wall: Wall::Solid { from: to, to: from }, ..inputs } } else { inputs },
-                            scale,
-                        )
-                    }
-                    Wall::Thin => (inputs, 1.0),
+                let (v, l) = (draws.direction(FRAC_PI_2), side * draws.direction(FRAC_PI_2));
+                let there = lobes(&inputs, v).evaluate(kind, l);
+                let wall = match inputs.wall {
+                    Wall::Solid { from, to } if kind == Kind::Transmission => Wall::Solid { from: to, to: from },
+                    wall => wall,
                 };
                 let n = side * DVec3::Z;
-                let back = Lobes::new(swapped, Frame { wo: l, ng: n, n, coat_n: n }).evaluate(kind, v);
-                let off = (scale * there - back).abs();
+                let back = Lobes::new(Inputs { wall, ..inputs }, Frame { wo: l, ng: n, n, coat_n: n }).evaluate(kind, v);
+                let off = (flux_scale(inputs.wall, kind) * there - back).abs();
                 assert!(off.cmple(1e-9 * (back.abs() + 1e-3)).all(), "{what}, {kind:?}: {there} and {back} between {v} and {l}");
                 tested += u32::from(there.max_element() > 0.0);
             }

@@ -2,7 +2,7 @@
 //! completions and manual pages.
 
 use crate::common::prelude::*;
-use crate::common::program::{PROGRAM, on_device};
+use crate::common::program::{PROGRAM, assert_says, entries, on_device};
 use serde_json::Value;
 
 const FILE: &str = "\
@@ -33,22 +33,17 @@ fn a_run_from_a_file_is_that_of_its_options() {
     let place = Place::new();
     let table = "[open-box]\nvariant = \"cpu\"\noutput = \"a.png\"\nmesh = 0x10\nphotons = 1_000\neye = [0.25, 0, 1]\nbias = false\n";
     place.write("run.toml", format!("seed = 3\nquiet = true\nmesh = 1\n\n{table}"));
-    let run = |line: &str| {
-        let output = place.run(line);
-        assert!(output.status.success(), "{line}: {}", text(&output.stderr));
-        (text(&output.stdout), text(&output.stderr))
-    };
     let picture = |name: &str| std::fs::read(place.at(name)).unwrap();
-    let (stdout, stderr) = run("--config run.toml");
+    let (stdout, stderr) = place.said("--config run.toml");
     assert!(stderr.is_empty() && stdout.contains("wrote a.png"), "{stdout}{stderr}");
-    run("--variant cpu --mesh 16 --photons 1000 --eye 0.25,0,1 --seed 3 -o b.png");
+    place.said("--variant cpu --mesh 16 --photons 1000 --eye 0.25,0,1 --seed 3 -o b.png");
     assert!(picture("a.png") == picture("b.png"), "the pictures differ");
-    run("--config run.toml -o c.png --seed 4");
+    place.said("--config run.toml -o c.png --seed 4");
     assert!(picture("a.png") != picture("c.png"), "--seed 4 changes nothing");
     // What conflicts with a typed option is not taken: --quiet with --progress.
-    let (_, stderr) = run("--config run.toml -o d.png --progress json");
+    let (_, stderr) = place.said("--config run.toml -o d.png --progress json");
     assert!(stderr.lines().all(|line| serde_json::from_str::<Value>(line).is_ok()) && !stderr.is_empty(), "{stderr}");
-    let (stdout, _) = run("repeat a.png");
+    let (stdout, _) = place.said("repeat a.png");
     assert!(stdout.contains("identical"), "{stdout}");
 }
 
@@ -57,11 +52,7 @@ fn a_run_from_a_file_is_that_of_its_options() {
 fn options_in_force_are_printed_as_a_file() {
     let place = Place::new();
     place.write("run.toml", FILE);
-    let print = |line: &str| {
-        let output = place.run(&format!("{line} --print-config"));
-        assert!(output.status.success(), "{line}: {}", text(&output.stderr));
-        text(&output.stdout)
-    };
+    let print = |line: &str| place.said(&format!("{line} --print-config")).0;
     let commands = [
         "render --config run.toml --device 0 --error 2%",
         "plan cornell --with bvh",
@@ -130,7 +121,7 @@ fn files_that_are_wrong_are_refused_in_one_line() {
 #[test]
 fn messages_are_more_or_fewer() {
     let place = Place::new();
-    let [quiet, usual] = ["-q", ""].map(|option| place.succeed(&format!("--mesh 8 -o a.png {option}")));
+    let [quiet, usual] = ["--quiet", ""].map(|option| place.succeed(&format!("--mesh 8 -o a.png {option}")));
     let verbose = place.succeed("render cornell -o a.png --size 8 --rounds 2 --photons 500 -v");
     assert!(quiet.1.is_empty() && usual.1.contains("photonmill: device: "), "{}{}", quiet.1, usual.1);
     // What is printed every few seconds of a slow run has whole seconds.
@@ -210,17 +201,13 @@ fn shells_complete_commands_options_values_and_scenes() {
 #[test]
 fn manual_pages_are_whole() {
     let place = Place::new();
-    let output = place.run("man pages");
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    let names = crate::common::program::entries(&place.at("pages"));
+    place.said("man pages");
+    let names = entries(&place.at("pages"));
     assert!(names.len() > 15 && names.contains(&"photonmill-map-export.1".to_owned()), "{names:?}");
     assert_eq!(text(&place.run("man").stdout), place.text("pages/photonmill.1"));
     let page = place.text("pages/photonmill-render.1").replace('\\', "");
-    for word in
-        [".TH photonmill-render 1", "--caustic-photons", ".SH EXAMPLES", "photonmill render cornell-spheres -o picture.png", "--config"]
-    {
-        assert!(page.contains(word), "{word}");
-    }
+    assert_says(&page, [".TH photonmill-render 1", "--caustic-photons", ".SH EXAMPLES", "--config"]);
+    assert_says(&page, ["photonmill render cornell-spheres -o picture.png"]);
     let Ok(groff) = std::process::Command::new("groff")
         .args(["-man", "-ww", "-z"])
         .args(names.iter().map(|name| place.at("pages").join(name)))

@@ -3,11 +3,10 @@
 //! `PHOTONMILL_WRITE_GUIDE=1 cargo test --test tests guide::` writes the tables anew.
 
 use std::fs;
-use std::process::{Command, Stdio};
 
 use crate::common::gltf_file::{square, square_buffer};
 use crate::common::prelude::*;
-use crate::common::program::{PROGRAM, device_of};
+use crate::common::program::on_device;
 use crate::common::sources::{files, read, root};
 use photonmill::measure::bench::table::scaled;
 use photonmill::measure::bench::targets::{TARGETS, Target, Wanted};
@@ -153,12 +152,9 @@ fn short(arguments: &[&str]) -> Vec<String> {
     shrunk(&words.iter().map(String::as_str).collect::<Vec<_>>(), &[&of_run, &there[..], of_kind].concat())
 }
 
-fn program(folder: &Path, arguments: &[String]) -> Check {
-    let output = Command::new(PROGRAM).current_dir(folder).args(arguments).stdin(Stdio::null()).output().expect("the program starts");
-    match output.status.code() {
-        Some(0) => Ok(()),
-        code => Err(format!("{}: exit code {code:?}: {}", arguments.join(" "), String::from_utf8_lossy(&output.stderr).trim())),
-    }
+fn ends_well(place: &Place, line: &str) -> Check {
+    let output = place.shell(&format!("photonmill {line}")).output().expect("bash starts");
+    require(output.status.success(), || format!("{line}: {:?}: {}", output.status.code(), text(&output.stderr).trim()))
 }
 
 /// Files and folders that the command says it writes.
@@ -178,38 +174,31 @@ fn kind(command: &str) -> BTreeSet<&str> {
 }
 
 /// Runs one command of a text in a folder that holds its inputs; what it says it writes must be there.
-fn run(folder: &Path, command: &str) -> Check {
+fn run(place: &Place, command: &str) -> Check {
     let line = command.replace("tools/setup && cargo run --release --", "photonmill");
     let mut words = line.split_whitespace();
     require(words.next() == Some("photonmill") && !line.contains(['|', '>', '<', ';', '&', '$', '"', '\'', '\\']), || {
         format!("{command}: is neither run nor listed as not run")
     })?;
     let arguments: Vec<&str> = words.collect();
-    let mut run = short(&arguments);
-    if let Some(device) = device_of(&run.join(" ")) {
-        run.extend(["--device".to_owned(), device]);
-    }
-    program(folder, &run)?;
-    match outputs(&arguments).into_iter().find(|path| !folder.join(path).exists()) {
-        Some(absent) => Err(format!("{command}: wrote no {absent}")),
-        None => Ok(()),
-    }
+    ends_well(place, &on_device(&short(&arguments).join(" ")))?;
+    let absent = outputs(&arguments).into_iter().find(|path| !place.at(path).exists());
+    require(absent.is_none(), || format!("{command}: wrote no {absent:?}"))
 }
 
 /// Only whether the program knows command, options and values, and takes them together: `--print-config` is parsed with all of them.
-fn parse(folder: &Path, command: &str) -> Check {
-    let words = command.split_whitespace().skip(1).chain(["--print-config"]);
-    program(folder, &words.map(ToString::to_string).collect::<Vec<_>>())
+fn parse(place: &Place, command: &str) -> Check {
+    ends_well(place, &format!("{} --print-config", command.trim_start_matches("photonmill ")))
 }
 
 /// A folder with the files that the commands read.
-fn folder_with_inputs() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
+fn place_with_inputs() -> Place {
+    let place = Place::new();
     let mut scene = square();
     scene["buffers"][0].as_object_mut().unwrap().remove("uri");
-    fs::write(folder.path().join("scene.glb"), binary_file(&scene, &square_buffer(), &[])).unwrap();
-    fs::write(folder.path().join("points.txt"), "# two points of the floor\n0 0.01 0 0 1 0\n1 0.01 1 0 1 0\n").unwrap();
-    folder
+    place.write("scene.glb", binary_file(&scene, &square_buffer(), &[]));
+    place.write("points.txt", "# two points of the floor\n0 0.01 0 0 1 0\n1 0.01 1 0 1 0\n");
+    place
 }
 
 #[test]
@@ -225,8 +214,9 @@ fn all_commands_of_readme_and_guide_run() {
 
 fn run_commands(all: bool) {
     let Some(_) = device() else { return };
-    let folder = folder_with_inputs();
+    let place = place_with_inputs();
     let texts: Vec<(String, Vec<String>)> = all_texts().into_iter().map(|(path, text)| (path, commands(&text))).collect();
+    let parsed_only = || PARSED.iter().chain(LONG.iter().filter(move |_| !all));
     let (mut seen, mut done, mut kinds) = (BTreeSet::new(), BTreeSet::new(), BTreeSet::new());
     for (path, commands) in &texts {
         // What stands in several texts is the same command.
@@ -235,43 +225,38 @@ fn run_commands(all: bool) {
             if let Some((start, why)) = NOT_RUN.iter().find(starts) {
                 println!("{path}: {command}: not run, {why}");
                 seen.insert(*start);
-            } else if let Some((start, why)) = PARSED.iter().find(starts) {
+            } else if let Some((start, why)) = parsed_only().find(starts) {
                 println!("{path}: {command}: parsed only, {why}");
                 seen.insert(*start);
-                assert_holds(path, parse(folder.path(), command));
-            } else if let Some((start, why)) = LONG.iter().find(|listed| !all && starts(listed)) {
-                println!("{path}: {command}: parsed only, {why}");
-                seen.insert(*start);
-                assert_holds(path, parse(folder.path(), command));
+                assert_holds(path, parse(&place, command));
             } else if kinds.insert(kind(command)) {
                 let began = Instant::now();
-                assert_holds(path, run(folder.path(), command));
+                assert_holds(path, run(&place, command));
                 println!("{path}: {command}: {:.2} s", began.elapsed().as_secs_f64());
             } else {
                 println!("{path}: {command}: parsed only, one that differs in values was run");
-                assert_holds(path, parse(folder.path(), command));
+                assert_holds(path, parse(&place, command));
             }
         }
     }
-    let of_short = LONG.iter().filter(|_| !all);
-    let listed: BTreeSet<&str> = NOT_RUN.iter().chain(&PARSED).chain(of_short).map(|(start, _)| *start).collect();
+    let listed: BTreeSet<&str> = NOT_RUN.iter().chain(parsed_only()).map(|(start, _)| *start).collect();
     assert_eq!(listed, seen, "what is listed as not run stands in no text");
 }
 
 #[test]
 fn commands_that_are_wrong_are_noticed() {
-    let folder = folder_with_inputs();
+    let place = place_with_inputs();
     let text = "```sh\nphotonmill a  # one\n\nphotonmill b --c\n```\n```text\nphotonmill no\n```\n";
     assert_eq!(commands(text), ["photonmill a", "photonmill b --c"]);
-    assert_complains("another program", run(folder.path(), "photonhill render scene.glb -o a.exr"));
-    assert_complains("a shell's syntax", run(folder.path(), "photonmill devices | head"));
-    assert_complains("no such option", run(folder.path(), "photonmill render cornell -o a.exr --no-such-option"));
-    assert_complains("no such file", run(folder.path(), "photonmill plan absent.glb"));
-    assert_complains("a file that is not written", run(folder.path(), "photonmill --version -o absent.png"));
-    assert_holds("options that are known", parse(folder.path(), "photonmill render cornell -o a.exr"));
-    assert_complains("no such option, parsed", parse(folder.path(), "photonmill render cornell -o a.exr --no-such-option"));
-    assert_complains("no such value, parsed", parse(folder.path(), "photonmill render cornell -o a.exr --rounds some"));
-    assert_complains("what excludes each other, parsed", parse(folder.path(), "photonmill render a.glb -o a.exr --photons 5 --map a.pm"));
+    assert_complains("another program", run(&place, "photonhill render scene.glb -o a.exr"));
+    assert_complains("a shell's syntax", run(&place, "photonmill devices | head"));
+    assert_complains("no such option", run(&place, "photonmill render cornell -o a.exr --no-such-option"));
+    assert_complains("no such file", run(&place, "photonmill plan absent.glb"));
+    assert_complains("a file that is not written", run(&place, "photonmill --version -o absent.png"));
+    assert_holds("options that are known", parse(&place, "photonmill render cornell -o a.exr"));
+    assert_complains("no such option, parsed", parse(&place, "photonmill render cornell -o a.exr --no-such-option"));
+    assert_complains("no such value, parsed", parse(&place, "photonmill render cornell -o a.exr --rounds some"));
+    assert_complains("what excludes each other, parsed", parse(&place, "photonmill render a.glb -o a.exr --photons 5 --map a.pm"));
     let is_alike = |a: &str, b: &str| kind(a) == kind(b);
     let first = "photonmill render cornell --rounds 4 -o a.exr";
     assert!(is_alike(first, "photonmill render cornell-spheres --rounds 8 -o a.exr"));
@@ -298,11 +283,7 @@ fn options(text: &str) -> BTreeSet<String> {
 fn options_of_readme_and_guide_exist() {
     let names =
         ["", "render", "repeat", "bake", "probe", "merge", "plan", "info", "compare", "devices", "selfcheck", "study", "bench", "paper"];
-    let help = |name: &str| {
-        let output = Place::new().run(&format!("{name} --help"));
-        assert!(output.status.success(), "{name}");
-        text(&output.stdout)
-    };
+    let help = |name: &str| Place::new().said(&format!("{name} --help")).0;
     let known = options(&names.map(help).concat());
     assert!(known.len() > 60 && known.contains("--final-gather"), "{known:?}");
     for (path, text) in all_texts() {

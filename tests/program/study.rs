@@ -42,21 +42,20 @@ fn run(gpu: &Gpu, folder: &Path, request: Request, end: &str) -> photonmill::err
     Ok(study)
 }
 
+static UNCANCELLED: AtomicBool = AtomicBool::new(false);
 /// What no study says.
 const NEVER: &str = "never";
 
 /// What a study measures of a scene, without measuring it.
 fn subject(gpu: &Gpu, request: &Request) -> Subject {
-    let never = AtomicBool::new(false);
-    Subject::all(gpu, &scene(&request.scene), request, &never, &mut |_| {}).unwrap().remove(0)
+    Subject::all(gpu, &scene(&request.scene), request, &UNCANCELLED, &mut |_| {}).unwrap().remove(0)
 }
 
 /// A point of one choice among all.
 fn point_of(gpu: &Gpu, subject: &Subject, request: &Request, label: &str) -> Point {
-    let never = AtomicBool::new(false);
     let mut choices = subject.groups.iter().flat_map(|group| &group.configurations);
     let choice: &Configuration = choices.find(|choice| choice.label.starts_with(label)).unwrap_or_else(|| panic!("no {label}"));
-    let run = |k: u32| subject.run(gpu, choice, request.most_rounds, request.seed + u64::from(k), &never).unwrap();
+    let run = |k: u32| subject.run(gpu, choice, request.most_rounds, request.seed + u64::from(k), &UNCANCELLED).unwrap();
     let shots: Vec<_> = (0..request.repeats).map(|k| (run(k), Duration::ZERO)).collect();
     Point::of(&shots, &subject.reference, subject.command(choice, request.most_rounds, request.seed), request.most_rounds)
 }
@@ -149,10 +148,8 @@ fn study_the_open_box(end: &str) -> Option<(Study, String)> {
     let request = || request("open-box", 4);
     let first = run(&gpu, folder.path(), request(), end).unwrap();
     let axes: Vec<Axis> = first.parts.iter().flat_map(|part| part.comparisons.iter().map(|comparison| comparison.axis)).collect();
-    for axis in [Axis::Builder, Axis::Photons, Axis::Radius, Axis::Nearest, Axis::Edges, Axis::Bounces, Axis::Randomness] {
-        assert!(axes.contains(&axis), "{axis:?} of {axes:?}");
-    }
-    for axis in [Axis::Sums, Axis::Arithmetic, Axis::Index, Axis::Paper] {
+    let of_light = [Axis::Builder, Axis::Photons, Axis::Radius, Axis::Nearest, Axis::Edges, Axis::Bounces, Axis::Randomness];
+    for axis in of_light.into_iter().chain([Axis::Sums, Axis::Arithmetic, Axis::Index, Axis::Paper]) {
         assert!(axes.contains(&axis), "{axis:?} of {axes:?}");
     }
     for part in first.parts.iter().filter(|part| !part.comparisons.is_empty()) {
@@ -220,7 +217,7 @@ fn study_a_picture(scene: &str, end: &str) -> Option<(Study, String)> {
     let mut study = run(&gpu, folder.path(), request(), end).unwrap();
     let subject = subject(&gpu, &request());
     if study.parts[0].strip.is_none() {
-        study.parts[0].strip = strip(&gpu, &subject, &study.parts[0], &request(), &AtomicBool::new(false)).unwrap();
+        study.parts[0].strip = strip(&gpu, &subject, &study.parts[0], &request(), &UNCANCELLED).unwrap();
         study::write(&Folder::open("-o", folder.path()).unwrap(), &study).unwrap();
     }
     let part = &study.parts[0];

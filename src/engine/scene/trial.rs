@@ -249,11 +249,9 @@ mod tests {
         let planes = [Vec4::new(0.0, 0.0, 1.0, 0.0), Vec4::new(0.0, 0.0, 1.0, -0.001)];
         let side = 256;
         let place = |i: usize| (i as f32 + 0.5) / side as f32 - 0.5;
-        let photon = |i: usize, plane: u32, height: f32| MapPhoton {
-            position: Vec3::new(place(i % side), place(i / side), height),
-            plane,
-            flux: Vec3::ONE,
-            wi: 0,
+        let photon = |i: usize, plane: u32, height: f32| {
+            let position = Vec3::new(place(i % side), place(i / side), height);
+            MapPhoton { position, plane, flux: Vec3::ONE, wi: 0 }
         };
         let photons: Vec<MapPhoton> = (0..side * side).flat_map(|i| [photon(i, 0, 0.0), photon(i, 2, 0.001)]).collect();
         let point = VisiblePoint { position: Vec3::ZERO, plane: 0, ..bytemuck::Zeroable::zeroed() };

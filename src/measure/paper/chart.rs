@@ -85,25 +85,3 @@ fn draw_running_times(rows: &[Row]) -> String {
         Ok(())
     })
 }
-
-#[cfg(test)]
-mod tests {
-    use super::super::sample;
-    use super::*;
-
-    #[test]
-    fn charts_name_their_series_and_no_address() {
-        let found = sample::reproduction();
-        let drawn = totals(&found).unwrap().wide + &running_times(&found).unwrap().wide;
-        assert!(drawn.contains("here, brute force") && drawn.contains("map: naive"));
-        assert!(!drawn.contains("http"));
-    }
-
-    #[test]
-    fn nothing_measured_is_no_chart() {
-        let mut found = sample::reproduction();
-        found.totals.clear();
-        found.running_times.clear();
-        assert!(totals(&found).is_none() && running_times(&found).is_none());
-    }
-}

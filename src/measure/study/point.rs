@@ -266,7 +266,8 @@ impl Curve {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::rng::philox;
+    use crate::measure::interval::Interval;
+    use crate::measure::interval::tests::{coverage, normal};
 
     /// Runs whose squared error is `noise`^2 / rounds plus that of a bias, all but equal.
     pub fn curve(noise: f64, bias: f64, ms_a_round: f64) -> Curve {
@@ -314,18 +315,11 @@ pub(super) mod tests {
     /// in all carries the noise.
     #[test]
     fn intervals_cover() {
-        let normal = |run: u32, draw: u32| {
-            let uniform = philox([run, draw, 0, 0], [5, 9]).map(|word| (f64::from(word) + 0.5) / 4_294_967_296.0);
-            (-2.0 * uniform[0].ln()).sqrt() * (std::f64::consts::TAU * uniform[1]).cos()
-        };
-        const TRIALS: u32 = 4000;
-        let share_held = |truth: f64, estimate: &dyn Fn(u32) -> Estimate| {
-            let holds = |trial: &u32| (estimate(*trial).low..=estimate(*trial).high).contains(&truth);
-            (0..TRIALS).filter(holds).count() as f64 / f64::from(TRIALS)
-        };
+        let normal = |trial: u32, draw: u32| normal([5, 9], trial, draw);
+        let interval = |Estimate { value, low, high }: Estimate| Interval { value, low, high };
         for runs in [2, 3, 5] {
             let values = |trial: u32| (0..runs).map(|draw| 7.0 + normal(trial, draw)).collect::<Vec<_>>();
-            let held = share_held(7.0, &|trial| Estimate::of_mean(&values(trial)));
+            let held = coverage(7.0, |trial| interval(Estimate::of_mean(&values(trial))));
             // Three standard errors of a share of 0.95.
             assert!((held - CONFIDENCE).abs() < 0.0104, "{runs} runs: {held}");
         }
@@ -333,7 +327,7 @@ pub(super) mod tests {
         for (pixels, runs) in [(1, 3), (1, 5), (2, 3), (2, 5), (5, 3), (5, 5), (40, 5)] {
             let square =
                 |trial: u32, run: u32| (0..pixels).map(|pixel| normal(trial, 64 * run + pixel).powi(2)).sum::<f64>() / f64::from(pixels);
-            let held = share_held(1.0, &|trial| Estimate::of_squares(&(0..runs).map(|run| square(trial, run)).collect::<Vec<_>>()));
+            let held = coverage(1.0, |trial| interval(Estimate::of_squares(&(0..runs).map(|run| square(trial, run)).collect::<Vec<_>>())));
             assert!(held > 0.87, "{pixels} pixels, {runs} runs: {held}");
         }
     }

@@ -343,6 +343,10 @@ mod tests {
         assert_eq!(choices(&[1.0]), [CHOICES]);
     }
 
+    fn texture(width: u32, height: u32, texels: Vec<Vec3>) -> Texture {
+        Texture { name: "t".into(), width, height, texels: texels.into(), wrap: [Wrap::Repeat; 2], filter: Default::default() }
+    }
+
     /// A strip of so many triangles that shines by a texture.
     fn textured_lamp(triangles: u32, texture: Texture) -> Scene {
         let mut lamp = Mesh { name: "lamp".into(), ..Mesh::default() };
@@ -361,15 +365,7 @@ mod tests {
     /// A texture is summed once and not for every triangle.
     #[test]
     fn many_triangles_shine_by_a_large_texture() {
-        let texture = Texture {
-            name: "t".into(),
-            width: 2048,
-            height: 2048,
-            texels: vec![Vec3::splat(0.25); 1 << 22].into(),
-            wrap: [Wrap::Repeat; 2],
-            filter: Default::default(),
-        };
-        let scene = textured_lamp(6036, texture);
+        let scene = textured_lamp(6036, texture(2048, 2048, vec![Vec3::splat(0.25); 1 << 22]));
         let (geometry, summed) = work::of(|| Geometry::new(&scene).unwrap());
         assert_eq!(geometry.emitters.len(), 6036);
         let watts = geometry.power * geometry.unit * geometry.unit;
@@ -380,15 +376,8 @@ mod tests {
     /// No sample of a texture exceeds what photons' fluxes are scaled by.
     #[test]
     fn no_sample_is_brighter_than_the_brightest() {
-        let texels: Vec<Vec3> = (0..70_000u32).map(|k| Vec3::new(0.1, 0.2 + 0.7 * (k % 997) as f32 / 997.0, 0.3)).collect();
-        let texture = Texture {
-            name: "t".into(),
-            width: 700,
-            height: 100,
-            texels: texels.clone().into(),
-            wrap: [Wrap::Repeat; 2],
-            filter: Default::default(),
-        };
+        let texel = |k: u32| Vec3::new(0.1, 0.2 + 0.7 * (k % 997) as f32 / 997.0, 0.3);
+        let texture = texture(700, 100, (0..70_000).map(texel).collect());
         let summary = Shining::new(&texture).all;
         let texels = || (0..70_000).map(|place| texture.texels.at(place).truncate().as_dvec3());
         let brightest = texels().map(|texel| texel.y).fold(0.0, f64::max);
@@ -402,15 +391,7 @@ mod tests {
     /// Photons that choose lights otherwise carry the same flux together, and none carries more than 1.
     #[test]
     fn other_shares_leave_the_flux() {
-        let texture = Texture {
-            name: "t".into(),
-            width: 2,
-            height: 2,
-            texels: vec![Vec3::ONE; 4].into(),
-            wrap: [Wrap::Repeat; 2],
-            filter: Default::default(),
-        };
-        let geometry = Geometry::new(&textured_lamp(5, texture)).unwrap();
+        let geometry = Geometry::new(&textured_lamp(5, texture(2, 2, vec![Vec3::ONE; 4]))).unwrap();
         let (emitters, scale) = geometry.emitters_by(&[0.5, 0.25, 0.125, 0.125 - 1e-12, 1e-12]);
         assert!(emitters[0].probability > 0.49 && emitters[4].probability < 1e-6 && emitters[4].cumulative == 1.0);
         for (old, new) in geometry.emitters.iter().zip(&emitters) {

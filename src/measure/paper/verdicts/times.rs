@@ -316,43 +316,26 @@ mod tests {
         found
     }
 
-    fn standing_of_append(found: &Reproduction) -> Standing {
-        append(found).unwrap().standing.unwrap()
-    }
-
     #[test]
     fn the_append_is_judged_by_the_interval_of_its_ratio() {
-        let quiet = 0.01;
-        for (atomic, standing) in [(2.0, Standing::Holds), (1.05, Standing::NoLonger), (0.5, Standing::NoLonger)] {
-            let verdict = append(&with_map_ms(1.0, atomic, 1.0, quiet)).unwrap();
+        use Standing::{Holds, HoldsInPart, NoLonger, Undecided};
+        // The same ratios are not decided by runs that differ more.
+        let cases = [(2.0, 0.01, Holds), (1.2, 0.01, Holds), (1.05, 0.01, NoLonger), (0.5, 0.01, NoLonger)];
+        for (atomic, noise, standing) in cases.into_iter().chain([(1.2, 0.1, Undecided), (1.05, 0.1, Undecided), (2.0, 0.4, Undecided)]) {
+            let verdict = append(&with_map_ms(1.0, atomic, 1.0, noise)).unwrap();
             assert_eq!(verdict.standing, Some(standing), "{verdict:?}");
             let Evidence { interval, .. } = &verdict.evidence[0];
             assert!((interval.value / atomic - 1.0).abs() < 1e-9 && interval.low < atomic && interval.high > atomic, "{interval:?}");
             assert!(verdict.here.contains(" to ") && verdict.then.contains(&times(11.0 / 1.7)), "{verdict:?}");
         }
-        let mixed = with_another_size(with_map_ms(1.0, 2.0, 1.0, quiet), Builder::Atomic, runs(1.0, quiet));
-        assert_eq!(standing_of_append(&mixed), Standing::HoldsInPart);
-    }
-
-    /// The same ratios as above, of runs that differ more.
-    #[test]
-    fn noise_leaves_a_difference_undecided() {
-        for (atomic, noise) in [(1.2, 0.1), (1.05, 0.1), (2.0, 0.4)] {
-            assert_eq!(standing_of_append(&with_map_ms(1.0, atomic, 1.0, noise)), Standing::Undecided, "{atomic}");
-            assert_ne!(standing_of_append(&with_map_ms(1.0, atomic, 1.0, 0.01)), Standing::Undecided, "{atomic}");
+        // One size of four is as fast, or noisy.
+        for (runs, standing) in [(runs(1.0, 0.01), HoldsInPart), (runs(2.0, 0.4), Undecided)] {
+            let other = with_another_size(with_map_ms(1.0, 2.0, 1.0, 0.01), Builder::Atomic, runs);
+            assert_eq!(append(&other).unwrap().standing, Some(standing));
         }
-        // One size of four is noisy.
-        let noisy = with_another_size(with_map_ms(1.0, 2.0, 1.0, 0.01), Builder::Atomic, runs(2.0, 0.4));
-        assert_eq!(standing_of_append(&noisy), Standing::Undecided);
-    }
-
-    #[test]
-    fn two_runs_are_too_few() {
-        let mut found = with_map_ms(1.0, 5.0, 1.0, 0.01);
-        for time in &mut found.running_times {
-            time.runs_ms.truncate(2);
-        }
-        assert_eq!(standing_of_append(&found), Standing::Undecided);
+        let mut two_runs = with_map_ms(1.0, 5.0, 1.0, 0.01);
+        two_runs.running_times.iter_mut().for_each(|time| time.runs_ms.truncate(2));
+        assert_eq!(append(&two_runs).unwrap().standing, Some(Undecided));
     }
 
     #[test]
