@@ -36,8 +36,9 @@ fn balls_in_a_row(light: LightKind) -> Scene {
     scene
 }
 
-/// By name.
-pub const SCENES: [(&str, fn() -> Scene); 11] = [
+type Named = (&'static str, fn() -> Scene);
+
+pub const SCENES: [Named; 11] = [
     ("point", || bench(vec![bulb(DVec3::new(0.5, 1.4, 0.2))])),
     ("spot", || {
         // Its falloff crosses the ball.

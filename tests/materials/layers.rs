@@ -195,8 +195,10 @@ fn cameras() -> [Camera; 2] {
     ]
 }
 
+type Lacking = (&'static str, fn(&mut Layers));
+
 /// Effects whose absence the picture from before the stage shows; plates show those of a coat and of a stretch.
-const LACKING: [(&str, fn(&mut Layers)); 5] = [
+const LACKING: [Lacking; 5] = [
     ("no coat and no sheen", |layers| (layers.coat, layers.sheen_colour) = (0.0, Vec3::ZERO)),
     ("no sheen", |layers| layers.sheen_colour = Vec3::ZERO),
     ("no films", |layers| layers.iridescence = 0.0),
