@@ -212,7 +212,7 @@ impl Disagreement {
     }
 }
 
-/// And with itself, in chunks. (What threads do, `tests/engine/cpu.rs` asks.)
+/// And with itself, in chunks.
 #[test]
 fn the_cpu_builder_agrees_photon_by_photon() {
     let gpu = device();
@@ -229,6 +229,23 @@ fn the_cpu_builder_agrees_photon_by_photon() {
         let [distance, weight] = [&disagreement.distances, &disagreement.weights].map(|sorted| sorted.last().unwrap());
         println!("{rng:?}, {emission:?}: {} flipped, distance up to {distance:e}, weights up to {weight:e}", disagreement.flipped);
         assert_holds(format!("{rng:?}, {emission:?}"), disagreement.check(settings.photons));
+    }
+}
+
+#[test]
+fn threads_change_no_photon_of_the_cpu_builder() {
+    for photons in [2, 3, 511, 512, 513, 5001] {
+        for rng in GENERATORS {
+            let settings = RoomSettings { photons, rng, ..RoomSettings::default() };
+            let expected = photons_on_cpu(&settings);
+            assert_holds("one thread", each_once(&expected, photons, settings.bounces));
+            for threads in [2, 3, 8] {
+                let found = photons_on_cpu(&RoomSettings { threads, ..settings.clone() });
+                assert_holds(format!("{rng:?}, {photons} photons, {threads} threads"), same_photons(&found, &expected));
+            }
+            let found = photons_on_cpu(&RoomSettings { chunk: Some(64), threads: 3, ..settings.clone() });
+            assert_holds(format!("{rng:?}, {photons} photons in chunks"), same_photons(&found, &expected));
+        }
     }
 }
 

@@ -441,6 +441,47 @@ fn sobol_scrambles_are_uniform_and_independent() {
     assert_complains("a scramble that only mirrors", pairs(&draws, 0, &mirrored, 0));
 }
 
+/// Mean of a function with kinks and products over the first `count` of some points.
+fn mean_of(count: u32, draws: impl Fn(u32) -> Vec<f32>) -> f64 {
+    let value = |u: Vec<f32>| f64::from(u[0] * u[1] * u[4]) + f64::from(u[2]).sqrt() + f64::from(u8::from(u[4] + u[5] < 0.5));
+    (0..count).map(|sample| value(draws(sample))).sum::<f64>() / f64::from(count)
+}
+
+/// Estimates from any number of points are right on the mean over seeds, and far closer than chance.
+fn sobol_estimates_are_closer_than_chance(cases: &[(u32, f64)]) {
+    let expected = 0.125 + 2.0 / 3.0 + 0.125;
+    let by_seed = |count, draws: &dyn Fn(u64, u32) -> Vec<f32>| -> (f64, f64) {
+        let means: Vec<f64> = (0..2000).map(|seed| mean_of(count, |sample| draws(seed, sample))).collect();
+        let mean = means.iter().sum::<f64>() / 2000.0;
+        (mean, (means.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / 1999.0).sqrt())
+    };
+    let philox = RoomSettings { rng: Rng::Philox, ..RoomSettings::default() };
+    for &(count, gain) in cases {
+        let (mean, deviation) = by_seed(count, &|seed, sample| sobol_draws(seed, 0, sample, 1));
+        assert_holds(format!("{count} points"), z_check("mean", mean, expected, deviation / 2000f64.sqrt()));
+        let chance = by_seed(count, &|seed, sample| draws_of(Streams { seed, ..streams_of(&philox) }, 0, sample, 1)).1;
+        println!("{count} points: standard deviation {deviation:.2e}, by chance {chance:.2e}, {:.1} times", chance / deviation);
+        assert!(chance > gain * deviation, "{count} points: {deviation} against {chance} by chance");
+        let plain = |sample: u32| {
+            let point = sobol_point(sample).map(|word| (word >> 8) as f32 / 16_777_216.0);
+            [point, point].concat()
+        };
+        let unscrambled = mean_of(count, plain);
+        assert_complains("points without scrambling", z_check("mean", unscrambled, expected, deviation / 2000f64.sqrt()));
+    }
+}
+
+#[test]
+fn sobol_estimates_are_unbiased_and_closer_than_chance() {
+    sobol_estimates_are_closer_than_chance(&[(1, 0.9), (13, 1.3), (200, 2.5)]);
+}
+
+#[test]
+#[ignore = "long: a power of two of points, too"]
+fn sobol_estimates_of_whole_nets_are_unbiased_and_closer_than_chance() {
+    sobol_estimates_are_closer_than_chance(&[(256, 2.5)]);
+}
+
 /// Photons of real runs of the open box: with Sobol' points as many on the mean meet a wall at first and are stored at each
 /// bounce, and at first their number differs far less from seed to seed.
 #[test]
