@@ -1,4 +1,5 @@
-//! Everything that can go wrong, each as one sentence: what, which value, what is allowed.
+//! Everything that can go wrong, each as one sentence: what, which value, what is allowed. A field of a request stands in backticks, as in
+//! "use a smaller `radius`".
 
 use std::fmt::Display;
 use std::ops::RangeInclusive;
@@ -21,16 +22,16 @@ pub type Result<T> = std::result::Result<T, Error>;
 
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// An option's value is not allowed.
-    #[error("{option} {}: {allowed}", echo(value))]
+    /// The value of a request's field, or of a command's option, is not allowed.
+    #[error("{} {}: {allowed}", named(option), echo(value))]
     Setting { option: &'static str, value: String, allowed: String },
 
     /// A file or folder that an option names cannot be written.
-    #[error("{option} {}: cannot be written ({reason}); choose a place that can be written", echo(path.display()))]
+    #[error("{} {}: cannot be written ({reason}); choose a place that can be written", named(option), echo(path.display()))]
     Output { option: &'static str, path: PathBuf, reason: String },
 
     /// The same after a run, whose results went somewhere else.
-    #[error("{option} {}: cannot be written ({reason}); everything is saved in {} instead", echo(path.display()), folder.display())]
+    #[error("{} {}: cannot be written ({reason}); everything is saved in {} instead", named(option), echo(path.display()), folder.display())]
     Saved { option: &'static str, path: PathBuf, reason: String, folder: PathBuf },
 
     /// A scene file, or something in it, cannot be used.
@@ -118,6 +119,11 @@ pub enum Error {
     /// The validation layer reported errors.
     #[error("--validate: {} from the validation layer, the first: {first}", counted(count, "message"))]
     Validation { count: usize, first: String },
+}
+
+/// A field in backticks, for whoever writes it in another way; all other names as they are: `-o`, `FILE`.
+fn named(option: &str) -> String {
+    if option.starts_with(|letter: char| letter.is_ascii_lowercase()) { format!("`{option}`") } else { option.to_owned() }
 }
 
 impl Error {

@@ -14,6 +14,7 @@ use crate::gpu::Gpu;
 use crate::measure::bench::experiment::Experiment;
 use crate::measure::bench::{self, Request, Size, table};
 use crate::output::destination::{Destination, Folder, check_distinct, write_all};
+use crate::render::Seconds;
 use crate::scene::{Scene, built_in};
 
 #[derive(Args)]
@@ -25,7 +26,7 @@ pub(super) struct BenchArgs {
     json: JsonArg,
     /// Start no further experiment after this time: 90s, 10m
     #[arg(long, value_name = "TIME", value_parser = parse_seconds, allow_hyphen_values = true, default_value = "10m", help_heading = "When to stop")]
-    time: f64,
+    time: Seconds,
     /// Run only these experiments, separated by commas: open-box, builders, table-1, index, gather, cornell,
     /// cornell-spheres, caustic-sphere, mesh, effects, compaction, tuning [default: all but tuning, which takes minutes a scene]
     #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = parse_experiment, help_heading = "Measurements")]
@@ -62,7 +63,7 @@ fn parse_experiment(name: &str) -> std::result::Result<Experiment, String> {
 }
 
 pub(super) fn run(args: &BenchArgs, cancelled: &AtomicBool) -> Result<End> {
-    require((1.0..=1e6).contains(&args.time), "--time", args.time, "must be from 1s to 1000000s")?;
+    require((1.0..=1e6).contains(&args.time.0), "--time", args.time, "must be from 1s to 1000000s")?;
     let json = optional_file("--json", args.json.json.as_ref())?;
     let folder = args.output.as_ref().map(|path| Folder::open("-o", path)).transpose()?;
     let in_folder = folder.iter().map(|folder| folder.file("bench.json"));
@@ -91,11 +92,11 @@ pub(super) fn run(args: &BenchArgs, cancelled: &AtomicBool) -> Result<End> {
         experiments: if args.only.is_empty() { Experiment::USUAL.to_vec() } else { args.only.clone() },
         scenes,
         scale: args.scale,
-        budget: Duration::from_secs_f64(args.time),
+        budget: Duration::from_secs_f64(args.time.0),
     };
     let names: Vec<&str> = request.experiments.iter().map(|experiment| experiment.name()).collect();
     let what = if args.scale { "time and memory against photons and triangles".to_owned() } else { names.join(", ") };
-    reporter.note(&format!("plan: {what}; starts no experiment after {} s", args.time));
+    reporter.note(&format!("plan: {what}; starts no experiment after {} s", args.time.0));
     let found = bench::run(&gpu, request, cancelled, &mut |line| reporter.step(line))?;
     reporter.finish();
     let to_stdout = json.iter().any(Destination::is_standard_output).then(|| json.clone()).flatten();

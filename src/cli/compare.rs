@@ -10,6 +10,7 @@ use super::{JsonOrStdoutArg, complain, optional_file, say_beside};
 use crate::error::{Error, Result, require, within};
 use crate::output::destination::{Destination, check_distinct, check_not_read, write_all};
 use crate::output::exr_file;
+use crate::render::Percent;
 use crate::verify::compare::Comparison;
 use crate::verify::compare::false_colour::Show;
 use crate::verify::compare::pair::Pair;
@@ -45,7 +46,7 @@ pub(super) struct CompareArgs {
     error_blocks: Option<u32>,
     /// End with exit code 1 if the RMSE is above so many per cent of the reference's mean
     #[arg(long, value_name = "PERCENT", value_parser = parse_percent, allow_hyphen_values = true, help_heading = "Checks")]
-    fail_above: Option<f64>,
+    fail_above: Option<Percent>,
     #[command(flatten)]
     progress: ProgressArgs,
 }
@@ -65,7 +66,7 @@ const MAX_BLOCKS: u32 = 1 << 20;
 const ERRORS: [&str; 2] = ["--errors-a", "--errors-b"];
 
 pub(super) fn run(args: &CompareArgs) -> Result<()> {
-    if let Some(allowed) = args.fail_above {
+    if let Some(allowed) = args.fail_above.map(Percent::share) {
         require(allowed >= 0.0 && allowed.is_finite(), "--fail-above", allowed, "must be 0 % or more, and finite")?;
     }
     let show = args.show.map_or(Show::default(), Show::from);
@@ -110,7 +111,7 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
     }
     say_beside(&files, &text)?;
     written?;
-    match args.fail_above.filter(|allowed| comparison.deviation.is_above(*allowed)) {
+    match args.fail_above.map(Percent::share).filter(|allowed| comparison.deviation.is_above(*allowed)) {
         Some(allowed) => {
             let found = comparison.deviation.relative_rmse();
             Err(Error::PictureAbove { allowed: percent(allowed), path: args.a.clone(), found })

@@ -12,6 +12,7 @@ use crate::error::{Result, require, within};
 use crate::gpu::Gpu;
 use crate::measure::gallery::{self, Request};
 use crate::output::destination::Folder;
+use crate::render::{Percent, Seconds};
 use crate::scene::picture_size::MAX_SIDE;
 
 #[derive(Args)]
@@ -24,10 +25,10 @@ pub(super) struct GalleryArgs {
     size: Option<u32>,
     /// End each picture at this error [default: 1%; 5% on a CPU]
     #[arg(long, value_name = "ERROR", value_parser = parse_percent, allow_hyphen_values = true, help_heading = "When to stop")]
-    error: Option<f64>,
+    error: Option<Percent>,
     /// End each picture after this time, if the error is not reached before [default: 5s; 30s on a CPU]
     #[arg(long, value_name = "TIME", value_parser = parse_seconds, allow_hyphen_values = true, help_heading = "When to stop")]
-    time: Option<f64>,
+    time: Option<Seconds>,
     #[command(flatten)]
     progress: ProgressArgs,
     #[command(flatten)]
@@ -44,8 +45,8 @@ pub(super) fn run(args: &GalleryArgs, cancelled: &AtomicBool) -> Result<End> {
     drop(gpu);
     let request = Request {
         width: args.size.unwrap_or(if is_cpu { 160 } else { 640 }),
-        error: 100.0 * args.error.unwrap_or(if is_cpu { 0.05 } else { 0.01 }),
-        seconds: args.time.unwrap_or(if is_cpu { 30.0 } else { 5.0 }),
+        error: 100.0 * args.error.map_or(if is_cpu { 0.05 } else { 0.01 }, Percent::share),
+        seconds: args.time.map_or(if is_cpu { 30.0 } else { 5.0 }, |Seconds(seconds)| seconds),
         device: device_arguments(&args.device),
     };
     within("--size", u64::from(request.width), 1..=u64::from(MAX_SIDE), "pixels")?;

@@ -8,11 +8,12 @@ use glam::Vec3;
 use serde::Serialize;
 
 use super::progress::{ProgressArgs, ProgressReporter};
-use super::scene::stages;
 use super::values::parse_number;
 use super::{JsonOrStdoutArg, help, optional_file, say};
 use crate::error::Result;
 use crate::output::destination::write_all;
+use crate::render::scene::stages;
+use crate::render::{Event, Observer};
 use crate::scene::light::LightKind;
 use crate::scene::material::{Coverage, Layers, Material, Medium, NormalMap, Surface, TextureUse, UvTransform};
 use crate::scene::texture::{Filter, Texels, Texture, Wrap};
@@ -79,7 +80,10 @@ struct LightEntry {
 pub(super) fn run(args: &InfoArgs) -> Result<()> {
     let json = optional_file("--json", args.json.json.as_ref())?;
     let reporter = ProgressReporter::new(&args.progress);
-    let scene = Scene::open_with(&args.scene, Reading { at: args.at, ..Reading::default() }, &mut stages(&args.scene, &reporter))?;
+    let tell = |event: Event| reporter.event(event);
+    let observer = Observer { tell: &tell, ..Observer::default() };
+    let reading = Reading { at: args.at, ..Reading::default() };
+    let scene = Scene::open_with(&args.scene, reading, &mut stages(&args.scene, &observer))?;
     reporter.finish();
     let contents = Contents::of(&scene);
     if let Some(json) = json {

@@ -16,12 +16,17 @@ static SIGNAL: AtomicI32 = AtomicI32::new(0);
 /// Ctrl-C.
 const SIGINT: i32 = 2;
 
+/// Says whether what is under way looks at the flag from now on.
+pub(super) fn set_interruptible(is_so: bool) {
+    HAS_BEGUN.fetch_or(is_so, Ordering::Relaxed);
+    IS_INTERRUPTIBLE.store(is_so, Ordering::Relaxed);
+}
+
 /// Runs `body`, which ends early once the flag is set.
 pub(super) fn interruptible<T>(body: impl FnOnce() -> T) -> T {
-    HAS_BEGUN.store(true, Ordering::Relaxed);
-    IS_INTERRUPTIBLE.store(true, Ordering::Relaxed);
+    set_interruptible(true);
     let result = body();
-    IS_INTERRUPTIBLE.store(false, Ordering::Relaxed);
+    set_interruptible(false);
     result
 }
 

@@ -5,28 +5,17 @@ use std::sync::atomic::AtomicBool;
 
 use clap::{ArgMatches, Args, Command, FromArgMatches, Subcommand};
 
-use super::camera::{named, resolve};
-use super::interrupt::interruptible;
-use super::options::{CommonArgs, TimedDeviceArgs};
+use super::options::TimedDeviceArgs;
 use super::progress::{ProgressArgs, ProgressReporter};
-use super::scene::{PhotonArgs, SceneArgs, geometry, settings};
+use super::request::{MAP, RequestArgs};
 use super::values::{parse_integer, value_enum};
-use super::{End, JsonOrStdoutArg, complain, device_failed, optional_file, say};
-use crate::engine;
-use crate::engine::Control;
-use crate::engine::retry::until_done;
-use crate::engine::scene::fill_map::{Filled, fill};
-use crate::engine::scene::map_file::{MapFile, MapWriter};
-use crate::engine::scene::{View, trial};
-use crate::engine::watch::Keep;
+use super::{End, JsonOrStdoutArg, optional_file, say, spell};
+use crate::engine::scene::map_file::MapFile;
 use crate::error::{Error, Result, require};
-use crate::gpu::Gpu;
 use crate::output::destination::{Destination, check_not_read, write_all};
 use crate::output::photon_map;
-use crate::plan::scene::ScenePlan;
-use crate::plan::sensor::Sensor;
-use crate::settings::scene::SceneSettings;
-use crate::settings::stop::LEAST_BLOCKS;
+use crate::render::map::{USUAL_ROUNDS, WrittenMap};
+use crate::render::{Event, Inputs, Observer, Receivers, RenderRequest, prepare};
 use crate::text::counted;
 
 /// A file is made of a scene, or another command given.
@@ -74,19 +63,15 @@ pub(super) struct MakeArgs {
     /// File of photons, for `--map` of render, bake and probe
     #[arg(short, long, alias = "out", value_name = "FILE", required = true, help_heading = "Output")]
     output: PathBuf,
-    #[command(flatten)]
-    scene: SceneArgs,
     /// Camera for whose picture photons choose among lamps and openings; pictures of other cameras are right too, with more noise
     /// [default: the first one; one that sees the whole scene if it has none]
     #[arg(long, value_name = "NAME", help_heading = "Scene")]
     camera: Option<String>,
     #[command(flatten)]
-    light: PhotonArgs,
+    request: RequestArgs<MAP>,
     /// Number of independent rounds; pictures have as many, or fewer [default: 16]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
     rounds: Option<u32>,
-    #[command(flatten)]
-    common: CommonArgs,
     #[command(flatten)]
     progress: ProgressArgs,
     #[command(flatten)]
@@ -134,56 +119,25 @@ pub(super) fn run(args: &MapArgs, cancelled: &AtomicBool) -> Result<End> {
     }
 }
 
-/// Each is a block, so that they tell the error of a picture well.
-const USUAL_ROUNDS: u32 = 2 * LEAST_BLOCKS;
-
 fn make(args: &MakeArgs, cancelled: &AtomicBool) -> Result<End> {
-    let usual = settings(&args.light.request(&args.common), None, args.light.chosen.open()?.as_ref());
     // Of a block each: rounds know nothing of each other.
-    let settings = SceneSettings { rounds: args.rounds.unwrap_or(USUAL_ROUNDS), block: Some(1), ..usual };
-    settings.validate()?;
-    let output = Destination::open_file("-o", &args.output)?;
-    check_not_read(std::slice::from_ref(&output), [args.scene.path()])?;
-    let reporter = ProgressReporter::new(&args.progress);
-    let scene = args.scene.open(&reporter)?;
-    let camera = named(&scene, args.camera.as_deref())?;
-    let (width, height) = resolve(None, &camera, &reporter)?;
-    let camera = if scene.cameras.is_empty() { scene.camera_around(f64::from(width) / f64::from(height)) } else { camera };
-    let geometry = geometry(&scene, &settings, &reporter)?;
-    let mut gpu = args.device.open(&reporter)?;
-    let view = View { geometry: &geometry, camera: Some(&camera), phases: &[] };
-    let sensor = Sensor::Picture { width, height };
-    let trial = until_done(&mut gpu, &device_failed, |gpu| trial::find(gpu, &scene, &view, &settings, sensor))?;
-    // No picture is made, so that its buffers need no room.
-    let sensor = Sensor::Picture { width: 1, height: 1 };
-    let plan_of = |gpu: &Gpu| ScenePlan::with_trial(&scene, &geometry, &settings, sensor, &engine::limits(gpu.facts()), trial.clone());
-    let plan = plan_of(&gpu)?;
-    let maps: Vec<String> = plan.maps().map(|map| counted(map.photons, &format!("{} photon", map.name))).collect();
-    let no_photons = "calls for no photons: nothing scatters light a second time, and nothing makes caustics";
-    require(!maps.is_empty(), "SCENE", &args.scene.scene, no_photons)?;
-    reporter.note(&format!("plan: {}, {} of {}", scene.name, counted(settings.rounds, "round"), maps.join(" and ")));
-
-    reporter.status("making the pipelines");
-    let mut file = output.stage()?;
-    let unwritten = |error: std::io::Error| output.failed(&error);
-    let mut writer = MapWriter::new(file.file(), &scene.name, &geometry, &plan, &gpu.facts().label()).map_err(unwritten)?;
-    let mut control = Control { cancelled, progress: &mut |progress| reporter.report(progress, "round"), keep: Keep::default() };
-    let mut once = |gpu: &Gpu| fill(gpu, &geometry, &plan_of(gpu)?, &mut writer, &unwritten, &mut control);
-    let filled = interruptible(|| until_done(&mut gpu, &device_failed, &mut once));
-    // A device that is gone for good leaves whole rounds too.
-    let (filled, failed) = match filled {
-        Err(error @ (Error::DeviceLost { .. } | Error::OutOfMemory { .. })) if writer.rounds() > 0 => {
-            (Filled { rounds: writer.rounds(), is_cancelled: true, nonfinite_values: None }, Some(error))
-        }
-        filled => (filled?, None),
+    let request = RenderRequest {
+        camera: args.camera.clone(),
+        rounds: Some(args.rounds.unwrap_or(USUAL_ROUNDS)),
+        block: Some(1),
+        ..args.request.0.clone()
     };
-    let header = writer.finish().map_err(unwritten)?;
-    file.finish()?;
+    let inputs = Inputs::open(&request)?;
+    let output = Destination::open_file("-o", &args.output)?;
+    check_not_read(std::slice::from_ref(&output), request.inputs())?;
+    let reporter = ProgressReporter::new(&args.progress);
+    let tell = |event: Event| reporter.event(event);
+    let observer = Observer { cancelled, tell: &tell };
+    let prepared = prepare(inputs, Receivers::Image(None), &observer)?;
+    let mut gpu = args.device.open(&reporter)?;
+    let WrittenMap { header, filled, failed } = prepared.write_map(&mut gpu, &output, &observer)?;
     reporter.finish();
-    if filled.is_cancelled {
-        complain(&format!("ended early: the file holds {} of {}", counted(filled.rounds, "round"), settings.rounds));
-    }
-    let found = filled.nonfinite_values.map_or_else(String::new, |values| values.text() + "\n");
+    let found = filled.nonfinite_values.map_or_else(String::new, |values| spell(&values.text()) + "\n");
     say(&format!("{found}{}\nwrote {}", photon_map::text(&header).trim_end(), args.output.display()))?;
     failed.map_or(Ok(if filled.is_cancelled { End::Cancelled } else { End::Finished }), Err)
 }

@@ -5,10 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::how_made::of_merge;
-use super::keep::read;
-use super::scene::ToneArg;
 use super::typed::Typed;
-use super::values::parse_stops;
+use super::values::{parse_stops, value_enum};
 use super::{JsonArg, complain, optional_file, say_beside};
 use crate::engine::blocks::Share;
 use crate::engine::saved::{NotMerged, SavedFilm, SavedRun};
@@ -19,6 +17,8 @@ use crate::output::destination::{Destination, check_distinct, check_not_read, wr
 use crate::output::merge_report;
 use crate::output::show::{Layer, Show, units};
 use crate::plan::sensor::Sensor;
+use crate::render::Stops;
+use crate::render::checkpoints::read;
 
 #[derive(Args)]
 pub(super) struct MergeArgs {
@@ -33,7 +33,7 @@ pub(super) struct MergeArgs {
     error_image: Option<PathBuf>,
     /// Exposure of a PNG in stops, each of which doubles the brightness [default: what makes the mean middle grey]
     #[arg(long, value_name = "STOPS", value_parser = parse_stops, allow_hyphen_values = true, help_heading = "Output")]
-    exposure: Option<f32>,
+    exposure: Option<Stops>,
     /// Tone curve of a PNG [default: neutral]
     #[arg(long, value_enum, value_name = "CURVE", help_heading = "Output")]
     tone: Option<ToneArg>,
@@ -47,12 +47,19 @@ pub(super) struct MergeArgs {
     partial: bool,
 }
 
+value_enum!(ToneArg => Tone {
+    /// Highlights keep their shape: Khronos PBR Neutral
+    Neutral,
+    /// What is brighter than white is white
+    Linear,
+});
+
 pub(super) fn run(args: &MergeArgs, typed: &Typed) -> Result<()> {
     let format = args.output.as_ref().map(|path| Format::of("-o", path)).transpose()?;
     if let Some(path) = &args.error_image {
         require(Format::of("--error-image", path)? == Format::Exr, "--error-image", path.display(), "must end in .exr")?;
     }
-    if let Some(exposure) = args.exposure {
+    if let Some(Stops(exposure)) = args.exposure {
         require(format == Some(Format::Png), "--exposure", exposure, "is for PNG only: an EXR holds linear radiance")?;
     }
     let picture = optional_file("-o", args.output.as_ref())?;
@@ -78,7 +85,7 @@ pub(super) fn run(args: &MergeArgs, typed: &Typed) -> Result<()> {
     if let (Some(film), Some(Sensor::Picture { width, height })) = (film, run.sensor) {
         let show = Show {
             size: (width, height),
-            exposure: args.exposure,
+            exposure: args.exposure.map(|Stops(stops)| stops),
             tone: args.tone.map_or(Tone::default(), Tone::from),
             layers: Layer::ALL.into(),
             denoised: None,

@@ -2,11 +2,8 @@
 
 mod bake;
 mod bench;
-mod camera;
-mod chosen;
 mod compare;
 mod config;
-mod denoise;
 mod devices;
 mod display;
 mod gallery;
@@ -14,11 +11,10 @@ mod help;
 mod how_made;
 mod info;
 mod interrupt;
-mod job;
-mod keep;
 mod manual;
 mod map;
 mod merge;
+mod messages;
 mod options;
 mod paper;
 mod plan;
@@ -26,8 +22,8 @@ mod probe;
 mod progress;
 mod render;
 mod repeat;
+mod request;
 mod run;
-mod scene;
 mod selfcheck;
 mod stop;
 mod study;
@@ -37,19 +33,15 @@ mod values;
 mod view;
 
 use std::ffi::OsString;
-use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
 
 use clap::error::ErrorKind as ClapErrorKind;
 use clap::{ArgMatches, Args, ColorChoice, CommandFactory, FromArgMatches, Parser, Subcommand};
 
-use crate::engine::retry::{Remedy, in_words};
-use crate::engine::run::RunResult;
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Options};
-use crate::output::destination::Destination;
 use interrupt::{cancel_on_signal, exit_code, interruptible};
-use progress::print_line;
+use messages::{End, complain, device_failed, optional_file, say, say_beside, spell};
 use typed::Typed;
 use values::parse_bytes;
 
@@ -159,7 +151,7 @@ impl DeviceArgs {
         match Gpu::open(options) {
             Ok(gpu) => Ok(Some(gpu)),
             Err(error @ (Error::NoVulkan { .. } | Error::DeviceLacks { .. })) if self.device.is_none() => {
-                complain(&format!("{error}; running the CPU builder instead"));
+                complain(&spell(&format!("{error}; running the CPU builder instead")));
                 Ok(None)
             }
             Err(error) => Err(error),
@@ -199,20 +191,6 @@ struct TimingArgs {
 impl TimingArgs {
     fn options(&self, device: &DeviceArgs) -> Options {
         Options { time_dispatches: self.time_dispatches, warm_up: self.warm_up, ..device.options() }
-    }
-}
-
-/// How a command ended that did not fail.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum End {
-    Finished,
-    /// By Ctrl-C, with what was finished saved.
-    Cancelled,
-}
-
-impl End {
-    fn of<Plan, Film>(run: &RunResult<Plan, Film>) -> End {
-        if run.is_cancelled() { End::Cancelled } else { End::Finished }
     }
 }
 
@@ -264,7 +242,7 @@ pub fn main() -> u8 {
     let result = match cli.command {
         None => interruptible(|| run::run(&cli.run, &Typed::of(&matches, &command), &cancelled)),
         Some(Command::Devices(args)) => devices::run(&args).map(|()| End::Finished),
-        Some(Command::Render(args)) => render::run(&args, &Typed::of(&matches, &command), &cancelled),
+        Some(Command::Render(args)) => render::run(&args, &cancelled),
         Some(Command::View(args)) => view::run(&args, &Typed::of(&matches, &command), &cancelled),
         Some(Command::Repeat(args)) => repeat::run(args, &cancelled),
         Some(Command::Bake(args)) => bake::run(&args, &cancelled),
@@ -287,7 +265,7 @@ pub fn main() -> u8 {
         Ok(End::Cancelled) => exit_code(),
         Err(error) => {
             let error = usage::as_typed(error, &matches, &command);
-            complain(&origins.located(error.to_string()));
+            complain(&origins.located(spell(&error.to_string())));
             if matches!(error, Error::Interrupted) { exit_code() } else { error.exit_code() }
         }
     }
@@ -311,45 +289,9 @@ fn print_config(command: &clap::Command, matches: &ArgMatches) -> u8 {
 fn printed(result: Result<()>) -> u8 {
     result.map_or_else(
         |error| {
-            complain(&error.to_string());
+            complain(&spell(&error.to_string()));
             error.exit_code()
         },
         |()| 0,
     )
-}
-
-/// One line on stderr. Where nobody can read it there still is the exit code.
-fn complain(line: &str) {
-    // Names of files and of things in them may hold anything; a complaint stays one line.
-    let line: String = line.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect();
-    print_line(&format!("photonmill: {line}"));
-}
-
-/// Tells of a device that failed while it was at work.
-fn device_failed(gpu: &Gpu, error: &Error, remedy: Remedy) {
-    complain(&format!("warning: {}", in_words(gpu, error, remedy)));
-}
-
-/// Text on stdout; a reader that has gone away, as `head` does, has seen enough.
-fn say(text: &str) -> Result<()> {
-    match writeln!(std::io::stdout(), "{text}") {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
-            Err(Error::Output { option: "standard output", path: PathBuf::from("(stdout)"), reason: error.kind().to_string() })
-        }
-        _ => Ok(()),
-    }
-}
-
-/// A report for people: on stdout, unless one of the files goes there.
-fn say_beside<'a>(files: impl IntoIterator<Item = &'a Destination>, text: &str) -> Result<()> {
-    if files.into_iter().any(Destination::is_standard_output) {
-        print_line(text);
-        return Ok(());
-    }
-    say(text)
-}
-
-/// A destination that may be left out.
-fn optional_file(option: &'static str, path: Option<&PathBuf>) -> Result<Option<Destination>> {
-    path.map(|path| Destination::open(option, path)).transpose()
 }

@@ -12,6 +12,7 @@ use crate::error::{Error, Result, require};
 use crate::measure::paper::bench::Bench;
 use crate::measure::paper::{self, Reproduction, Request, published, tables, verdicts};
 use crate::output::destination::Folder;
+use crate::render::Seconds;
 use crate::text::counted;
 
 #[derive(Args)]
@@ -27,7 +28,7 @@ pub(super) struct PaperArgs {
     repeats: u32,
     /// Leave out rows of table 1 that would take longer than this
     #[arg(long, value_name = "TIME", value_parser = parse_seconds, allow_hyphen_values = true, default_value = "90s", help_heading = "Measurements")]
-    longest: f64,
+    longest: Seconds,
     /// Also measure the CPU builder on this many threads, or on `all` [default: only on one]
     #[arg(long, value_name = "N|all", value_parser = parse_threads, allow_hyphen_values = true, help_heading = "Implementation")]
     threads: Option<usize>,
@@ -51,7 +52,7 @@ pub(super) fn run(args: &PaperArgs, cancelled: &AtomicBool) -> Result<End> {
         large: args.large.unwrap_or(if is_cpu { LARGE_ON_CPU } else { LARGE_ON_GPU }),
         repeats: args.repeats as usize,
         threads: args.threads.unwrap_or(1),
-        longest_ms: 1e3 * args.longest,
+        longest_ms: 1e3 * args.longest.0,
     };
     reporter.note(&format!(
         "plan: 4 figures, running times and table 1; {} and {} photons per round, the median of {}",
@@ -90,8 +91,8 @@ impl PaperArgs {
         let allowed = format!("must be from {smallest} to {MAX_LARGE} photons per round, more than the paper's");
         require((smallest..=MAX_LARGE).contains(&large), "--large", large, allowed)?;
         require((1..=MAX_REPEATS).contains(&self.repeats), "--repeats", self.repeats, format!("must be from 1 to {MAX_REPEATS}"))?;
-        let is_time = self.longest.is_finite() && self.longest > 0.0;
-        require(is_time, "--longest", format!("{}s", self.longest), "must be a time above 0, such as 90s")?;
+        let is_time = self.longest.0.is_finite() && self.longest.0 > 0.0;
+        require(is_time, "--longest", self.longest, "must be a time above 0, such as 90s")?;
         let threads = self.threads.unwrap_or(1);
         require((1..=MAX_THREADS).contains(&threads), "--threads", threads, format!("must be from 1 to {MAX_THREADS}, or all"))
     }

@@ -1,6 +1,5 @@
 //! `photonmill probe`: irradiance at given points, as Radiance's `rtrace -I` gives it.
 
-use std::borrow::Cow;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -8,19 +7,16 @@ use std::sync::atomic::AtomicBool;
 use clap::Args;
 use glam::DVec3;
 
-use super::job::{Job, MessageArgs};
 use super::options::{DevicesOfRunArgs, ReportArgs};
-use super::progress::ProgressReporter;
-use super::scene::{SceneArgs, TransportArgs, geometry, settings};
-use super::{End, complain, say_beside};
-use crate::engine::scene::{RunResult, Target};
+use super::progress::{MessageArgs, ProgressReporter};
+use super::request::{PROBE, RequestArgs};
+use super::{End, say_beside, spell};
+use crate::engine::scene::RunResult;
 use crate::error::{Error, Result};
 use crate::output::destination::{Destination, check_distinct, write_all};
 use crate::output::scene_report;
-use crate::plan::sensor::Sensor;
-use crate::plan::work_division::Free;
-use crate::render::{MAX_POINTS, point_of};
-use crate::scene::sensors::with_sensors;
+use crate::render::points::{MAX_POINTS, point_of};
+use crate::render::{Event, Inputs, Observer, Receivers, prepare};
 use crate::text::{counted, echo, refusal};
 
 #[derive(Args)]
@@ -31,13 +27,11 @@ pub(super) struct ProbeArgs {
     output: PathBuf,
     #[command(flatten)]
     report: ReportArgs,
-    #[command(flatten)]
-    scene: SceneArgs,
     /// Points and normals, one `x y z nx ny nz` per line, in metres; `-` is standard input
     #[arg(long, value_name = "FILE", help_heading = "Scene")]
     points: PathBuf,
     #[command(flatten)]
-    transport: TransportArgs,
+    request: RequestArgs<PROBE>,
     #[command(flatten)]
     messages: MessageArgs,
     #[command(flatten)]
@@ -45,60 +39,40 @@ pub(super) struct ProbeArgs {
 }
 
 pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
-    let map = args.transport.map()?;
-    let request = args.transport.request();
-    let settings = settings(&request, map.as_ref(), args.transport.light.chosen.open()?.as_ref());
-    settings.validate()?;
+    let request = &args.request.0;
+    let inputs = Inputs::open(request)?;
+    let reporter = ProgressReporter::explaining(&args.messages);
+    let tell = |event: Event| reporter.event(event);
+    let observer = Observer { cancelled, tell: &tell };
     let output = Destination::open("-o", &args.output)?;
     let reports = args.report.open()?;
-    let mut keeper = args.transport.keep.open(&args.transport.stop)?;
-    let all = [vec![output.clone()], reports.destinations(), keeper.destinations()].concat();
+    let mut checkpoints = inputs.checkpoints(&observer)?;
+    let all = [vec![output.clone()], reports.destinations(), checkpoints.destinations()].concat();
     check_distinct(&all)?;
-    keeper.check_not_read(&all, args.transport.inputs().chain([args.points.as_path(), args.scene.path()]))?;
+    checkpoints.check_not_read(&all, request.inputs().chain([args.points.as_path()]))?;
     let points = read_points(&args.points)?;
 
-    let reporter = ProgressReporter::new(&args.messages.progress);
-    let scene = args.scene.open(&reporter)?;
-    // Photons of a file are those of the scene alone.
-    let scene = if map.is_some() { Cow::Borrowed(&scene) } else { with_sensors(&scene, &points, &settings) };
-    let geometry = geometry(&scene, &settings, &reporter)?;
-    let far = geometry.place_warning("points", points.iter().map(|(position, _)| *position));
-    far.iter().for_each(|line| complain(&format!("warning: {line}")));
-    let phases = Target::Points(&points).phases(&geometry);
-    let sensor = Sensor::Receivers { count: points.len() as u32 };
-    let job = Job {
-        scene: &scene,
-        geometry: &geometry,
-        settings: &settings,
-        sensor,
-        camera: None,
-        phases: &phases,
-        map: map.as_ref(),
-        free: Free { samples: false, ..args.transport.free(&request) },
-        chosen: None,
-        save_settings: None,
-        explain: args.messages.explains(),
-        point: "point",
-    };
+    let prepared = prepare(inputs, Receivers::Points(&points), &observer)?;
     let mut gpus = args.device.open(&reporter)?;
-    let lit = job.run(&mut gpus, &args.transport.stop, &mut keeper, &reporter, cancelled)?;
+    let run = prepared.run(&mut gpus, &mut checkpoints, &observer)?.result;
     reporter.finish();
 
-    let text = scene_report::text(&scene.name, &lit, job.point, args.messages.explains());
+    let scene = &prepared.scene.name;
+    let text = spell(&scene_report::text(scene, &run, prepared.point, args.messages.explains()));
     let wrote = if output.is_standard_output() { String::new() } else { format!("\nwrote {}", args.output.display()) };
-    let mut files = vec![(output, table(&lit))];
-    files.extend(reports.files(&lit, || scene_report::json(&scene.name, &lit)));
+    let mut files = vec![(output, table(&run))];
+    files.extend(reports.files(&run, || scene_report::json(scene, &run)));
     if let Err(error) = write_all(files) {
         return say_beside(&all, &text).and(Err(error));
     }
     say_beside(&all, &format!("{}{wrote}", text.trim_end()))?;
-    keeper.finish()?;
-    Ok(End::of(&lit))
+    checkpoints.finish()?;
+    Ok(End::of(&run))
 }
 
 /// Irradiance, standard errors, their degrees of freedom, the intervals that follow with the run's confidence, and the most that light
 /// which was not met may add to any channel; W/m2. An error that is not known is `inf`.
-fn table(lit: &RunResult) -> Vec<u8> {
+fn table(run: &RunResult) -> Vec<u8> {
     const COLUMNS: [&str; 15] = [
         "red",
         "green",
@@ -118,7 +92,7 @@ fn table(lit: &RunResult) -> Vec<u8> {
     ];
     let mut table = csv::Writer::from_writer(Vec::new());
     table.write_record(COLUMNS).expect("memory takes what is written");
-    let film = &lit.film;
+    let film = &run.film;
     let (errors, intervals, unseen) = (film.stated_errors(), film.intervals(), film.unseen_bounds());
     let of_all = [f64::from(film.error_freedom()), film.plan.confidence];
     for point in 0..film.pixels() {

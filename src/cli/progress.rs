@@ -1,6 +1,6 @@
 //! What a command prints while it runs: device, plan and progress, all on stderr.
 
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 use std::io::{IsTerminal, Write};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -10,9 +10,12 @@ use std::time::{Duration, Instant};
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::complain;
+use super::interrupt::set_interruptible;
+use super::{complain, spell};
 use crate::engine::Progress;
 use crate::gpu::{DeviceFacts, Gpu};
+use crate::output::scene_report;
+use crate::render::Event;
 use crate::text::counted;
 
 #[derive(Args)]
@@ -30,6 +33,22 @@ pub(super) struct ProgressArgs {
     pub(super) verbose: bool,
 }
 
+/// What a run prints.
+#[derive(Args)]
+pub(super) struct MessageArgs {
+    /// Also print which effects were kept or dropped and why, with the time and the light of each, and what a pilot chose
+    #[arg(long, help_heading = "Messages")]
+    explain: bool,
+    #[command(flatten)]
+    pub(super) progress: ProgressArgs,
+}
+
+impl MessageArgs {
+    pub(super) fn explains(&self) -> bool {
+        self.explain || self.progress.verbose
+    }
+}
+
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum ProgressForm {
     /// A bar on a terminal, elsewhere a line every few seconds
@@ -44,8 +63,10 @@ pub(super) struct ProgressReporter {
     form: Form,
     status: Arc<Mutex<String>>,
     /// Prints the status every few seconds; ends when the sender goes.
-    ticker: Option<(Sender<()>, JoinHandle<()>)>,
+    ticker: RefCell<Option<(Sender<()>, JoinHandle<()>)>>,
     is_verbose: bool,
+    /// Whether what a pilot chooses is explained.
+    explains: bool,
     started: Instant,
 }
 
@@ -101,7 +122,33 @@ impl ProgressReporter {
             });
             (end, thread)
         });
-        ProgressReporter { form, status, ticker, is_verbose: args.verbose, started: Instant::now() }
+        ProgressReporter { form, status, ticker: RefCell::new(ticker), is_verbose: args.verbose, explains: false, started: Instant::now() }
+    }
+
+    /// The same of a command that explains, where asked.
+    pub(super) fn explaining(args: &MessageArgs) -> ProgressReporter {
+        let mut reporter = ProgressReporter::new(&args.progress);
+        reporter.explains = args.explains();
+        reporter
+    }
+
+    /// Prints what a run says of itself.
+    pub(super) fn event(&self, event: Event) {
+        match event {
+            Event::Warning(text) => complain(&format!("warning: {}", spell(text))),
+            Event::Remark(text) => complain(&spell(text)),
+            Event::Note(text) => self.note(&spell(text)),
+            Event::Status(text) => self.status(&spell(text)),
+            Event::Step(text) => self.step(&spell(text)),
+            Event::Pilot(pilot, stop, point) => {
+                self.note(&spell(&scene_report::pilot(pilot, stop, point)));
+                if self.explains {
+                    spell(&scene_report::pilot_table(pilot, stop, point)).lines().for_each(|line| self.note(line));
+                }
+            }
+            Event::Progress(progress) => self.report(progress, "round"),
+            Event::Interruptible(is_so) => set_interruptible(is_so),
+        }
     }
 
     /// One line, printed now.
@@ -169,11 +216,7 @@ impl ProgressReporter {
     }
 
     /// Ends all output, before the results are printed; so does dropping it.
-    pub(super) fn finish(self) {}
-}
-
-impl Drop for ProgressReporter {
-    fn drop(&mut self) {
+    pub(super) fn finish(&self) {
         if let Some((end, thread)) = self.ticker.take() {
             drop(end);
             // It only sleeps and prints.
@@ -183,6 +226,12 @@ impl Drop for ProgressReporter {
             *BAR.lock().unwrap_or_else(PoisonError::into_inner) = None;
             bar.finish_and_clear();
         }
+    }
+}
+
+impl Drop for ProgressReporter {
+    fn drop(&mut self) {
+        self.finish();
     }
 }
 

@@ -1,22 +1,20 @@
 //! `photonmill repeat`: runs a picture again, from what its file says of how it was made.
 
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
 use clap::{Args, CommandFactory, FromArgMatches};
 
-use super::chosen::Chosen;
 use super::options::DevicesOfRunArgs;
-use super::progress::ProgressArgs;
-use super::render::{Again, Repeated};
+use super::progress::{ProgressArgs, ProgressReporter};
 use super::typed::Typed;
-use super::{Cli, Command, End, optional_file, say, usage};
+use super::{Cli, End, optional_file, say, usage};
 use crate::error::{Error, Result};
 use crate::output::colour::Format;
 use crate::output::destination::{check_not_read, write_all};
 use crate::output::metadata::{Metadata, Repeat};
-use crate::output::{colour, exr_file};
+use crate::render::repeat::{Repeated, RoundsOf, differing, repeat};
+use crate::render::{Event, Observer};
 use crate::scene::file;
 
 #[derive(Args)]
@@ -54,19 +52,20 @@ pub(super) fn run(args: RepeatArgs, cancelled: &AtomicBool) -> Result<End> {
         Repeat::With { command, arguments, division, tiles } => (command, arguments, *division, tiles.clone()),
         Repeat::Not(reason) => return Err(refuse(reason.clone())),
     };
-    let damaged = |reason: &dyn std::fmt::Display| refuse(format!("says otherwise than photonmill does how it was made ({reason})"));
-    let chosen = Chosen::of_picture(&made, division, tiles).map_err(|error| damaged(&error))?;
-    let (mut cli, typed) = parsed(command, arguments, &chosen).map_err(|reason| damaged(&reason))?;
-    let repeated = match cli.command {
-        Some(Command::Render(mut render)) => {
-            let has_moved = args.scene.is_some();
-            render.set(args.scene, args.progress, args.device);
-            let again = Again { chosen: &chosen, made: &made, path: &path, has_moved, typed: &typed, format };
-            super::render::again(&render, &again, cancelled)?
+    let reporter = ProgressReporter::new(&args.progress);
+    let tell = |event: Event| reporter.event(event);
+    let observer = Observer { cancelled, tell: &tell };
+    let repeated = match command.as_str() {
+        "render" => {
+            let rounds = RoundsOf { division, tiles };
+            let devices = || args.device.open(&reporter).map(Box::new);
+            repeat(&path, (&made, arguments, &rounds), format, args.scene.as_deref(), devices, &observer)?
         }
-        None => {
+        "" => {
             let elsewhere = "is for pictures of a scene's file, and this one is of the paper's box; leave it out";
             args.scene.map_or(Ok(()), |scene| Err(Error::setting("--scene", scene, elsewhere)))?;
+            let damaged = |reason: String| refuse(format!("says otherwise than photonmill does how it was made ({reason})"));
+            let (mut cli, typed) = of_box(arguments, made.rounds).map_err(damaged)?;
             let folder = tempfile::tempdir().map_err(|error| refuse(format!("cannot be repeated: {}", error.kind())))?;
             let place = folder.path().join(if format == Format::Png { "repeated.png" } else { "repeated.exr" });
             cli.run.set(place.clone(), args.progress, args.device);
@@ -77,8 +76,9 @@ pub(super) fn run(args: RepeatArgs, cancelled: &AtomicBool) -> Result<End> {
             let devices = Metadata::read(&content).map_err(refuse)?.devices;
             Repeated { content, devices }
         }
-        Some(_) => return Err(damaged(&"it is of no picture")),
+        _ => return Err(refuse("says otherwise than photonmill does how it was made (it is of no picture)".to_owned())),
     };
+    reporter.finish();
     let differing = differing(&content, &repeated.content, format).map_err(refuse)?;
     if let Some(output) = output {
         write_all([(output, repeated.content)])?;
@@ -96,12 +96,11 @@ pub(super) fn run(args: RepeatArgs, cancelled: &AtomicBool) -> Result<End> {
     Ok(End::Finished)
 }
 
-/// The command line of a picture, of which nothing may be but what decides pixels.
-fn parsed(command: &str, arguments: &[String], chosen: &Chosen) -> std::result::Result<(Cli, Typed), String> {
-    let words = ["photonmill", command].into_iter().filter(|word| !word.is_empty()).map(str::to_owned).chain(arguments.iter().cloned());
-    let rounds = format!("--rounds={}", chosen.rounds);
+/// The command line of a picture of the paper's box, of which nothing may be but what decides pixels.
+fn of_box(arguments: &[String], rounds: u32) -> std::result::Result<(Cli, Typed), String> {
     // It asks for some output.
-    let words: Vec<String> = words.chain([rounds, "-o=repeated.exr".to_owned()]).collect();
+    let more = [format!("--rounds={rounds}"), "-o=repeated.exr".to_owned()];
+    let words: Vec<String> = ["photonmill".to_owned()].into_iter().chain(arguments.iter().cloned()).chain(more).collect();
     let known = Cli::command();
     let matches = known
         .clone()
@@ -113,36 +112,4 @@ fn parsed(command: &str, arguments: &[String], chosen: &Chosen) -> std::result::
     }
     let cli = Cli::from_arg_matches(&matches).map_err(|error| error.to_string())?;
     Ok((cli, typed))
-}
-
-/// Values that differ, of how many.
-struct Differing {
-    count: usize,
-    of: usize,
-}
-
-/// Compares the values of a picture with those of another one, to the bit. What the other one has beside them is not compared: layers
-/// that a run could not keep, which went on with a checkpoint without them.
-fn differing(before: &[u8], after: &[u8], format: Format) -> std::result::Result<Differing, String> {
-    let [before, after] = [values(before, format)?, values(after, format)?];
-    let mut differing = Differing { count: 0, of: 0 };
-    for (name, values) in &before {
-        let others = after.get(name).map_or(&[][..], Vec::as_slice);
-        let same = values.iter().zip(others).filter(|(value, other)| value == other).count();
-        differing.of += values.len();
-        differing.count += values.len() - same;
-    }
-    Ok(differing)
-}
-
-/// Values of each channel as bits, by its name; a PNG's codes have none.
-fn values(content: &[u8], format: Format) -> std::result::Result<BTreeMap<String, Vec<u32>>, String> {
-    match format {
-        Format::Png => Ok([(String::new(), colour::png_codes(content)?.into_iter().map(u32::from).collect())].into()),
-        Format::Exr => {
-            let (_, channels) = exr_file::decode(content)?;
-            let bits = |values: Vec<f32>| values.into_iter().map(f32::to_bits).collect();
-            Ok(channels.into_iter().map(|channel| (channel.name, bits(channel.values))).collect())
-        }
-    }
 }

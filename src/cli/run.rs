@@ -8,16 +8,15 @@ use std::time::Instant;
 use clap::Args;
 
 use super::how_made::of_room;
-use super::keep::{KeepArgs, Keeper};
 use super::options::{CommonArgs, DevicesOfRunArgs, ReportArgs, Reports};
 use super::progress::{ProgressArgs, ProgressReporter};
-use super::stop::{StopArgs, bias_before, goals, rounds_after, up_to};
+use super::stop::{CheckpointArgs, StopArgs};
 use super::typed::Typed;
 use super::values::{
     BuilderArg, SwitchArg, builder_parser, parse_integer, parse_number, parse_numbers, parse_photon_name, parse_shininess, parse_threads,
     parse_within, value_enum,
 };
-use super::{End, complain, device_failed, say, say_beside};
+use super::{End, complain, device_failed, say, say_beside, spell};
 use crate::engine;
 use crate::engine::Control;
 use crate::engine::choose_builder::{Choice, choose_builder};
@@ -35,8 +34,12 @@ use crate::output::colour::Format;
 use crate::output::destination::{Destination, Folder, check_distinct, write_all};
 use crate::output::image::overview;
 use crate::output::lightmap::{self, Quantity};
+use crate::output::report::{goals, up_to};
 use crate::output::room_report;
 use crate::plan::{Limits, RoomPlan};
+use crate::render::bias::{bias_before, rounds_after};
+use crate::render::checkpoints::Checkpoints;
+use crate::render::{Event, Observer};
 use crate::rng::Rng;
 use crate::scene::open_box::open_box;
 use crate::scene::room::RoomScene;
@@ -87,7 +90,7 @@ pub(super) struct RunArgs {
     #[command(flatten)]
     stop: StopArgs,
     #[command(flatten)]
-    keep: KeepArgs,
+    checkpoint: CheckpointArgs,
 
     /// Experiment of the paper that sets the defaults [default: modified]
     #[arg(long, value_enum, value_name = "NAME", help_heading = "Photons")]
@@ -253,12 +256,14 @@ pub(super) fn run(args: &RunArgs, typed: &Typed, cancelled: &AtomicBool) -> Resu
     if let Some(name) = args.replay {
         return show_photon(args, &settings, &scene, name);
     }
-    let mut keeper = args.keep.open(&args.stop)?;
-    let outputs = Outputs::open(args, &scene, &keeper)?;
-    if let Some(warning) = settings.warning() {
-        complain(&format!("warning: {warning}"));
-    }
     let reporter = ProgressReporter::new(&args.progress);
+    let tell = |event: Event| reporter.event(event);
+    let observer = Observer { cancelled, tell: &tell };
+    let mut checkpoints = args.checkpoint.open(&args.stop, &observer)?;
+    let outputs = Outputs::open(args, &scene, &checkpoints)?;
+    if let Some(warning) = settings.warning() {
+        observer.tell(Event::Warning(&warning));
+    }
     let mut gpus = if settings.builder == Builder::Cpu { Vec::new() } else { args.device.open_or_none(&reporter)? };
     if gpus.is_empty() {
         reporter.device(None);
@@ -278,10 +283,10 @@ pub(super) fn run(args: &RunArgs, typed: &Typed, cancelled: &AtomicBool) -> Resu
         Some(gpu) => until_done(gpu, &device_failed, |gpu| room::measure_bias(Some(gpu), &scene, settings, rounds, cancelled)),
         None => room::measure_bias(None, &scene, settings, rounds, cancelled),
     };
-    let before = bias_before(&settings.stop, args.stop.bias, false, &reporter, |rounds| measure(gpus.first_mut(), &settings, rounds))?;
+    let before = bias_before(&settings.stop, args.stop.bias, false, &observer, |rounds| measure(gpus.first_mut(), &settings, rounds))?;
     let settings = RoomSettings { stop: Stop { bias: before.map(|bias| bias.upper), ..settings.stop }, ..settings };
     reporter.status("making the pipelines");
-    let keep = keeper.keep("open-box");
+    let keep = checkpoints.keep("open-box");
     let mut control = Control { cancelled, progress: &mut |progress| reporter.report(progress, "photon"), keep };
     let mut outcome = match gpus.len() {
         0 => room::run(None, &scene, &settings, &mut control)?,
@@ -299,7 +304,7 @@ pub(super) fn run(args: &RunArgs, typed: &Typed, cancelled: &AtomicBool) -> Resu
         complain(&format!("ended after {emitted} of {total} photons; the results are of these"));
     }
     outputs.write(outcome, &scene, typed)?;
-    keeper.finish()?;
+    checkpoints.finish()?;
     Ok(end)
 }
 
@@ -383,7 +388,7 @@ struct Outputs {
 }
 
 impl Outputs {
-    fn open(args: &RunArgs, scene: &RoomScene, keeper: &Keeper) -> Result<Outputs> {
+    fn open(args: &RunArgs, scene: &RoomScene, checkpoints: &Checkpoints) -> Result<Outputs> {
         let folder = |option, path: &Option<PathBuf>| path.as_ref().map(|path| Folder::open(option, path)).transpose();
         let outputs = Outputs {
             picture: (Destination::open("-o", &args.output)?, Format::of("-o", &args.output)?),
@@ -394,7 +399,7 @@ impl Outputs {
         let folders = [&outputs.irradiance, &outputs.radiosity].into_iter().flatten();
         let mut all = vec![outputs.picture.0.clone()];
         all.extend(outputs.reports.destinations());
-        all.extend(keeper.destinations());
+        all.extend(checkpoints.destinations());
         all.extend(folders.flat_map(|folder| lightmap::destinations(folder, scene)));
         check_distinct(&all)?;
         Ok(outputs)
@@ -418,7 +423,7 @@ impl Outputs {
 
         files.extend(self.reports.files(&outcome, || room_report::json(&outcome, &walls, &error)));
         let destinations: Vec<Destination> = files.iter().map(|(destination, _)| destination.clone()).collect();
-        let text = room_report::text(&outcome, &error);
+        let text = spell(&room_report::text(&outcome, &error));
         match write_all(files) {
             Ok(()) => say_beside(&destinations, &format!("{text}\nwrote {picture}")),
             Err(error) => say_beside(&destinations, &text).and(Err(error)),

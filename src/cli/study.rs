@@ -12,6 +12,7 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::measure::study::{self, Request, peers};
 use crate::output::destination::Folder;
+use crate::render::Seconds;
 use crate::scene::Scene;
 
 #[derive(Args)]
@@ -23,7 +24,7 @@ pub(super) struct StudyArgs {
     scene: String,
     /// Time of all measurements together, without a path-traced reference: 90s, 10m
     #[arg(long, value_name = "TIME", value_parser = parse_seconds, allow_hyphen_values = true, default_value = "4m", help_heading = "When to stop")]
-    budget: f64,
+    budget: Seconds,
     /// Runs of every setting and number of rounds; their spread gives the confidence intervals
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, default_value = "5", help_heading = "Measurements")]
     repeats: u32,
@@ -58,7 +59,7 @@ fn scene_help() -> String {
 
 pub(super) fn run(args: &StudyArgs, cancelled: &AtomicBool) -> Result<End> {
     let folder = Folder::open("-o", &args.output)?;
-    let budget = study::budget(args.budget)?;
+    let budget = study::budget(args.budget.0)?;
     let request = |is_cpu: bool| {
         let usual = Request::usual(&args.scene, is_cpu);
         Request {
@@ -88,7 +89,7 @@ pub(super) fn run(args: &StudyArgs, cancelled: &AtomicBool) -> Result<End> {
         scene.name,
         request.photons,
         request.repeats,
-        args.budget,
+        args.budget.0,
         side = request.size
     ));
     let study = study::run(&gpu, &scene, request, &folder, cancelled, &mut |line| reporter.step(line))?;
@@ -154,7 +155,7 @@ mod tests {
                 Line::Scene(settings) => {
                     let line = command::on_scene("render open-box -o picture.exr", settings);
                     let Some(Command::Render(render)) = parse(&line).command else { panic!("{line}") };
-                    assert_eq!(render.settings(None, None), *settings, "{line}");
+                    assert_eq!(render.request.0.settings(None), *settings, "{line}");
                 }
             }
         }

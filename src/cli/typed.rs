@@ -1,21 +1,19 @@
-//! The arguments of a command that decide its picture, as the user typed them: what the picture's file says of them, and
-//! what `photonmill repeat` reads back.
+//! The arguments of a command that decide its picture, as the user typed them: what a picture of the paper's box says of them, and
+//! what `photonmill repeat` reads back; and what a window takes over.
 
 use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Command};
 
+use crate::render::options::{Decides, row};
 use crate::text::quoted;
 
-/// Headings of options that change no pixel: where results go, how they are made and watched, and when the run ends, of which the
-/// rounds that it had say enough.
+/// Headings of options of the paper's box that change no pixel: where results go, how they are made and watched, and when the run ends, of
+/// which the rounds that it had say enough.
 const WITHOUT_EFFECT: [&str; 6] = ["Output", "Messages", "Checks", "Device", "When to stop", "Implementation"];
 /// Options under them that do change the file.
-const WITH_EFFECT: [&str; 9] = ["exposure", "tone", "layers", "denoise", "measure", "confidence", "math", "sums", "gather"];
+const WITH_EFFECT: [&str; 7] = ["exposure", "tone", "measure", "confidence", "math", "sums", "gather"];
 /// Options under other headings in whose place the metadata has what came of them.
 const IN_FORCE: [&str; 3] = ["rounds", "config", "print_config"];
-/// The same of scenes.
-const REPLACED: [&str; 8] =
-    ["settings", "save_settings", "samples", "shadow_rays", "photons", "caustic_photons", "neighbours", "caustic_neighbours"];
 
 #[derive(Debug, Clone, PartialEq)]
 struct Argument {
@@ -66,8 +64,11 @@ pub(super) struct Typed {
 
 fn is_kept(argument: &Arg, is_of_box: bool) -> bool {
     let id = argument.get_id().as_str();
+    if let Some(row) = row(id).filter(|_| !is_of_box) {
+        return row.decides == Decides::Picture;
+    }
     let is_under = argument.get_help_heading().is_some_and(|heading| WITHOUT_EFFECT.contains(&heading));
-    (!is_under || WITH_EFFECT.contains(&id)) && !IN_FORCE.contains(&id) && (is_of_box || !REPLACED.contains(&id))
+    (!is_under || WITH_EFFECT.contains(&id)) && !IN_FORCE.contains(&id)
 }
 
 impl Typed {
@@ -91,11 +92,6 @@ impl Typed {
         // The scene first.
         arguments.sort_by_key(|argument| argument.option.is_some());
         Typed { command: name, arguments }
-    }
-
-    /// Whether it has this option, of those that decide pixels.
-    pub(super) fn has(&self, option: &str) -> bool {
-        self.arguments.iter().any(|argument| argument.option.as_deref() == Some(option))
     }
 
     /// As clap takes them.

@@ -8,6 +8,7 @@ use clap::{Arg, ArgMatches, Command};
 use super::typed::{Selected, was_typed};
 use crate::error::Error;
 use crate::output::words::list;
+use crate::render::names::as_option;
 use crate::scene::built_in;
 use crate::text::echo;
 
@@ -94,7 +95,7 @@ pub(super) fn as_typed(error: Error, matches: &ArgMatches, command: &Command) ->
     let Selected { matches, command, .. } = Selected::of(matches, command);
     let argument = command
         .get_arguments()
-        .filter(|argument| argument.get_long().is_some_and(|long| option.strip_prefix("--") == Some(long)))
+        .filter(|argument| argument.get_long().is_some_and(|long| as_option(option.trim_start_matches("--")) == format!("--{long}")))
         .find(|argument| argument.get_action().takes_values())
         .filter(|argument| was_typed(matches, argument));
     let typed: Vec<_> = argument.and_then(|argument| matches.get_raw(argument.get_id().as_str())).into_iter().flatten().collect();

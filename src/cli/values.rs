@@ -1,17 +1,19 @@
 //! Values of options that commands share: text to numbers, with what is allowed in words, and choices. Ranges are the settings' affair.
 
 use std::fmt::Display;
-use std::num::IntErrorKind;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
 use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
+use super::messages::spell;
 use crate::engine::blocks::Share;
 use crate::engine::replay::PhotonName;
 use crate::gpu::LEAST_MEMORY;
-use crate::settings::scene::Effect;
+use crate::render::values::{Value, meaning};
+pub(super) use crate::render::values::{parse_integer, parse_number, parse_numbers};
+use crate::render::{Percent, Seconds, Stops};
 use crate::settings::{Builder, Math, WALL_NAMES};
 
 type Parsed<T> = Result<T, String>;
@@ -32,6 +34,31 @@ macro_rules! value_enum {
 
 pub(super) use value_enum;
 
+/// What reads the values of a type.
+fn parse<T>(text: &str) -> Parsed<T>
+where
+    Option<T>: Value,
+{
+    let mut value = None;
+    value.read(text).map(|()| value.expect("it was read"))
+}
+
+pub(super) fn parse_percent(text: &str) -> Parsed<Percent> {
+    parse(text)
+}
+
+pub(super) fn parse_seconds(text: &str) -> Parsed<Seconds> {
+    parse(text)
+}
+
+pub(super) fn parse_stops(text: &str) -> Parsed<Stops> {
+    parse(text)
+}
+
+pub(super) fn parse_shard(text: &str) -> Parsed<Share> {
+    parse(text)
+}
+
 value_enum!(MathArg => Math {
     /// As fast as the device can
     Fast,
@@ -49,39 +76,12 @@ pub(super) type BuilderArg = Option<Builder>;
 
 /// Reads a [`BuilderArg`] that is one of `known`, or auto, which means what `auto` says.
 pub(super) fn builder_parser(known: impl IntoIterator<Item = Builder>, auto: &'static str) -> impl TypedValueParser<Value = BuilderArg> {
-    let help = |builder| match builder {
-        Builder::Naive => "One slot per photon and bounce, empty slots included (the paper's first)",
-        Builder::Atomic => "Only surviving photons, one atomic per thread (the paper's second)",
-        Builder::Ballot => "Only surviving photons, one atomic per subgroup",
-        Builder::Group => "Only surviving photons, one atomic per work group",
-        Builder::Scan => "Only surviving photons, in their original order, by prefix sums",
-        Builder::Persistent => "One invocation traces each photon from emission to its end",
-        Builder::Cpu => "The paper's CPU implementation, on one thread or on --threads",
-    };
-    let values = known.into_iter().map(|builder| PossibleValue::new(builder.name()).help(help(builder)));
+    let values = known.into_iter().map(|builder| PossibleValue::new(builder.name()).help(spell(meaning(builder))));
     PossibleValuesParser::new(values.chain([PossibleValue::new("auto").help(auto)]))
         .map(|name| Builder::ALL.into_iter().find(|builder| builder.name() == name))
 }
 
-pub(super) fn effect_parser() -> impl TypedValueParser<Value = Effect> {
-    let known = |name: String| Effect::ALL.into_iter().find(|effect| effect.name() == name).expect("only names of effects pass");
-    PossibleValuesParser::new(Effect::ALL.map(Effect::name)).map(known)
-}
-
-/// A number that `T` does not hold becomes 0 or the largest of `T`. The setting must allow neither: validation, which knows
-/// its range, then refuses both.
-pub(super) fn parse_integer<T: TryFrom<u64>>(text: &str) -> Parsed<T> {
-    let number = match text.parse::<i128>() {
-        Ok(number) => number,
-        Err(error) if *error.kind() == IntErrorKind::PosOverflow => i128::MAX,
-        Err(error) if *error.kind() == IntErrorKind::NegOverflow => 0,
-        Err(_) => return Err("must be a whole number".to_owned()),
-    };
-    let largest = u64::MAX >> (64 - 8 * size_of::<T>());
-    Ok(T::try_from(number.clamp(0, largest.into()) as u64).ok().expect("the number is in the range of T"))
-}
-
-/// The same for a setting that allows an end of `T`.
+/// A whole number within a range.
 pub(super) fn parse_within<T>(allowed: RangeInclusive<T>) -> impl Fn(&str) -> Parsed<T> + Clone + Send + Sync
 where
     T: FromStr + PartialOrd + Display + Clone + Send + Sync,
@@ -90,36 +90,6 @@ where
         let number = text.parse().ok().filter(|number| allowed.contains(number));
         number.ok_or_else(|| format!("must be a whole number from {} to {}", allowed.start(), allowed.end()))
     }
-}
-
-pub(super) fn parse_number<T: FromStr>(text: &str) -> Parsed<T> {
-    text.parse().map_err(|_| "must be a number".to_owned())
-}
-
-/// Stops of an exposure.
-pub(super) fn parse_stops(text: &str) -> Parsed<f32> {
-    let stops = parse_number(text)?;
-    if (-64.0..=64.0).contains(&stops) { Ok(stops) } else { Err("must be from -64 to 64 stops".to_owned()) }
-}
-
-/// `1,2,3`.
-pub(super) fn parse_numbers<T: FromStr + Copy, const N: usize>(text: &str) -> Parsed<[T; N]> {
-    let wanted = format!("must be {N} numbers separated by commas");
-    let parts: Option<Vec<T>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
-    parts.and_then(|parts| parts.try_into().ok()).ok_or(wanted)
-}
-
-/// `1%` or `1`: per cent, as a share of 1.
-pub(super) fn parse_percent(text: &str) -> Parsed<f64> {
-    let number = text.strip_suffix('%').unwrap_or(text).trim();
-    number.parse().map(|percent: f64| percent / 100.0).map_err(|_| "must be a number of per cent, such as 1%".to_owned())
-}
-
-/// `2s`, `500ms`, `3m`, `1h`, or seconds.
-pub(super) fn parse_seconds(text: &str) -> Parsed<f64> {
-    let units = [("ms", 1e-3), ("s", 1.0), ("m", 60.0), ("h", 3600.0)];
-    let (number, unit) = units.iter().find_map(|(name, unit)| Some((text.strip_suffix(name)?, *unit))).unwrap_or((text, 1.0));
-    number.trim().parse().map(|count: f64| count * unit).map_err(|_| "must be a time, such as 2s, 500ms or 3m".to_owned())
 }
 
 /// Bytes, as a number or with K, M, G or T for powers of 1024.
@@ -132,28 +102,11 @@ pub(super) fn parse_bytes(text: &str) -> Parsed<u64> {
     bytes.filter(|bytes| (LEAST_MEMORY as f64..1e18).contains(bytes)).map(|bytes| bytes as u64).ok_or(allowed)
 }
 
-/// `3/8`, counted from 1.
-pub(super) fn parse_share(text: &str) -> Parsed<Share> {
-    let share = text.split_once('/').and_then(|(number, of)| {
-        let (number, of): (u32, u32) = (number.trim().parse().ok()?, of.trim().parse().ok()?);
-        (1..=of).contains(&number).then(|| Share { number: number - 1, of })
-    });
-    share.ok_or_else(|| "must be K/N, a shard and their number, such as 3/8: K is from 1 to N".to_owned())
-}
-
 pub(super) fn parse_shininess(text: &str) -> Parsed<[f32; 5]> {
     match parse_numbers::<f32, 1>(text) {
         Ok([all]) => Ok([all; 5]),
         Err(_) => parse_numbers::<f32, 5>(text).map_err(|_| format!("must be one number, or five for {}", WALL_NAMES.join(","))),
     }
-}
-
-pub(super) fn parse_colour(text: &str) -> Parsed<[f32; 3]> {
-    let all = match parse_numbers::<f32, 1>(text) {
-        Ok([grey]) => [grey; 3],
-        Err(_) => parse_numbers::<f32, 3>(text).map_err(|_| "must be one number, or three separated by commas".to_owned())?,
-    };
-    if all.iter().all(|value| value.is_finite() && *value >= 0.0) { Ok(all) } else { Err("must be 0 or more and finite".to_owned()) }
 }
 
 pub(super) fn parse_threads(text: &str) -> Parsed<usize> {

@@ -3,38 +3,32 @@
 use std::sync::atomic::AtomicBool;
 
 use clap::Args;
+use glam::DVec3;
 
-use super::camera::CameraArgs;
-use super::options::CommonArgs;
 use super::progress::{ProgressArgs, ProgressReporter};
-use super::scene::{PhotonArgs, SceneArgs, settings};
+use super::request::{RequestArgs, VIEW};
 use super::typed::Typed;
-use super::values::{BuilderArg, builder_parser, parse_percent, parse_seconds};
+use super::values::{parse_percent, parse_seconds};
 use super::{DeviceArgs, End};
 use crate::error::{Error, Result};
+use crate::render::image::kept;
+use crate::render::viewpoint::size_of;
+use crate::render::{Event, Inputs, Observer, Percent, PreparedScene, RenderRequest, Seconds};
+use crate::scene::{Camera, Scene};
+use crate::settings::RoomSettings;
 use crate::settings::scene::{SceneSettings, Stop};
-use crate::settings::{Builder, RoomSettings};
 use crate::view::{self, Request, Subject};
 
 #[derive(Args)]
 pub(super) struct ViewArgs {
     #[command(flatten)]
-    scene: SceneArgs,
-    #[command(flatten)]
-    camera: CameraArgs,
-    #[command(flatten)]
-    light: PhotonArgs,
-    /// Builder of the photon maps; all give bit-identical results [default: auto]
-    #[arg(long, value_name = "BUILDER", help_heading = "Implementation", value_parser = builder_parser(Builder::ON_GPU, "Persistent for scenes, atomic for the box"))]
-    variant: Option<BuilderArg>,
+    request: RequestArgs<VIEW>,
     /// Error at which a picture ends that R renders [default: 2 %, or a time that suits the device]
     #[arg(long, value_name = "PERCENT", value_parser = parse_percent, allow_hyphen_values = true, help_heading = "When to stop")]
-    error: Option<f64>,
+    error: Option<Percent>,
     /// Time after which it ends: 30s, 5m
     #[arg(long, value_name = "TIME", value_parser = parse_seconds, allow_hyphen_values = true, help_heading = "When to stop")]
-    time: Option<f64>,
-    #[command(flatten)]
-    common: CommonArgs,
+    time: Option<Seconds>,
     #[command(flatten)]
     progress: ProgressArgs,
     #[command(flatten)]
@@ -43,10 +37,6 @@ pub(super) struct ViewArgs {
 
 /// In place of a scene.
 const BOX: &str = "box";
-/// What the window says anew in the command that makes its picture.
-const SAID_ANEW: [&str; 11] =
-    ["--camera", "--eye", "--look-at", "--up", "--fov", "--orthographic", "--size", "--aperture", "--focus", "--without", "--variant"];
-
 /// Options that decide how the paper's box is lit here; it has more of them without a window.
 const OF_BOX: [&str; 3] = ["--photons", "--seed", "--size"];
 
@@ -65,36 +55,52 @@ fn option_of(word: &str) -> &str {
 }
 
 pub(super) fn run(args: &ViewArgs, typed: &Typed, cancelled: &AtomicBool) -> Result<End> {
+    let request = &args.request.0;
     let reporter = ProgressReporter::new(&args.progress);
-    let is_box = args.scene.scene == BOX;
-    let builder = args.variant.flatten();
-    let stop = Stop { error: args.error, seconds: args.time, ..Stop::default() };
-    if is_box {
-        check_box(typed)?;
-    }
+    let tell = |event: Event| reporter.event(event);
+    let observer = Observer { cancelled, tell: &tell };
+    let is_box = request.scene == BOX;
+    let (error, seconds) = (args.error.map(Percent::share), args.time.map(|Seconds(seconds)| seconds));
+    let stop = Stop { error, seconds, ..Stop::default() };
     let (subject, size) = if is_box {
+        check_box(typed)?;
         let usual = RoomSettings::default();
-        let settings = RoomSettings { builder: builder.unwrap_or(usual.builder), seed: args.common.seed.unwrap_or(usual.seed), ..usual };
-        let photons = args.light.photons.unwrap_or(settings.photons);
+        let settings =
+            RoomSettings { builder: request.variant.unwrap_or(usual.builder), seed: request.seed.unwrap_or(usual.seed), ..usual };
+        let photons = request.photons.unwrap_or(settings.photons);
         RoomSettings { stop, photons, ..settings.clone() }.validate()?;
-        (Subject::Box(Box::new(settings)), args.camera.size_of_box(&reporter)?)
+        // Its camera is none of a scene.
+        let camera = Camera::looking_at("box", DVec3::Z, DVec3::ZERO, DVec3::Y, 1.0);
+        let size = request.size.map(|_| size_of(request.size, &camera, &observer)).transpose()?;
+        (Subject::Box(Box::new(settings)), size.map(<[u32; 2]>::from))
     } else {
-        let chosen = args.light.chosen.open()?;
-        let settings = SceneSettings { builder, ..settings(&args.light.request(&args.common), None, chosen.as_ref()) };
+        let inputs = Inputs::open(request)?;
+        let settings = inputs.settings.clone();
         SceneSettings { stop, ..settings.clone() }.validate()?;
-        args.camera.check()?;
-        let scene = args.scene.open(&reporter)?;
-        let (camera, resolved) = args.camera.resolve(&scene, &reporter)?;
-        let subject = Subject::Scene { scene: Box::new(scene), camera, settings: Box::new(settings) };
-        (subject, args.camera.size.map(|_| resolved))
+        let scene = PreparedScene::read(request, &observer)?;
+        let (camera, size) = request.viewpoint(&scene.scene, None, &observer)?;
+        let scene = Box::new(Scene::clone(&scene.scene));
+        (Subject::Scene { scene, camera, settings: Box::new(settings) }, request.size.map(|_| size))
     };
     reporter.finish();
-    let is_kept = |word: &String| !SAID_ANEW.contains(&option_of(word));
-    let words = typed.words().into_iter().filter(is_kept).filter(|word| !is_box || word != BOX);
-    let error = args.error.map(|error| format!("--error={}%", 100.0 * error));
-    let time = args.time.map(|seconds| format!("--time={seconds}s"));
-    let words = words.chain(error).chain(time);
-    let command = if is_box { words.collect() } else { ["render".to_owned()].into_iter().chain(words).collect() };
-    view::run(Request { subject, photons: args.light.photons, size, command, options: args.device.options(), cancelled })?;
+    // What the window says anew is left out.
+    let kept = RenderRequest {
+        camera: None,
+        eye: None,
+        look_at: None,
+        up: None,
+        fov: None,
+        orthographic: None,
+        size: None,
+        aperture: None,
+        focus: None,
+        without: Vec::new(),
+        ..kept(request)
+    };
+    let words = if is_box { kept.words().split_off(1) } else { [vec!["render".to_owned()], kept.words()].concat() };
+    let error = args.error.map(|error| format!("--error={error}"));
+    let time = args.time.map(|time| format!("--time={time}"));
+    let command = words.into_iter().chain(error).chain(time).collect();
+    view::run(Request { subject, photons: request.photons, size, command, options: args.device.options(), cancelled })?;
     Ok(End::Finished)
 }

@@ -11,7 +11,7 @@ pub mod merge_report;
 pub mod metadata;
 pub mod page;
 pub mod photon_map;
-mod report;
+pub mod report;
 pub mod room_report;
 pub mod scene_report;
 pub mod show;

@@ -300,6 +300,22 @@ fn timing_table(timings: &Timings, device: Option<&DeviceFacts>) -> String {
     text
 }
 
+/// What ends a run, as it was understood: for the line that announces the plan.
+pub fn goals(stop: &Stop) -> String {
+    let mut goals = Vec::new();
+    // Rounded to twelve digits, as 0.05 / 100 * 100 is not quite 0.05.
+    let percent = |share: f64| format!("{} %", (share * 1e14).round() / 1e12);
+    goals.extend(stop.error.map(|error| format!("an error of {} ({} confidence)", percent(error), percent(stop.confidence))));
+    goals.extend(stop.seconds.map(|seconds| format!("{seconds} s")));
+    goals.extend(stop.photons.map(|photons| counted(photons, "photon")));
+    if goals.is_empty() { String::new() } else { format!("; stops at {}", goals.join(" or ")) }
+}
+
+/// Rounds that a run does, or may do at most.
+pub fn up_to(stop: &Stop, rounds: u32) -> String {
+    format!("{}{}", if stop.is_set() { "up to " } else { "" }, counted(rounds, "round"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

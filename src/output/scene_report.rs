@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
-use super::report::{Common, common, end_in_words, ending, ledger, losses, shares};
+use super::report::{Common, common, end_in_words, ending, goals, ledger, losses, shares, up_to};
 use crate::constants::MAX_BOUNCES;
 use crate::engine::End;
 use crate::engine::scene::RunResult;
@@ -186,6 +186,27 @@ pub fn plan_table(plan: &ScenePlan, run: Option<(&Timings, &[u64])>) -> String {
 pub fn missing(plan: &ScenePlan) -> Option<String> {
     let names: Vec<&str> = plan.missing().iter().map(|effect| effect.name()).collect();
     (!names.is_empty()).then(|| format!("left out, though the scene has it: {}; the result lacks that light", names.join(", ")))
+}
+
+/// What will be traced, before it is; `unit` is the geometry's in metres.
+pub fn plan_line(plan: &ScenePlan, scene: &str, unit: f64, point: &str, is_of_file: bool) -> String {
+    let what = match plan.sensor {
+        Sensor::Picture { width, height } => format!("{width} x {height} pixels"),
+        Sensor::Receivers { count } => counted(count, point),
+    };
+    let maps: Vec<String> = plan.maps().map(|map| counted(map.photons, &format!("{} photon", map.name))).collect();
+    let radii: Vec<String> = plan.maps().map(|map| format!("{:.4} m ({})", map.radius * unit, map.name)).collect();
+    let (maps, radius) = match maps.is_empty() {
+        true => ("no photons".to_owned(), String::new()),
+        false => (maps.join(" and "), format!("; first radius {}", radii.join(", "))),
+    };
+    format!(
+        "plan: {scene}, {what}; {} of {maps}{}{radius}; {:.1} MiB on the device{}",
+        up_to(&plan.settings.stop, plan.settings.rounds),
+        if is_of_file { " from the file" } else { "" },
+        plan.bytes as f64 / f64::from(1 << 20),
+        goals(&plan.settings.stop)
+    )
 }
 
 /// One line on a radius by a trial round that is wider than what many points lie in.

@@ -17,7 +17,6 @@ use serde::{Deserialize, Serialize};
 
 use super::radius::{mean_squared_radius, over_usual};
 use super::work_cost::Cost;
-use crate::settings::request::Request;
 use crate::settings::scene::{SAMPLES_PER_BLOCK, SceneSettings};
 use crate::settings::stop::{FIRST_LOOK, Stop};
 
@@ -84,21 +83,6 @@ pub struct Free {
 impl Free {
     pub const ALL: Free =
         Free { samples: true, shadow_rays: true, photons: true, caustic_photons: true, neighbours: true, caustic_neighbours: true };
-
-    /// What a request leaves open, of a picture that ends at an error or a time.
-    pub fn of(request: &Request) -> Free {
-        if request.rounds.is_some() || request.stop.photons.is_some() {
-            return Free::default();
-        }
-        Free {
-            samples: request.samples.is_none(),
-            shadow_rays: request.shadow_rays.is_none(),
-            photons: request.photons.is_none(),
-            caustic_photons: request.caustic_photons.is_none(),
-            neighbours: request.neighbours.is_none() && request.radius.is_none(),
-            caustic_neighbours: request.caustic_neighbours.is_none() && request.neighbours.is_none() && request.caustic_radius.is_none(),
-        }
-    }
 }
 
 /// What light of a round varies by, relative to the square of all light.

@@ -23,7 +23,7 @@ pub struct Surroundings {
     pub strength: Option<f32>,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Environment {
     /// The same radiance from everywhere, W/m2/sr.
     Colour([f32; 3]),

@@ -14,7 +14,7 @@ macro_rules! named {
         impl $type {
             pub const ALL: [$type; [$($name),*].len()] = [$($type::$value),*];
 
-            pub fn name(self) -> &'static str {
+            pub const fn name(self) -> &'static str {
                 match self { $($type::$value => $name),* }
             }
         }
@@ -22,7 +22,6 @@ macro_rules! named {
 }
 
 pub mod builder;
-pub mod request;
 pub mod scene;
 pub mod stop;
 pub mod tile_samples;

@@ -1,11 +1,14 @@
 //! Errors of the library as exceptions.
 
 use photonmill::error::Error as Failure;
+use photonmill::render::names::spelled;
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyType};
+
+use crate::settings::keyword;
 
 create_exception!(photonmill, Error, PyException, "What went wrong, in one line: what, which value, what is allowed.");
 create_exception!(photonmill, RunWarning, PyUserWarning, "What the user should know of a scene or a run, in one line.");
@@ -48,34 +51,9 @@ pub fn of(py: Python<'_>, failure: &Failure) -> PyErr {
     }
 }
 
-/// A message in which options are called as arguments are: `--total-photons` is total_photons.
+/// A message in which fields are named as keyword arguments.
 pub fn in_python(message: &str) -> String {
-    let is_part = |letter: char| letter.is_ascii_lowercase() || letter == '-';
-    let mut text = String::with_capacity(message.len());
-    let mut rest = message.strip_prefix("-o ").map_or_else(|| message.to_owned(), |rest| format!("path {rest}"));
-    if let Some(after) = rest.strip_prefix("SCENE ") {
-        rest = format!("scene {after}");
-    }
-    let mut rest = rest.as_str();
-    while let Some(place) = rest.find("--") {
-        let (before, option) = rest.split_at(place);
-        text.push_str(before);
-        let name = &option[2..];
-        let length = name.find(|letter| !is_part(letter)).unwrap_or(name.len());
-        let starts_a_word = before.chars().next_back().is_none_or(|letter| !letter.is_alphanumeric());
-        if length == 0 || !starts_a_word {
-            text.push_str("--");
-            rest = name;
-            continue;
-        }
-        let name_in_python = match &name[..length] {
-            "with" => "with_".to_owned(),
-            name => name.replace('-', "_"),
-        };
-        text.push_str(&name_in_python);
-        rest = &name[length..];
-    }
-    text + rest
+    spelled(message, |field| format!("{}=", keyword(field)))
 }
 
 /// Issues warnings, as Python's filters want them.

@@ -9,7 +9,8 @@ use numpy::ndarray::{Array, Array2, Array3, Dimension};
 use numpy::{IntoPyArray, PyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use photonmill::output::colour::{Format, Tone};
 use photonmill::output::show::{Layer, Surface};
-use photonmill::render::{Lightmaps as Baked, Picture, Style};
+use photonmill::render::values::Layers;
+use photonmill::render::{Image, Lightmaps as Baked, Observer, RenderRequest, Stops};
 use photonmill::settings::scene::Part;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -57,24 +58,31 @@ pub struct Film {
 }
 
 impl Film {
-    pub fn new(py: Python<'_>, scene: &str, found: Picture) -> PyResult<Py<Film>> {
-        let run = Run::new(py, scene, Found::Picture(found))?;
+    pub fn new(py: Python<'_>, scene: &str, found: Image, warnings: Vec<String>) -> PyResult<Py<Film>> {
+        let run = Run::new(py, scene, Found::Image(found), warnings)?;
         let found = run.found.clone();
         let film =
             Film { found, radiance: Pixels::new(), standard_error: Pixels::new(), parts: PyOnceLock::new(), surfaces: PyOnceLock::new() };
         Py::new(py, PyClassInitializer::from(run).add_subclass(film))
     }
 
-    fn picture(&self) -> &Picture {
+    fn image(&self) -> &Image {
         match &*self.found {
-            Found::Picture(picture) => picture,
+            Found::Image(image) => image,
             _ => unreachable!("a film is of a picture"),
         }
     }
 
+    fn style(&self, py: Python<'_>, exposure: Option<f32>, tone: &str) -> PyResult<RenderRequest> {
+        let exposure = stops_of(py, exposure)?.map(Stops);
+        // A file that says nothing of its tone has the usual one.
+        let tone = Some(tone_of(py, tone)?).filter(|tone| *tone != Tone::default());
+        Ok(RenderRequest { exposure, tone, ..self.image().request.clone() })
+    }
+
     fn surfaces(&self, py: Python<'_>) -> PyResult<&Surfaces> {
         self.surfaces.get_or_try_init(py, || {
-            let made = self.picture();
+            let made = self.image();
             let seen = py.detach(|| made.surfaces());
             let colours = |of: fn(&Surface) -> Vec3| array(py, picture(made.size, seen.iter().map(of))).unbind();
             let (width, height) = (made.size.0 as usize, made.size.1 as usize);
@@ -114,19 +122,19 @@ impl Film {
     #[doc = doc!("Film.width")]
     #[getter]
     fn width(&self) -> u32 {
-        self.picture().size.0
+        self.image().size.0
     }
 
     #[doc = doc!("Film.height")]
     #[getter]
     fn height(&self) -> u32 {
-        self.picture().size.1
+        self.image().size.1
     }
 
     #[doc = doc!("Film.radiance")]
     #[getter]
     fn radiance<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray3<f32>> {
-        let Picture { run, size, .. } = self.picture();
+        let Image { run, size, .. } = self.image();
         let make = || array(py, py.detach(|| picture(*size, run.film.means().map(DVec3::as_vec3)))).unbind();
         self.radiance.get_or_init(py, make).bind(py).clone()
     }
@@ -134,7 +142,7 @@ impl Film {
     #[doc = doc!("Film.standard_error")]
     #[getter]
     fn standard_error<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray3<f32>> {
-        let Picture { run, size, .. } = self.picture();
+        let Image { run, size, .. } = self.image();
         let errors = || {
             let of_pixel = run.film.stated_errors();
             picture(*size, (0..run.film.pixels()).map(|pixel| of_pixel(pixel).as_vec3()))
@@ -145,7 +153,7 @@ impl Film {
     #[doc = doc!("Film.unseen")]
     #[getter]
     fn unseen<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f32>> {
-        let Picture { run, size, .. } = self.picture();
+        let Image { run, size, .. } = self.image();
         let bounds: Vec<f32> = py.detach(|| (0..run.film.pixels()).map(run.film.unseen_bounds()).map(|most| most as f32).collect());
         array(py, Array2::from_shape_vec((size.1 as usize, size.0 as usize), bounds).expect("one bound a pixel"))
     }
@@ -153,12 +161,12 @@ impl Film {
     #[doc = doc!("Film.degrees_of_freedom")]
     #[getter]
     fn degrees_of_freedom(&self) -> u32 {
-        self.picture().run.film.error_freedom()
+        self.image().run.film.error_freedom()
     }
 
     #[doc = doc!("Film.interval")]
     fn interval<'py>(&self, py: Python<'py>) -> [Bound<'py, PyArray3<f32>>; 2] {
-        let Picture { run, size, .. } = self.picture();
+        let Image { run, size, .. } = self.image();
         [0, 1].map(|end| {
             let ends = run.film.intervals();
             array(py, py.detach(|| picture(*size, (0..run.film.pixels()).map(|pixel| ends(pixel)[end].as_vec3()))))
@@ -168,7 +176,7 @@ impl Film {
     #[doc = doc!("Film.parts")]
     #[getter]
     fn parts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let Picture { run, size, .. } = self.picture();
+        let Image { run, size, .. } = self.image();
         let make = || {
             let parts = PyDict::new(py);
             let is_apart = run.film.mean_of_part(0, 0).is_some();
@@ -204,16 +212,16 @@ impl Film {
     #[doc = doc!("Film.save")]
     #[pyo3(signature = (path, *, exposure=None, tone="neutral", layers=None))]
     fn save(&self, py: Python<'_>, path: PathBuf, exposure: Option<f32>, tone: &str, layers: Option<Vec<String>>) -> PyResult<()> {
-        let layers = layers.map_or(Ok(Style::default().layers), |names| layers_of(py, &names))?;
-        let style = Style { exposure: stops_of(py, exposure)?, tone: tone_of(py, tone)?, layers };
-        py.detach(|| self.picture().save(&path, &style)).map_err(|failure| error::of(py, &failure))
+        let layers = layers.map(|names| layers_of(py, &names).map(Layers)).transpose()?;
+        let style = RenderRequest { layers, ..self.style(py, exposure, tone)? };
+        py.detach(|| self.image().save_as(&path, &style, &Observer::default())).map_err(|failure| error::of(py, &failure))
     }
 
     #[doc = doc!("Film.png")]
     #[pyo3(signature = (*, exposure=None, tone="neutral"))]
     fn png<'py>(&self, py: Python<'py>, exposure: Option<f32>, tone: &str) -> PyResult<Bound<'py, PyBytes>> {
-        let style = Style { exposure: stops_of(py, exposure)?, tone: tone_of(py, tone)?, ..Style::default() };
-        Ok(PyBytes::new(py, &py.detach(|| self.picture().encode(Format::Png, &style))))
+        let style = self.style(py, exposure, tone)?;
+        Ok(PyBytes::new(py, &py.detach(|| self.image().file(&style, Format::Png, &Observer::default()).0)))
     }
 
     /// What a notebook shows.
@@ -231,8 +239,8 @@ pub struct Irradiance {
 }
 
 impl Irradiance {
-    pub fn new(py: Python<'_>, scene: &str, found: photonmill::render::Run) -> PyResult<Py<Irradiance>> {
-        let run = Run::new(py, scene, Found::Points(found))?;
+    pub fn new(py: Python<'_>, scene: &str, found: photonmill::render::Run, warnings: Vec<String>) -> PyResult<Py<Irradiance>> {
+        let run = Run::new(py, scene, Found::Points(found), warnings)?;
         let found = run.found.clone();
         let points = Irradiance { found, irradiance: PyOnceLock::new(), standard_error: PyOnceLock::new() };
         Py::new(py, PyClassInitializer::from(run).add_subclass(points))
@@ -331,8 +339,8 @@ pub struct Lightmaps {
 }
 
 impl Lightmaps {
-    pub fn new(py: Python<'_>, scene: &str, baked: Baked) -> PyResult<Py<Lightmaps>> {
-        let run = Run::new(py, scene, Found::Lightmaps(baked))?;
+    pub fn new(py: Python<'_>, scene: &str, baked: Baked, warnings: Vec<String>) -> PyResult<Py<Lightmaps>> {
+        let run = Run::new(py, scene, Found::Lightmaps(baked), warnings)?;
         let found = run.found.clone();
         Py::new(py, PyClassInitializer::from(run).add_subclass(Lightmaps { found, maps: PyOnceLock::new() }))
     }

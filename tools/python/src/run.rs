@@ -1,17 +1,18 @@
 //! Runs beside Python: on a thread of their own, so that other threads of Python go on, Ctrl-C is heard and progress is reported. And what all
 //! results have in common.
 
+use std::cell::RefCell;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::time::Duration;
 
-use photonmill::engine::watch::{Keep, Progress};
-use photonmill::engine::{Control, End};
+use photonmill::engine::End;
+use photonmill::engine::watch::Progress;
 use photonmill::error::{Error as Failure, Result};
 use photonmill::gpu::Gpu;
 use photonmill::output::scene_report;
-use photonmill::render::{self, Lightmaps, Picture};
+use photonmill::render::{self, Event, Image, Lightmaps, Observer};
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -75,22 +76,27 @@ fn lock<'a>(gpus: &'a Mutex<Vec<Gpu>>, cancelled: &AtomicBool) -> Result<MutexGu
     }
 }
 
-/// Does `work` on devices, and tells `progress` how far it has come.
+/// Does `work` on devices, and calls `progress` with how far it has come; returns the warnings of the work, too.
 pub fn on_devices<T: Send>(
     py: Python<'_>,
     gpus: &Mutex<Vec<Gpu>>,
     progress: Option<&Bound<'_, PyAny>>,
-    work: impl FnOnce(&mut Vec<Gpu>, &mut Control) -> Result<T> + Send,
-) -> PyResult<T> {
+    work: impl FnOnce(&mut Vec<Gpu>, &Observer) -> Result<T> + Send,
+) -> PyResult<(T, Vec<String>)> {
     let progress = progress.map(|progress| progress.clone().unbind());
     let tell = |py: Python<'_>, told: Progress| match &progress {
         Some(progress) => progress.call1(py, (progress_dict(py, &told)?,)).map(drop),
         None => Ok(()),
     };
     beside_python(py, &tell, |cancelled, tell| {
-        let mut report = |progress: &Progress| tell(progress.clone());
-        let mut control = Control { cancelled, progress: &mut report, keep: Keep::default() };
-        work(&mut *lock(gpus, cancelled)?, &mut control)
+        let (warnings, tell) = (RefCell::new(Vec::new()), RefCell::new(tell));
+        let event = |event: Event| match event {
+            Event::Progress(progress) => (tell.borrow_mut())(progress.clone()),
+            Event::Warning(text) | Event::Remark(text) => warnings.borrow_mut().push(text.to_owned()),
+            _ => {}
+        };
+        let done = work(&mut *lock(gpus, cancelled)?, &Observer { cancelled, tell: &event })?;
+        Ok((done, warnings.into_inner()))
     })
 }
 
@@ -106,7 +112,7 @@ fn progress_dict<'py>(py: Python<'py>, progress: &Progress) -> PyResult<Bound<'p
 
 /// What a call has found.
 pub enum Found {
-    Picture(Picture),
+    Image(Image),
     Points(render::Run),
     Lightmaps(Lightmaps),
 }
@@ -116,19 +122,19 @@ pub enum Found {
 pub struct Run {
     pub found: Arc<Found>,
     scene: String,
+    warnings: Vec<String>,
 }
 
 impl Run {
     /// Issues the warnings of a run.
-    pub fn new(py: Python<'_>, scene: &str, found: Found) -> PyResult<Run> {
-        let run = Run { found: Arc::new(found), scene: scene.to_owned() };
-        error::warn(py, &run.run().warnings)?;
-        Ok(run)
+    pub fn new(py: Python<'_>, scene: &str, found: Found, warnings: Vec<String>) -> PyResult<Run> {
+        error::warn(py, &warnings)?;
+        Ok(Run { found: Arc::new(found), scene: scene.to_owned(), warnings })
     }
 
     fn run(&self) -> &render::Run {
         match &*self.found {
-            Found::Picture(picture) => &picture.run,
+            Found::Image(image) => &image.run,
             Found::Points(run) => run,
             Found::Lightmaps(lightmaps) => &lightmaps.run,
         }
@@ -212,18 +218,18 @@ impl Run {
     #[doc = doc!("Run.warnings")]
     #[getter]
     fn warnings(&self) -> Vec<String> {
-        self.run().warnings.iter().map(|line| error::in_python(line)).collect()
+        self.warnings.iter().map(|line| error::in_python(line)).collect()
     }
 
     #[doc = doc!("Run.report")]
     #[getter]
     fn report(&self) -> String {
         let point = match &*self.found {
-            Found::Picture(_) => "pixel",
+            Found::Image(_) => "pixel",
             Found::Points(_) => "point",
             Found::Lightmaps(_) => "texel",
         };
-        scene_report::text(&self.scene, self.run(), point, false)
+        error::in_python(&scene_report::text(&self.scene, self.run(), point, false))
     }
 
     #[doc = doc!("Run.details")]

@@ -1,16 +1,21 @@
 //! Scenes, and what is computed of them.
 
+use std::cell::RefCell;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use numpy::PyReadonlyArray2;
 use photonmill::bake::MAX_SIDE;
 use photonmill::bake::pages::{Atlas, MIN_PAGE};
+use photonmill::gpu::Gpu;
 use photonmill::output::destination::Folder;
-use photonmill::render::{BakeRequest, PreparedScene, point_of};
+use photonmill::render::options::Command;
+use photonmill::render::points::point_of;
+use photonmill::render::values::SunPosition;
+use photonmill::render::{BakeRequest, Event, Observer, PreparedScene, RenderRequest};
 use photonmill::scene::picture_size::{PictureSize, parse_size};
-use photonmill::scene::surroundings::{Environment, Surroundings};
-use photonmill::scene::{LightKind, Reading, built_in};
+use photonmill::scene::surroundings::Environment;
+use photonmill::scene::{LightKind, built_in};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -44,6 +49,7 @@ impl Light {
 #[pyclass(module = "photonmill", frozen)]
 pub struct Scene {
     scene: Arc<PreparedScene>,
+    warnings: Vec<String>,
     /// As it was named.
     pub named: String,
 }
@@ -130,11 +136,30 @@ impl Scene {
             let allowed = "must be azimuth and elevation in degrees; the elevation above 0 and at most 90";
             return Err(error::argument(py, format!("sun ({azimuth}, {elevation}): {allowed}")));
         }
-        let surroundings = Surroundings { environment, sun, rotate: environment_rotate, strength: environment_strength };
-        let reading = Reading { radiometric, at };
-        let scene = beside_python(py, &|_, ()| Ok(()), |_, _| PreparedScene::read(&name, reading, &surroundings))?;
-        error::warn(py, &scene.warnings)?;
-        Ok(Scene { scene: Arc::new(scene), named: name })
+        let sun = sun.map(|[azimuth, elevation]| SunPosition { azimuth, elevation });
+        let request = RenderRequest {
+            radiometric,
+            at,
+            environment,
+            sun,
+            environment_rotate,
+            environment_strength,
+            ..RenderRequest::of(name.clone())
+        };
+        let (scene, warnings) = beside_python(py, &|_, ()| Ok(()), |cancelled, _| {
+            let warnings = RefCell::new(Vec::new());
+            let tell = |event: Event| {
+                if let Event::Warning(text) | Event::Remark(text) = event {
+                    warnings.borrow_mut().push(text.to_owned());
+                }
+            };
+            let observer = Observer { cancelled, tell: &tell };
+            let scene = PreparedScene::read(&request, &observer)?;
+            scene.geometry(&observer)?;
+            Ok((scene, warnings.take()))
+        })?;
+        error::warn(py, &warnings)?;
+        Ok(Scene { scene: Arc::new(scene), warnings, named: name })
     }
 
     #[doc = doc!("Scene.name")]
@@ -191,7 +216,7 @@ impl Scene {
     #[doc = doc!("Scene.warnings")]
     #[getter]
     fn warnings(&self) -> Vec<String> {
-        self.scene.warnings.iter().map(|line| error::in_python(line)).collect()
+        self.warnings.iter().map(|line| error::in_python(line)).collect()
     }
 
     #[doc = doc!("Scene.render")]
@@ -205,14 +230,13 @@ impl Scene {
         progress: Option<&Bound<'_, PyAny>>,
         settings: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Py<Film>> {
-        let request = settings::request(py, settings, true)?;
         let size = size.map(size_of).transpose()?;
-        let camera = camera.map(|camera| self.camera(camera)).transpose()?;
+        let request = RenderRequest { size, ..settings::request(py, settings, Command::Render)? };
+        let (request, camera) = camera.map_or(Ok((request.clone(), None)), |camera| self.camera(camera, &request))?;
         let device = or_usual(py, device)?;
-        let picture = on_devices(py, &device.get().gpus, progress, |gpus, control| {
-            self.scene.render(gpus, camera.as_ref(), size, &request, control)
-        })?;
-        Film::new(py, self.name(), picture)
+        let (image, warnings) =
+            on_devices(py, &device.get().gpus, progress, |gpus, observer| self.scene.render(gpus, camera.as_ref(), &request, observer))?;
+        Film::new(py, self.name(), image, warnings)
     }
 
     #[doc = doc!("Scene.probe")]
@@ -226,11 +250,12 @@ impl Scene {
         progress: Option<&Bound<'_, PyAny>>,
         settings: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Py<Irradiance>> {
-        let request = settings::request(py, settings, false)?;
+        let request = settings::request(py, settings, Command::Probe)?;
         let points = points_of(points, normals)?;
         let device = or_usual(py, device)?;
-        let run = on_devices(py, &device.get().gpus, progress, |gpus, control| self.scene.probe(gpus, &points, &request, control))?;
-        Irradiance::new(py, self.name(), run)
+        let work = |gpus: &mut Vec<Gpu>, observer: &Observer| self.scene.probe(gpus, &points, &request, observer);
+        let (run, warnings) = on_devices(py, &device.get().gpus, progress, work)?;
+        Irradiance::new(py, self.name(), run, warnings)
     }
 
     #[doc = doc!("Scene.bake")]
@@ -248,13 +273,14 @@ impl Scene {
         progress: Option<&Bound<'_, PyAny>>,
         settings: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Py<Lightmaps>> {
-        let request = settings::request(py, settings, false)?;
-        let folder = folder.map(|path| Folder::open("-o", &path)).transpose().map_err(|failure| error::of(py, &failure))?;
+        let request = settings::request(py, settings, Command::Bake)?;
+        let folder = folder.map(|path| Folder::open("folder", &path)).transpose().map_err(|failure| error::of(py, &failure))?;
         let atlas = atlas.map(atlas_of).transpose()?;
         let bake = BakeRequest { texels_per_metre, folder, atlas, preview, exposure };
         let device = or_usual(py, device)?;
-        let baked = on_devices(py, &device.get().gpus, progress, |gpus, control| self.scene.bake(gpus, &bake, &request, control))?;
-        Lightmaps::new(py, self.name(), baked)
+        let work = |gpus: &mut Vec<Gpu>, observer: &Observer| self.scene.bake(gpus, &bake, &request, observer);
+        let (baked, warnings) = on_devices(py, &device.get().gpus, progress, work)?;
+        Lightmaps::new(py, self.name(), baked, warnings)
     }
 
     fn __repr__(&self) -> String {
@@ -263,14 +289,15 @@ impl Scene {
 }
 
 impl Scene {
-    /// One of its cameras by name, or one's own.
-    fn camera(&self, camera: &Bound<'_, PyAny>) -> PyResult<photonmill::scene::Camera> {
+    /// A request with one of the scene's cameras by name, or one's own camera beside it.
+    fn camera(&self, camera: &Bound<'_, PyAny>, request: &RenderRequest) -> PyResult<(RenderRequest, Option<photonmill::scene::Camera>)> {
         if let Ok(camera) = camera.cast::<Camera>() {
-            return Ok(camera.get().camera.clone());
+            return Ok((request.clone(), Some(camera.get().camera.clone())));
         }
         let wrong = |_| PyTypeError::new_err(format!("camera must be a Camera or the name of one, not {}", camera.get_type()));
         let name: String = camera.extract().map_err(wrong)?;
-        self.scene.scene.camera(&name).map_err(|failure| error::of(camera.py(), &failure))
+        self.scene.scene.camera(&name).map_err(|failure| error::of(camera.py(), &failure))?;
+        Ok((RenderRequest { camera: Some(name), ..request.clone() }, None))
     }
 }
 

@@ -1,131 +1,78 @@
-//! Keyword arguments as a request: each is called as the program's option of the same meaning, with _ for - in it.
+//! Keyword arguments as a request: each is an option of the program, with `_` for `-` in its name.
 
-use photonmill::render::Request;
-use photonmill::settings::scene::{Effect, Filter, Illumination, Kernel, Part};
-use photonmill::settings::stop::Measure;
-use photonmill::settings::{Builder, Math};
+use std::path::PathBuf;
+
+use photonmill::render::options::{Command, ROWS, Row};
+use photonmill::render::values::Form;
+use photonmill::render::{Percent, RenderRequest};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict};
 
 use crate::error;
 
-/// Every name that [`request`] knows.
-const NAMES: [&str; 31] = [
-    "error",
-    "measure",
-    "confidence",
-    "time",
-    "total_photons",
-    "rounds",
-    "block",
-    "photons",
-    "caustic_photons",
-    "bounces",
-    "seed",
-    "neighbours",
-    "caustic_neighbours",
-    "radius",
-    "caustic_radius",
-    "alpha",
-    "kernel",
-    "edge_correction",
-    "samples",
-    "shadow_rays",
-    "final_gather",
-    "aim",
-    "illumination",
-    "part",
-    "filter",
-    "variant",
-    "math",
-    "paranoid",
-    "chunk",
-    "with_",
-    "without",
+/// Rows of other calls: those of a scene, which it is read with, and those of a picture's file, which it is written with.
+const ELSEWHERE: [&str; 11] = [
+    "radiometric",
+    "at",
+    "environment",
+    "sun",
+    "environment_rotate",
+    "environment_strength",
+    "camera",
+    "size",
+    "exposure",
+    "tone",
+    "layers",
 ];
 
-/// What is asked for; `of_picture`: samples, part and filter mean something.
-pub fn request(py: Python<'_>, settings: Option<&Bound<'_, PyDict>>, of_picture: bool) -> PyResult<Request> {
-    let mut request = Request::default();
+/// The keyword that stands for a field: Python has words of its own.
+pub fn keyword(field: &str) -> &str {
+    if field == "with" { "with_" } else { field }
+}
+
+/// The keyword arguments of a command's call.
+fn rows(command: Command) -> impl Iterator<Item = &'static Row> {
+    ROWS.iter().filter(move |row| row.is_of(command as u32) && !ELSEWHERE.contains(&row.field))
+}
+
+/// What is asked for.
+pub fn request(py: Python<'_>, settings: Option<&Bound<'_, PyDict>>, command: Command) -> PyResult<RenderRequest> {
+    let mut request = RenderRequest::default();
     for (key, value) in settings.into_iter().flatten() {
         let name: String = key.extract()?;
-        let value = Value { py, name: &name, value: &value };
-        if !of_picture && ["samples", "part", "filter"].contains(&name.as_str()) {
-            return Err(PyTypeError::new_err(format!("'{name}' is of pictures only; leave it out")));
-        }
-        // As if it were not given.
-        if value.value.is_none() && NAMES.contains(&name.as_str()) {
-            continue;
-        }
-        match name.as_str() {
-            "error" => request.stop.error = Some(value.number()?),
-            "measure" => request.stop.measure = value.choice(&[("rmse", Measure::Rmse), ("relmse", Measure::RelMse)])?,
-            "confidence" => request.stop.confidence = value.number()?,
-            "time" => request.stop.seconds = Some(value.number()?),
-            "total_photons" => request.stop.photons = Some(value.integer()?),
-            "rounds" => request.rounds = Some(value.integer()?),
-            "block" => request.block = Some(value.integer()?),
-            "photons" => request.photons = Some(value.integer()?),
-            "caustic_photons" => request.caustic_photons = Some(value.integer()?),
-            "bounces" => request.bounces = Some(value.integer()?),
-            "seed" => request.seed = Some(value.integer()?),
-            "neighbours" => request.neighbours = Some(value.integer()?),
-            "caustic_neighbours" => request.caustic_neighbours = Some(value.integer()?),
-            "radius" => request.radius = Some(value.number()?),
-            "caustic_radius" => request.caustic_radius = Some(value.number()?),
-            "alpha" => request.alpha = Some(value.number()?),
-            "kernel" => {
-                request.kernel =
-                    Some(value.choice(&[("box", Kernel::Box), ("cone", Kernel::Cone), ("epanechnikov", Kernel::Epanechnikov)])?);
-            }
-            "edge_correction" => request.edge_correction = Some(value.switch()?),
-            "samples" => request.samples = Some(value.integer()?),
-            "shadow_rays" => request.shadow_rays = Some(value.integer()?),
-            "final_gather" => request.final_gather = value.switch()?,
-            "aim" => request.aim = Some(value.switch()?),
-            "illumination" => {
-                request.illumination = Some(value.choice(&[("split", Illumination::Split), ("photons", Illumination::Photons)])?);
-            }
-            "part" => {
-                let parts = [Part::All, Part::Direct, Part::Specular, Part::Caustic, Part::Indirect];
-                let names = ["all", "direct", "specular", "caustic", "indirect"];
-                request.part = Some(value.choice(&names.into_iter().zip(parts).collect::<Vec<_>>())?);
-            }
-            "filter" => {
-                request.filter = Some(value.choice(&[("box", Filter::Box), ("tent", Filter::Tent), ("gaussian", Filter::Gaussian)])?);
-            }
-            "variant" => {
-                let builders = Builder::ON_GPU.into_iter().map(|builder| (builder.name(), Some(builder)));
-                request.builder = value.choice(&[("auto", None)].into_iter().chain(builders).collect::<Vec<_>>())?;
-            }
-            "math" => request.math = Some(value.choice(&[("fast", Math::Fast), ("strict", Math::Strict)])?),
-            "paranoid" => request.paranoid = value.switch()?,
-            "chunk" => request.chunk = Some(value.integer()?),
-            "with_" => request.with = value.effects()?,
-            "without" => request.without = value.effects()?,
-            _ => return Err(unknown(&name)),
+        let Some(row) = rows(command).find(|row| keyword(row.field) == name) else {
+            let is_of_pictures = rows(Command::Render).any(|row| keyword(row.field) == name);
+            return Err(match is_of_pictures {
+                true => PyTypeError::new_err(format!("'{name}' is of pictures only; leave it out")),
+                false => unknown(&name, command),
+            });
+        };
+        // None is as if it were not given.
+        if !value.is_none() {
+            Argument { py, name: &name, value: &value }.set(row, &mut request)?;
         }
     }
     Ok(request)
 }
 
 /// As Python refuses what a function does not take.
-fn unknown(name: &str) -> PyErr {
+fn unknown(name: &str, command: Command) -> PyErr {
+    let names: Vec<&str> = rows(command).map(|row| keyword(row.field)).collect();
     let likeness = |known: &&str| strsim::jaro(known, name);
-    let meant = NAMES.into_iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b))).filter(|best| likeness(best) > 0.8);
-    let meant = meant.map_or_else(|| format!("; the settings are {}", NAMES.join(", ")), |meant| format!(". Did you mean '{meant}'?"));
+    let meant = names.iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b))).filter(|best| likeness(best) > 0.8);
+    let meant = meant.map_or_else(|| format!("; the settings are {}", names.join(", ")), |meant| format!(". Did you mean '{meant}'?"));
     PyTypeError::new_err(format!("got an unexpected keyword argument '{name}'{meant}"))
 }
 
 /// An argument and what it is called.
-struct Value<'a, 'py> {
+struct Argument<'a, 'py> {
     py: Python<'py>,
     name: &'a str,
     value: &'a Bound<'py, PyAny>,
 }
 
-impl Value<'_, '_> {
+impl Argument<'_, '_> {
     fn wrong_type(&self, wanted: &str) -> PyErr {
         let found = self.value.get_type().name().map_or_else(|_| "another type".to_owned(), |name| name.to_string());
         PyTypeError::new_err(format!("{} must be {wanted}, not {found}", self.name))
@@ -133,51 +80,69 @@ impl Value<'_, '_> {
 
     fn refused(&self, allowed: &str) -> PyErr {
         let shown = self.value.repr().map_or_else(|_| String::new(), |shown| shown.to_string());
-        error::argument(self.py, format!("{} {shown}: {allowed}", self.name))
+        error::argument(self.py, format!("{}={shown}: {allowed}", self.name))
     }
 
-    fn number(&self) -> PyResult<f64> {
-        let number = if self.value.is_instance_of::<PyBool>() { None } else { self.value.extract().ok() };
-        number.ok_or_else(|| self.wrong_type("a number"))
+    fn set(&self, row: &Row, request: &mut RenderRequest) -> PyResult<()> {
+        let text = self.text(row)?;
+        let field = (row.of)(request);
+        field.read_os(text.as_ref()).map_err(|allowed| self.refused(&allowed))?;
+        // What does not fit became the least or the largest that does.
+        match field.text().filter(|read| row.form() == Form::Integer && *read != text) {
+            Some(end) if end == "0" => Err(self.refused("must be 0 or more")),
+            Some(end) => Err(self.refused(&format!("must be at most {end}"))),
+            None => Ok(()),
+        }
     }
 
-    /// What is out of range of its type is refused here, and what the setting does not allow by its validation.
-    fn integer<T: TryFrom<i128> + Bounded>(&self) -> PyResult<T> {
-        let number = if self.value.is_instance_of::<PyBool>() { None } else { self.value.call_method0("__index__").ok() };
-        let number = number.ok_or_else(|| self.wrong_type("an int"))?;
-        let fits = number.extract::<i128>().ok().and_then(|number| T::try_from(number).ok());
-        fits.ok_or_else(|| self.refused(&format!("must be from 0 to {}", T::LARGEST)))
+    /// The value as the command line has it.
+    fn text(&self, row: &Row) -> PyResult<String> {
+        let text = || self.value.extract::<String>();
+        match row.form() {
+            Form::Flag | Form::Switch => {
+                let is_on: bool = self.value.extract().map_err(|_| self.wrong_type("a bool"))?;
+                if !is_on && row.form() == Form::Flag { Ok("off".to_owned()) } else { Ok(if is_on { "on" } else { "off" }.to_owned()) }
+            }
+            Form::Integer => {
+                let number = if self.value.is_instance_of::<PyBool>() { None } else { self.value.call_method0("__index__").ok() };
+                number.ok_or_else(|| self.wrong_type("an int")).map(|number| number.to_string())
+            }
+            Form::Number => self.number().map(|number| number.to_string()).ok_or_else(|| self.wrong_type("a number")),
+            Form::Percent => match self.number() {
+                Some(share) => self.share(share),
+                None => text().map_err(|_| self.wrong_type("a number, or a str such as '2%'")),
+            },
+            Form::Time => match self.number() {
+                Some(seconds) => Ok(format!("{seconds}s")),
+                None => text().map_err(|_| self.wrong_type("a number of seconds, or a str such as '2m'")),
+            },
+            Form::Numbers(count) => {
+                let numbers: Vec<f64> = self.value.extract().map_err(|_| self.wrong_type(&format!("{count} numbers")))?;
+                Ok(numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(","))
+            }
+            Form::File => {
+                let path: PathBuf = self.value.extract().map_err(|_| self.wrong_type("a str or a path"))?;
+                path.into_os_string().into_string().map_err(|_| self.refused("must be in UTF-8"))
+            }
+            Form::Names(_) => {
+                let names = text().map(|name| vec![name]).or_else(|_| self.value.extract::<Vec<String>>());
+                names.map(|names| names.join(",")).map_err(|_| self.wrong_type("the name of an effect or a sequence of names"))
+            }
+            Form::Text | Form::Other | Form::Choice(_) => text().map_err(|_| self.wrong_type("a str")),
+        }
     }
 
-    fn switch(&self) -> PyResult<bool> {
-        self.value.extract().map_err(|_| self.wrong_type("a bool"))
+    fn number(&self) -> Option<f64> {
+        if self.value.is_instance_of::<PyBool>() { None } else { self.value.extract().ok() }
     }
 
-    fn choice<T: Copy>(&self, all: &[(&str, T)]) -> PyResult<T> {
-        let name: String = self.value.extract().map_err(|_| self.wrong_type("a str"))?;
-        let names: Vec<&str> = all.iter().map(|(name, _)| *name).collect();
-        let found = all.iter().find(|(known, _)| *known == name).map(|(_, value)| *value);
-        found.ok_or_else(|| self.refused(&format!("must be one of {}", names.join(", "))))
+    /// A share of 1. An error of more than a half is more likely one in per cent, as is a confidence of more than 1.
+    fn share(&self, share: f64) -> PyResult<String> {
+        let most = if self.name == "confidence" { 1.0 } else { 0.5 };
+        if share > most {
+            let (meant, as_given) = (Percent::new(share), Percent::of_share(share));
+            return Err(self.refused(&format!("did you mean {} or {as_given}? Write {} or '{as_given}'", meant, share / 100.0)));
+        }
+        Ok(Percent::of_share(share).to_string())
     }
-
-    fn effects(&self) -> PyResult<Vec<Effect>> {
-        let one = self.value.extract::<String>().ok().map(|name| vec![name]);
-        let names: Vec<String> =
-            one.map_or_else(|| self.value.extract(), Ok).map_err(|_| self.wrong_type("the name of an effect or a sequence of names"))?;
-        let known = Effect::ALL.map(Effect::name).join(", ");
-        let effect = |name: &String| Effect::ALL.into_iter().find(|effect| effect.name() == name);
-        names.iter().map(|name| effect(name).ok_or_else(|| self.refused(&format!("must be among {known}")))).collect()
-    }
-}
-
-trait Bounded {
-    const LARGEST: u64;
-}
-
-impl Bounded for u32 {
-    const LARGEST: u64 = u32::MAX as u64;
-}
-
-impl Bounded for u64 {
-    const LARGEST: u64 = u64::MAX;
 }

@@ -1,14 +1,12 @@
-//! Runs that are kept: checkpoints, shards, and going on with what a file holds.
+//! Checkpoints, shards and going on with what a file holds; snapshots of a run that is under way.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use clap::Args;
-
-use super::complain;
-use super::stop::StopArgs;
-use super::values::{parse_seconds, parse_share};
+use super::events::{Event, Tell};
+use super::request::RenderRequest;
+use super::values::{Percent, Seconds};
 use crate::engine::blocks::Share;
 use crate::engine::saved::SavedRun;
 use crate::engine::watch::{Keep, Later, SaveRun};
@@ -16,25 +14,9 @@ use crate::error::{Error, Result, require};
 use crate::output::destination::{Destination, check_not_read, write_synced};
 use crate::text::refusal;
 
-#[derive(Args)]
-#[command(next_help_heading = "When to stop")]
-pub(super) struct KeepArgs {
-    /// Write all sums into this file from time to time and at the end, so that --resume can go on with them
-    #[arg(long, value_name = "FILE")]
-    pub(super) checkpoint: Option<PathBuf>,
-    /// Time between two checkpoints [default: 30s]
-    #[arg(long, value_name = "TIME", value_parser = parse_seconds, allow_hyphen_values = true, requires = "checkpoint")]
-    every: Option<f64>,
-    /// Go on with the blocks of rounds that a checkpoint holds; the result is that of a run without a break, to the bit
-    #[arg(long, value_name = "FILE")]
-    resume: Option<PathBuf>,
-    /// Do every N-th block of rounds, from the K-th on (K from 1 to N); `photonmill merge` adds the checkpoints of all of them
-    #[arg(long, value_name = "K/N", value_parser = parse_share, requires = "checkpoint")]
-    pub(super) shard: Option<Share>,
-}
-
 /// What writes checkpoints and snapshots while a run goes on.
-pub(super) struct Keeper<'a> {
+pub struct Checkpoints<'a> {
+    tell: Tell<'a>,
     checkpoint: Option<Destination>,
     every: Duration,
     resume: Option<(PathBuf, SavedRun)>,
@@ -71,11 +53,11 @@ impl<W> Snapshot<W> {
         self.written.elapsed() >= self.every
     }
 
-    /// What fails is told of, and does not end the run.
-    fn write(&mut self, write: impl FnOnce(&mut W) -> Result<()>) {
+    /// What fails is reported, and does not end the run.
+    fn write(&mut self, tell: Tell, write: impl FnOnce(&mut W) -> Result<()>) {
         let result = write(&mut self.write);
         if let (Err(error), false) = (&result, self.is_absent) {
-            complain(&format!("warning: {error}; the run goes on"));
+            tell(Event::Warning(&format!("{error}; the run goes on")));
         }
         self.is_absent = result.is_err();
         self.written = Instant::now();
@@ -85,20 +67,31 @@ impl<W> Snapshot<W> {
 /// Between two checkpoints.
 const USUAL_EVERY: f64 = 30.0;
 
-impl KeepArgs {
+/// What of a run ends in a checkpoint, or goes on from one; without a field of a request that asks for it, nothing.
+#[derive(Debug, Clone, Default)]
+pub struct CheckpointRequest {
+    pub checkpoint: Option<PathBuf>,
+    pub every: Option<Seconds>,
+    pub resume: Option<PathBuf>,
+    pub shard: Option<Share>,
+}
+
+impl CheckpointRequest {
+    pub fn of(request: &RenderRequest) -> CheckpointRequest {
+        let RenderRequest { checkpoint, every, resume, shard, .. } = request;
+        CheckpointRequest { checkpoint: checkpoint.clone(), every: *every, resume: resume.clone(), shard: *shard }
+    }
+
     /// Fails now where the file could not be written later, or what is to be gone on with cannot be read.
-    pub(super) fn open<'a>(&self, stop: &StopArgs) -> Result<Keeper<'a>> {
-        let checkpoint = self.checkpoint.as_ref().map(|path| Destination::open_file("--checkpoint", path)).transpose()?;
-        let every = self.every.unwrap_or(USUAL_EVERY);
-        require((0.001..=1e6).contains(&every), "--every", every, "must be from 1ms to 1000000s")?;
-        if let Some(shard) = self.shard {
-            stop.check_shard(shard)?;
-        }
-        let resume = self.resume.as_ref().map(|path| Ok((path.clone(), read("--resume", path)?))).transpose()?;
-        let every = Duration::from_secs_f64(every);
-        Ok(Keeper {
+    pub fn open<'a>(&self, tell: Tell<'a>) -> Result<Checkpoints<'a>> {
+        let checkpoint = self.checkpoint.as_ref().map(|path| Destination::open_file("checkpoint", path)).transpose()?;
+        let every = self.every.map_or(USUAL_EVERY, |Seconds(seconds)| seconds);
+        require((0.001..=1e6).contains(&every), "every", every, "must be from 1ms to 1000000s")?;
+        let resume = self.resume.as_ref().map(|path| Ok((path.clone(), read("resume", path)?))).transpose()?;
+        Ok(Checkpoints {
+            tell,
             checkpoint,
-            every,
+            every: Duration::from_secs_f64(every),
             resume,
             share: self.shard.unwrap_or_default(),
             snapshot: None,
@@ -110,48 +103,61 @@ impl KeepArgs {
     }
 }
 
+/// Refuses what only all shards together can know.
+pub fn check_shard(shard: Option<Share>, error: Option<Percent>, total_photons: Option<u64>, bias: bool) -> Result<()> {
+    let Some(shard) = shard else { return Ok(()) };
+    let only_merged = "cannot be known to one shard; give `rounds`, leave it out with `shard`, and look at the error of the merge";
+    if let Some(error) = error {
+        return Err(Error::setting("error", error, only_merged));
+    }
+    if let Some(photons) = total_photons {
+        return Err(Error::setting("total_photons", photons, only_merged));
+    }
+    require(!bias, "shard", shard, "cannot be measured with `bias`; leave `bias` out")
+}
+
 /// A file of a run.
-pub(super) fn read(option: &'static str, path: &PathBuf) -> Result<SavedRun> {
+pub fn read(option: &'static str, path: &PathBuf) -> Result<SavedRun> {
     let refuse = |reason: String| Error::setting(option, path.display(), reason);
     let bytes =
-        std::fs::read(path).map_err(|error| refuse(format!("cannot be read ({}); name a file of --checkpoint", refusal(&error))))?;
+        std::fs::read(path).map_err(|error| refuse(format!("cannot be read ({}); name a file of `checkpoint`", refusal(&error))))?;
     SavedRun::from_bytes(&bytes).map_err(refuse)
 }
 
-impl<'a> Keeper<'a> {
+impl<'a> Checkpoints<'a> {
     /// Calls `write` at this interval while the run goes on, but not at its end.
-    pub(super) fn set_snapshot(&mut self, every: Duration, write: Write<'a>) {
+    pub fn set_snapshot(&mut self, every: Duration, write: Write<'a>) {
         self.snapshot = Some(Snapshot::new(every, write));
     }
 
     /// The same for what need not wait for the picture.
-    pub(super) fn set_display(&mut self, every: Duration, show: Show<'a>) {
+    pub fn set_display(&mut self, every: Duration, show: Show<'a>) {
         self.display = Some(Snapshot::new(every, show));
     }
 
     /// Refuses outputs in files that are read. A checkpoint may take the place of the one that the run goes on with.
-    pub(super) fn check_not_read<'b>(&self, outputs: &[Destination], inputs: impl IntoIterator<Item = &'b Path>) -> Result<()> {
+    pub fn check_not_read<'b>(&self, outputs: &[Destination], inputs: impl IntoIterator<Item = &'b Path>) -> Result<()> {
         let others: Vec<Destination> = outputs.iter().filter(|output| Some(*output) != self.checkpoint.as_ref()).cloned().collect();
         check_not_read(outputs, inputs)?;
         check_not_read(&others, self.resume.iter().map(|(path, _)| path.as_path()))
     }
 
     /// Of the run that is gone on with, whose blocks have so many.
-    pub(super) fn rounds_done(&self, block: u32) -> u32 {
+    pub fn rounds_done(&self, block: u32) -> u32 {
         self.resume.as_ref().map_or(0, |(_, run)| run.done.count() * block)
     }
 
     /// The run that is gone on with.
-    pub(super) fn resumed(&self) -> Option<&SavedRun> {
+    pub fn resumed(&self) -> Option<&SavedRun> {
         self.resume.as_ref().map(|(_, run)| run)
     }
 
-    pub(super) fn destinations(&self) -> Vec<Destination> {
+    pub fn destinations(&self) -> Vec<Destination> {
         self.checkpoint.iter().cloned().collect()
     }
 
     /// For a run on a scene of this name.
-    pub(super) fn keep<'b>(&'b mut self, scene: &'b str) -> Keep<'b> {
+    pub fn keep<'b>(&'b mut self, scene: &'b str) -> Keep<'b> {
         let of_checkpoint = self.checkpoint.as_ref().map(|_| self.every);
         let of_pictures = [self.snapshot.as_ref().map(|snapshot| snapshot.every), self.display.as_ref().map(|display| display.every)];
         let every = of_pictures.into_iter().chain([of_checkpoint]).flatten().min();
@@ -160,32 +166,33 @@ impl<'a> Keeper<'a> {
     }
 
     /// Fails where the last checkpoint is not there; says so where there is none, as no block of rounds was done.
-    pub(super) fn finish(self) -> Result<()> {
+    pub fn finish(self) -> Result<()> {
         if let Some(file) = self.checkpoint.filter(|_| !self.has_checkpoint && self.failed.is_none()) {
-            complain(&format!("warning: --checkpoint {}: is not written, as no block of rounds was done", file.path().display()));
+            let path = file.path().display();
+            (self.tell)(Event::Warning(&format!("`checkpoint` {path}: is not written, as no block of rounds was done")));
         }
         self.failed.map_or(Ok(()), Err)
     }
 }
 
-impl SaveRun for Keeper<'_> {
+impl SaveRun for Checkpoints<'_> {
     /// Writes what is due. A checkpoint that cannot be written is told of, and does not end the run.
     fn save(&mut self, run: &Arc<SavedRun>, is_last: bool) -> Result<()> {
         if let Some(file) = self.checkpoint.as_ref().filter(|_| is_last || self.written.elapsed() >= self.every) {
             let result = write_synced(file, &run.to_bytes());
             if let (Err(error), false, None) = (&result, is_last, &self.failed) {
-                complain(&format!("warning: {error}; the run goes on"));
+                (self.tell)(Event::Warning(&format!("{error}; the run goes on")));
             }
             self.has_checkpoint |= result.is_ok();
             self.failed = result.err();
             self.written = Instant::now();
         }
         if let Some(snapshot) = self.snapshot.as_mut().filter(|snapshot| !is_last && snapshot.is_due()) {
-            snapshot.write(|write| write(run));
+            snapshot.write(self.tell, |write| write(run));
         }
         if let Some(display) = self.display.as_mut().filter(|display| !is_last && display.is_due()) {
             let run = run.clone();
-            display.write(|show| show(Box::new(|| run)));
+            display.write(self.tell, |show| show(Box::new(|| run)));
         }
         Ok(())
     }
@@ -201,7 +208,7 @@ impl SaveRun for Keeper<'_> {
             return self.save(&Arc::new(run()), false);
         }
         if let Some(display) = self.display.as_mut().filter(|display| display.is_due()) {
-            display.write(|show| show(Box::new(|| Arc::new(run()))));
+            display.write(self.tell, |show| show(Box::new(|| Arc::new(run()))));
         }
         Ok(())
     }

@@ -1,9 +1,9 @@
-//! `--denoise`: direct light of a picture without its noise. Only there does the noise of a pixel say nothing of its neighbours'
+//! Direct light of a picture without its noise. Only there does the noise of a pixel say nothing of its neighbours'
 //! (src/guide/accuracy.md), and only such noise does a denoiser tell from detail.
 
 use glam::{DVec3, Vec3};
 
-use super::complain;
+use super::events::Observer;
 use crate::engine::saved::SavedRun;
 use crate::engine::scene::SceneFilm;
 use crate::error::{Result, require};
@@ -16,11 +16,11 @@ const DIRECT: usize = 0;
 
 /// Fails where the library is not installed, or a run of these settings has no direct light of its own.
 pub(super) fn open(settings: &SceneSettings, resumed: Option<&SavedRun>) -> Result<Denoiser> {
-    let needed = |is_so: bool, what: &str| require(is_so, "--denoise", "on", what);
-    needed(settings.part == Part::All, "is for pictures of all parts of the light; leave --part out")?;
-    let of_maps = "needs --illumination split: photons give neighbouring pixels the same noise, which a denoiser takes for detail";
+    let needed = |is_so: bool, what: &str| require(is_so, "denoise", "on", what);
+    needed(settings.part == Part::All, "is for pictures of all parts of the light; leave `part` out")?;
+    let of_maps = "needs `illumination` split: photons give neighbouring pixels the same noise, which a denoiser takes for detail";
     needed(settings.illumination == Illumination::Split, of_maps)?;
-    let apart = "needs a checkpoint of a run with -o FILE.exr or --denoise, which keeps direct light apart";
+    let apart = "needs a checkpoint of a run with -o FILE.exr or `denoise`, which keeps direct light apart";
     needed(resumed.is_none_or(SavedRun::has_parts), apart)?;
     Denoiser::open()
 }
@@ -31,14 +31,20 @@ pub(super) fn name(denoiser: &Denoiser) -> String {
 }
 
 /// Radiance of all pixels; `None` after a warning where it cannot be had.
-pub(super) fn denoised(denoiser: &Denoiser, film: &SceneFilm, surfaces: &[Surface], size: (u32, u32)) -> Option<Vec<Vec3>> {
+pub(super) fn denoised(
+    denoiser: &Denoiser,
+    film: &SceneFilm,
+    surfaces: &[Surface],
+    size: (u32, u32),
+    observer: &Observer,
+) -> Option<Vec<Vec3>> {
     let direct: Option<Vec<_>> = (0..film.pixels()).map(|pixel| film.mean_of_part(DIRECT, pixel)).collect();
     let Some(direct) = direct else {
-        complain("warning: --denoise: is left out, as the run could not keep direct light apart; the picture is as it was rendered");
+        observer.warn("`denoise`: is left out, as the run could not keep direct light apart; the picture is as it was rendered");
         return None;
     };
     if film.blocks < 2 {
-        complain("warning: --denoise: is left out, as errors are unknown before two blocks of rounds are whole; ask for more --rounds");
+        observer.warn("`denoise`: is left out, as errors are unknown before two blocks of rounds are whole; ask for more `rounds`");
         return None;
     }
     // What shines in the pixel itself is no noise of shadow rays; its sharp edges stay.
@@ -60,7 +66,7 @@ pub(super) fn denoised(denoiser: &Denoiser, film: &SceneFilm, surfaces: &[Surfac
             Some(denoised.into_iter().enumerate().map(bounded).map(DVec3::as_vec3).collect())
         }
         Err(error) => {
-            complain(&format!("warning: {error}; the picture is as it was rendered"));
+            observer.warn(format!("{error}; the picture is as it was rendered"));
             None
         }
     }

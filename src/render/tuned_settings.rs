@@ -1,11 +1,9 @@
-//! What a pilot has chosen, as a file: `--save-settings` and `--settings`.
+//! What a pilot has chosen, as a file.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use clap::Args;
 use serde::{Deserialize, Serialize};
 
-use super::complain;
 use crate::error::{Error, Result};
 use crate::output::destination::{Destination, write_all};
 use crate::output::metadata::Metadata;
@@ -13,13 +11,6 @@ use crate::plan::work_division::Division;
 use crate::settings::scene::SceneSettings;
 use crate::settings::tile_samples::TileSamples;
 use crate::text::refusal;
-
-#[derive(Args)]
-pub(super) struct ChosenArgs {
-    /// Take what a pilot has chosen from a file of --save-settings, and run no pilot; options that are given go before it
-    #[arg(long, value_name = "FILE", help_heading = "Light transport")]
-    settings: Option<PathBuf>,
-}
 
 /// The first line of a file says what it is.
 const FORMAT: &str = "photonmill settings 1";
@@ -29,7 +20,7 @@ const MOST_BYTES: u64 = 1 << 20;
 /// What was chosen, and for what.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Chosen {
+pub struct TunedSettings {
     format: String,
     version: String,
     scene: String,
@@ -39,45 +30,30 @@ pub(super) struct Chosen {
     size: [u32; 2],
     /// Class of the device.
     device: String,
-    pub(super) settings: Division,
+    pub settings: Division,
     /// Tiles with more samples than all pixels have.
     tiles: Option<TileSamples>,
     /// Rounds that the goal was expected to take, whole blocks.
-    pub(super) rounds: u32,
+    pub rounds: u32,
 }
 
 /// For what something was chosen, or is used.
-pub(super) struct For<'a> {
-    pub(super) scene: &'a str,
-    pub(super) scene_hash: String,
-    pub(super) size: (u32, u32),
-    pub(super) device: &'a str,
+pub struct TunedFor<'a> {
+    pub scene: &'a str,
+    pub scene_hash: String,
+    pub size: (u32, u32),
+    pub device: &'a str,
 }
 
-impl ChosenArgs {
-    /// Files that are read.
-    pub(super) fn inputs(&self) -> impl Iterator<Item = &Path> {
-        self.settings.iter().map(PathBuf::as_path)
-    }
-
-    pub(super) fn is_given(&self) -> bool {
-        self.settings.is_some()
-    }
-
-    pub(super) fn open(&self) -> Result<Option<Chosen>> {
-        self.settings.as_deref().map(Chosen::open).transpose()
-    }
-}
-
-impl Chosen {
-    pub(super) fn new(settings: &SceneSettings, rounds: u32, chosen_for: &For) -> Chosen {
-        Chosen {
+impl TunedSettings {
+    pub fn new(settings: &SceneSettings, rounds: u32, tuned_for: &TunedFor) -> TunedSettings {
+        TunedSettings {
             format: FORMAT.into(),
             version: env!("CARGO_PKG_VERSION").into(),
-            scene: chosen_for.scene.into(),
-            scene_hash: chosen_for.scene_hash.clone(),
-            size: [chosen_for.size.0, chosen_for.size.1],
-            device: chosen_for.device.into(),
+            scene: tuned_for.scene.into(),
+            scene_hash: tuned_for.scene_hash.clone(),
+            size: [tuned_for.size.0, tuned_for.size.1],
+            device: tuned_for.device.into(),
             settings: Division::of(settings),
             tiles: settings.tiles.clone(),
             rounds,
@@ -85,23 +61,23 @@ impl Chosen {
     }
 
     /// What a request starts from.
-    pub(super) fn settings(&self) -> SceneSettings {
+    pub fn settings(&self) -> SceneSettings {
         SceneSettings { tiles: self.tiles.clone(), rounds: self.rounds, ..self.settings.set(&SceneSettings::default()) }
     }
 
-    fn open(path: &Path) -> Result<Chosen> {
+    pub fn open(path: &Path) -> Result<TunedSettings> {
         let refused = |reason: String| Error::setting("--settings", path.display(), reason);
         let unreadable = |error: std::io::Error| refused(format!("cannot be read ({}); name a file of --save-settings", refusal(&error)));
         let is_long = std::fs::metadata(path).map_err(unreadable)?.len() > MOST_BYTES;
         let text = if is_long { Vec::new() } else { std::fs::read(path).map_err(unreadable)? };
         let other =
             |reason: &dyn std::fmt::Display| refused(format!("is no file of --save-settings of this version ({reason}); make a new one"));
-        let chosen: Chosen = serde_json::from_slice(&text).map_err(|error| other(&error))?;
-        if chosen.format != FORMAT {
+        let tuned: TunedSettings = serde_json::from_slice(&text).map_err(|error| other(&error))?;
+        if tuned.format != FORMAT {
             return Err(other(&format!("its format is not '{FORMAT}'")));
         }
-        chosen.validate().map_err(|error| other(&error))?;
-        Ok(chosen)
+        tuned.validate().map_err(|error| other(&error))?;
+        Ok(tuned)
     }
 
     fn validate(&self) -> Result<()> {
@@ -109,8 +85,8 @@ impl Chosen {
     }
 
     /// What a picture's file says of its rounds; fails where that is nothing that a run can do.
-    pub(super) fn of_picture(made: &Metadata, settings: Division, tiles: Option<TileSamples>) -> Result<Chosen> {
-        let chosen = Chosen {
+    pub fn of_picture(made: &Metadata, settings: Division, tiles: Option<TileSamples>) -> Result<TunedSettings> {
+        let tuned = TunedSettings {
             format: FORMAT.into(),
             version: made.photonmill.clone(),
             scene: made.scene.clone(),
@@ -121,18 +97,18 @@ impl Chosen {
             tiles,
             rounds: made.rounds,
         };
-        chosen.validate()?;
-        Ok(chosen)
+        tuned.validate()?;
+        Ok(tuned)
     }
 
-    pub(super) fn write(&self, destination: Destination) -> Result<()> {
+    pub fn write(&self, destination: Destination) -> Result<()> {
         let mut text = serde_json::to_vec_pretty(self).expect("settings are numbers and names");
         text.push(b'\n');
         write_all([(destination, text)])
     }
 
-    /// Warns where it was chosen for something else.
-    pub(super) fn compare(&self, used_for: &For) {
+    /// What is to be said where it was chosen for something else.
+    pub fn difference(&self, used_for: &TunedFor) -> Option<String> {
         let size = |size: [u32; 2]| format!("{} x {} pixels", size[0], size[1]);
         let own = [used_for.size.0, used_for.size.1];
         let other = if self.scene_hash != used_for.scene_hash {
@@ -142,8 +118,8 @@ impl Chosen {
         } else if self.device != used_for.device {
             format!("a device of class {}", self.device)
         } else {
-            return;
+            return None;
         };
-        complain(&format!("warning: --settings: chosen for {other}; other settings may be better here"));
+        Some(format!("`settings`: chosen for {other}; other settings may be better here"))
     }
 }

@@ -1,0 +1,69 @@
+//! The photons of a scene as a file.
+
+use super::events::{Event, Observer};
+use super::prepare::Prepared;
+use crate::engine::retry::until_done;
+use crate::engine::scene::fill_map::{Filled, fill};
+use crate::engine::scene::map_file::{Header, MapWriter};
+use crate::engine::scene::trial;
+use crate::engine::watch::Keep;
+use crate::engine::{self, Control};
+use crate::error::{Error, Result, require};
+use crate::gpu::Gpu;
+use crate::output::destination::Destination;
+use crate::plan::scene::ScenePlan;
+use crate::plan::sensor::Sensor;
+use crate::settings::stop::LEAST_BLOCKS;
+use crate::text::counted;
+
+/// Rounds of a file where nobody says how many: each is a block, and so many tell the error of an image well.
+pub const USUAL_ROUNDS: u32 = 2 * LEAST_BLOCKS;
+
+/// A file that was written.
+pub struct WrittenMap {
+    pub header: Header,
+    pub filled: Filled,
+    /// Why it holds fewer rounds, where the device is gone for good.
+    pub failed: Option<Error>,
+}
+
+impl Prepared<'_> {
+    /// Traces the photons of all rounds into a file. The rounds should be of a block each, as they know nothing of each other.
+    pub fn write_map(&self, gpu: &mut Gpu, output: &Destination, observer: &Observer) -> Result<WrittenMap> {
+        let (scene, geometry, settings) = (&*self.scene, &*self.geometry, &self.inputs.settings);
+        let find = |gpu: &Gpu| trial::find(gpu, scene, &self.view(), settings, self.sensor);
+        let trial = until_done(gpu, &observer.failed(), find)?;
+        // No picture is made, so that its buffers need no room.
+        let sensor = Sensor::Picture { width: 1, height: 1 };
+        let plan_of = |gpu: &Gpu| ScenePlan::with_trial(scene, geometry, settings, sensor, &engine::limits(gpu.facts()), trial.clone());
+        let plan = plan_of(gpu)?;
+        let maps: Vec<String> = plan.maps().map(|map| counted(map.photons, &format!("{} photon", map.name))).collect();
+        let no_photons = "calls for no photons: nothing scatters light a second time, and nothing makes caustics";
+        require(!maps.is_empty(), "SCENE", &self.inputs.request.scene, no_photons)?;
+        let rounds = counted(settings.rounds, "round");
+        observer.tell(Event::Note(&format!("plan: {}, {rounds} of {}", scene.name, maps.join(" and "))));
+
+        observer.tell(Event::Status("making the pipelines"));
+        let mut file = output.stage()?;
+        let unwritten = |error: std::io::Error| output.failed(&error);
+        let mut writer = MapWriter::new(file.file(), &scene.name, geometry, &plan, &gpu.facts().label()).map_err(unwritten)?;
+        let mut progress = |progress: &engine::Progress| observer.tell(Event::Progress(progress));
+        let mut control = Control { cancelled: observer.cancelled, progress: &mut progress, keep: Keep::default() };
+        let mut once = |gpu: &Gpu| fill(gpu, geometry, &plan_of(gpu)?, &mut writer, &unwritten, &mut control);
+        let filled = observer.interruptible(|| until_done(gpu, &observer.failed(), &mut once));
+        // A device that is gone for good leaves whole rounds too.
+        let (filled, failed) = match filled {
+            Err(error @ (Error::DeviceLost { .. } | Error::OutOfMemory { .. })) if writer.rounds() > 0 => {
+                (Filled { rounds: writer.rounds(), is_cancelled: true, nonfinite_values: None }, Some(error))
+            }
+            filled => (filled?, None),
+        };
+        let header = writer.finish().map_err(unwritten)?;
+        file.finish()?;
+        if filled.is_cancelled {
+            let done = counted(filled.rounds, "round");
+            observer.tell(Event::Remark(&format!("ended early: the file holds {done} of {}", settings.rounds)));
+        }
+        Ok(WrittenMap { header, filled, failed })
+    }
+}

@@ -1,0 +1,264 @@
+//! Every option of a request, a row each. From the rows come the arguments of the commands and their help, the keys of `--config`, what a
+//! picture's metadata keeps and `repeat` takes, Python's keyword arguments, and what errors call a field.
+
+use super::request::RenderRequest;
+use super::values::{Form, Value};
+
+/// Under which heading of the help an option stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Group {
+    Output,
+    Scene,
+    WhenToStop,
+    Photons,
+    LightTransport,
+    DensityEstimate,
+    Implementation,
+    Checks,
+}
+
+impl Group {
+    pub fn heading(self) -> &'static str {
+        match self {
+            Group::Output => "Output",
+            Group::Scene => "Scene",
+            Group::WhenToStop => "When to stop",
+            Group::Photons => "Photons",
+            Group::LightTransport => "Light transport",
+            Group::DensityEstimate => "Density estimate",
+            Group::Implementation => "Implementation",
+            Group::Checks => "Checks",
+        }
+    }
+}
+
+/// What an option decides of a picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Decides {
+    /// Its values, or its file: metadata keep it as it was given.
+    Picture,
+    /// How much work is done: metadata have what came of it.
+    Work,
+    /// Neither: how and when it is computed.
+    Nothing,
+}
+
+/// The commands that have options of a request; each as its number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Command {
+    Render = 1,
+    View = 1 << 1,
+    Bake = 1 << 2,
+    Probe = 1 << 3,
+    Map = 1 << 4,
+    Plan = 1 << 5,
+}
+
+const R: u32 = Command::Render as u32;
+const V: u32 = Command::View as u32;
+const B: u32 = Command::Bake as u32;
+const P: u32 = Command::Probe as u32;
+const M: u32 = Command::Map as u32;
+const L: u32 = Command::Plan as u32;
+const RUNS: u32 = R | B | P | L;
+const SEEN: u32 = R | V | L;
+const ALL: u32 = RUNS | V | M;
+
+pub struct Row {
+    /// As a field is called; a command's option has `-` for `_`.
+    pub field: &'static str,
+    /// What its value is called in the help; empty of a flag.
+    pub value: &'static str,
+    pub group: Group,
+    pub decides: Decides,
+    commands: u32,
+    pub help: &'static str,
+    /// What holds where it is not given, in words; empty where the help says enough.
+    pub default: &'static str,
+    /// Fields without which it means nothing, and fields that exclude it.
+    pub requires: &'static [&'static str],
+    pub conflicts: &'static [&'static str],
+    pub of: fn(&mut RenderRequest) -> &mut dyn Value,
+}
+
+macro_rules! rows {
+    ($($group:ident { $($field:ident $value:literal $decides:ident $commands:tt $help:literal
+        $(default $default:literal)? $(requires $requires:literal)? $(conflicts [$($conflict:literal),*])?;)* })*) => {
+        &[$($(Row {
+            field: stringify!($field),
+            value: $value,
+            group: Group::$group,
+            decides: Decides::$decides,
+            commands: $commands,
+            help: $help,
+            default: concat!($($default)?),
+            requires: &[$($requires)?],
+            conflicts: &[$($($conflict),*)?],
+            of: |request| &mut request.$field,
+        }),*),*]
+    };
+}
+
+/// In the order of the help.
+pub const ROWS: &[Row] = rows! {
+    Output {
+        exposure "STOPS" Picture R
+            "Exposure of a PNG in stops, each of which doubles the brightness" default "what makes the mean middle grey";
+        tone "CURVE" Picture R "Tone curve of a PNG" default "neutral";
+        layers "all|none|LAYER,..." Picture R
+            "Layers of an EXR beside the light: all, none, or some of direct, specular, caustic, indirect, standard_error, unseen, albedo, normal and depth"
+            default "all";
+        denoise "" Picture R
+            "Remove noise from direct light in the picture with Open Image Denoise, which must be installed. Other light, layers and errors stay as they were rendered"
+            requires "output";
+    }
+    Scene {
+        radiometric "" Picture ALL
+            "Take the intensities of the lights of a glTF file as W/sr and W/m2" default "candela and lux, divided by 683 lm/W";
+        at "SECONDS" Picture ALL
+            "Take nodes, skins and morph targets as the file's first animation has them at this time" default "at rest";
+        environment "R,G,B|FILE" Picture ALL
+            "Light from beyond the scene in place of the file's own: W/m2/sr, one number or three for red, green and blue, or a picture of all directions (equirectangular, .hdr or .exr)"
+            default "the file's; 1 if nothing in the file emits light";
+        sun "AZIMUTH,ELEVATION" Picture ALL
+            "Add a sun, degrees clockwise from -z as seen from above and above the horizon, and the clear sky that belongs to it unless `environment` is given";
+        environment_rotate "DEGREES" Picture ALL
+            "Turn the environment's picture about the vertical, degrees, counter-clockwise as seen from above; not the sky of `sun`";
+        environment_strength "FACTOR" Picture ALL "Multiply the environment's light, or that of `sun` and its sky";
+        camera "NAME" Picture SEEN "Camera by name" default "the first one; one that sees the whole scene if it has none";
+        eye "X,Y,Z" Picture SEEN "Where the camera stands, metres, in place of where the scene has it";
+        look_at "X,Y,Z" Picture SEEN "What it looks at, metres" default "straight on, as the scene's camera does";
+        up "X,Y,Z" Picture SEEN "What is up in its picture, as a direction" default "0,1,0 with `look_at`";
+        fov "DEGREES" Picture SEEN
+            "Angle between the picture's lower and upper edge, degrees" default "that of the scene's camera";
+        orthographic "METRES" Picture SEEN "Height of what the picture shows by parallel rays, metres" conflicts ["fov"];
+        size "WIDTH[xHEIGHT]" Picture SEEN
+            "Size of the picture in pixels; a width alone takes its height from the camera's aspect ratio"
+            default "about 307200 pixels in the camera's aspect ratio, 640x480 if it has none";
+        aperture "METRES" Picture SEEN
+            "Diameter of the camera's lens, metres: what is not in focus is blurred" default "0, a pinhole";
+        focus "METRES" Picture SEEN
+            "Distance of the plane in focus, metres" default "that of what the middle of the picture shows" requires "aperture";
+    }
+    WhenToStop {
+        error "PERCENT" Nothing RUNS
+            "Stop once the relative error is at most this: 2%. It is of light that surfaces scatter; lamps, the sky and unlit surfaces that are seen directly are left out";
+        measure "MEASURE" Picture RUNS
+            "What the error is: the RMSE over the mean, or the root of relMSE, whose epsilon is (1 % of the mean)^2" default "rmse";
+        confidence "PERCENT" Picture RUNS "Confidence level of the error bound" default "95%";
+        time "TIME" Nothing RUNS "Stop after rounds of this time: 2s, 500ms, 3m. Does not include start-up and the pilot";
+        total_photons "N" Nothing RUNS "Stop once this many photons have been traced, summed over all rounds and maps";
+        bias "" Nothing RUNS
+            "Measure the bias, which is the blur by the search radius, in extra runs where `measure` is relmse. Otherwise it is estimated from the run's own blocks. With `error` it counts as part of the error";
+        checkpoint "FILE" Nothing RUNS
+            "Write all sums into this file from time to time and at the end, so that `resume` can go on with them";
+        every "TIME" Nothing RUNS "Time between two checkpoints" default "30s" requires "checkpoint";
+        resume "FILE" Nothing RUNS
+            "Go on with the blocks of rounds that a checkpoint holds; the result is that of a run without a break, to the bit";
+        shard "K/N" Nothing RUNS
+            "Do every N-th block of rounds, from the K-th on (K from 1 to N); `photonmill merge` adds the checkpoints of all of them"
+            requires "checkpoint";
+    }
+    Photons {
+        photons "N" Work ALL
+            "Photons of the global map, per round" default "131072; what a pilot finds best of a picture that ends at an error or a time";
+        caustic_photons "N" Work ALL
+            "Photons of the caustic map, per round" default "the same as `photons`; what a pilot finds best";
+        bounces "N" Picture ALL "Cut photons off after this many bounces" default "none; Russian roulette ends paths";
+        aim "SWITCH" Picture ALL
+            "Aim photons of the caustic map at mirrors and glass (projection maps), and light of a sky or sun at the openings that it comes in through"
+            default "on";
+        map "FILE" Picture RUNS
+            "Take the photons from a file of `photonmill map` instead of tracing them: the same light for another camera, radius or kernel"
+            conflicts ["photons", "caustic_photons", "bounces", "aim", "illumination"];
+        rounds "N" Work RUNS
+            "Number of independent rounds, of which the result is the mean"
+            default "as many as the goals take, up to 65536; 32 of points, texels and shards without a goal";
+        block "N" Picture RUNS
+            "Rounds of a block, a power of two. Samples are stratified over a block, and errors come from the spread of blocks; `rounds` is rounded up to whole blocks"
+            default "4, less with more `samples`";
+        seed "N" Picture ALL "Seed of the random numbers" default "1";
+    }
+    LightTransport {
+        illumination "METHOD" Picture ALL "Source of direct light and caustics" default "split";
+        settings "FILE" Work ALL
+            "Take what a pilot has chosen from a file of `save_settings`, and run no pilot; options that are given go before it";
+        with "EFFECT" Picture ALL "Simulate an effect even if the scene does not need it; `photonmill plan` lists them";
+        without "EFFECT" Picture ALL "Leave an effect out even if the scene needs it";
+        shadow_rays "N" Work RUNS
+            "Shadow rays per visible point and round" default "4; what a pilot finds best of a picture that ends at an error or a time";
+        final_gather "" Picture RUNS
+            "Final gathering: take indirect light from one ray to the next surface, not from the map at the visible point";
+        part "PART" Picture (R | L) "Compute only this part of the light; the four parts sum to `all` exactly";
+        samples "N" Work R
+            "Camera paths per pixel and round, a power of two. Every path queries the caustic map; where all of them end on the first surface, only one queries the global map"
+            default "1; what a pilot finds best of a run that ends at an error or a time";
+        save_settings "FILE" Work R "Write what the pilot has chosen for `settings`. Without -o, only the pilot runs";
+        filter "FILTER" Picture R "Reconstruction filter of the pixels" default "box";
+    }
+    DensityEstimate {
+        neighbours "N" Work RUNS
+            "Photons of a round within the first radius of the global map at the median pixel, texel or point, as a trial round finds it"
+            default "24; what a pilot finds best of a picture that ends at an error or a time";
+        caustic_neighbours "N" Work RUNS
+            "The same for the caustic map" default "6, or a quarter of `neighbours`; or what a pilot finds best";
+        radius "METRES" Picture RUNS
+            "Radius of the density estimate of the global map in the first round, metres" default "what holds `neighbours`";
+        caustic_radius "METRES" Picture RUNS "The same for the caustic map" default "what holds `caustic_neighbours`";
+        alpha "ALPHA" Picture RUNS
+            "How the radius shrinks from round to round, as alpha of Knaus and Zwicker (2011): above 0 and at most 1, which keeps the radius"
+            default "0.667" conflicts ["fixed_radius"];
+        fixed_radius "" Picture RUNS "Keep the radius, like `alpha` 1";
+        kernel "KERNEL" Picture RUNS "Kernel of the density estimate: weight of a photon by its distance" default "box";
+        edge_correction "SWITCH" Picture RUNS
+            "Divide by the part of the search disc that lies on the surface, not by the whole disc" default "on";
+    }
+    Implementation {
+        variant "BUILDER" Nothing (RUNS | V) "Builder of the photon maps; all give bit-identical results" default "auto";
+        math "ROUNDING" Picture ALL "Rounding of the arithmetic" default "fast";
+        chunk "N" Nothing ALL
+            "Most photons traced at once; the result is the same to the bit" default "what fits on the device";
+        group_size "N" Nothing ALL "Invocations per work group, a power of two" default "128";
+    }
+    Checks {
+        paranoid "" Nothing ALL "Detect NaN and infinity, and print which photon, pixel, texel or point they come from";
+    }
+};
+
+impl Row {
+    /// Whether a command has it, by the command's number.
+    pub fn is_of(&self, command: u32) -> bool {
+        self.commands & command != 0
+    }
+
+    pub fn form(&self) -> Form {
+        (self.of)(&mut RenderRequest::default()).form()
+    }
+
+    /// As a command's option, without dashes in front.
+    pub fn option(&self) -> String {
+        self.field.replace('_', "-")
+    }
+
+    /// The value in a request as a command line has it; `None` where none is given.
+    pub fn text(&self, request: &RenderRequest) -> Option<String> {
+        (self.of)(&mut request.clone()).text()
+    }
+}
+
+/// The row of a field, or of a command's option without its dashes.
+pub fn row(name: &str) -> Option<&'static Row> {
+    ROWS.iter().find(|row| row.field == name || row.option() == name)
+}
+
+impl RenderRequest {
+    /// What is given, as words of a command line, the scene first.
+    pub fn words(&self) -> Vec<String> {
+        let option = |row: &'static Row| {
+            let value = row.text(self)?;
+            Some(if row.form() == Form::Flag { format!("--{}", row.option()) } else { format!("--{}={value}", row.option()) })
+        };
+        [self.scene.clone()].into_iter().filter(|scene| !scene.is_empty()).chain(ROWS.iter().filter_map(option)).collect()
+    }
+}
