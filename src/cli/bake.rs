@@ -15,6 +15,7 @@ use crate::bake::{MAX_SIDE, Written};
 use crate::error::{Error, Result};
 use crate::output::destination::{Folder, check_distinct, write_all};
 use crate::output::scene_report;
+use crate::render::checkpoints::Checkpoints;
 use crate::render::{BakeRequest, Event, Inputs, Observer, PreparedScene, Stops};
 use crate::scene::built_in;
 use crate::text::counted;
@@ -55,7 +56,7 @@ pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
     let observer = Observer { cancelled, tell: &tell };
     let folder = Folder::open("-o", &args.output)?;
     let reports = args.report.open()?;
-    let mut checkpoints = inputs.checkpoints(&observer)?;
+    let mut checkpoints = Checkpoints::open(request, &observer)?;
     let report_files = [reports.destinations(), checkpoints.destinations()].concat();
     check_distinct(&[report_files.as_slice(), &[folder.itself()]].concat())?;
     checkpoints.check_not_read(&report_files, request.inputs())?;

@@ -10,7 +10,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::Cli;
-use super::typed::{Selected, was_typed};
+use super::selected::{Selected, was_typed};
 use crate::scene::file;
 use crate::text::echo;
 

@@ -4,8 +4,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::how_made::of_merge;
-use super::typed::Typed;
 use super::values::{parse_stops, value_enum};
 use super::{JsonArg, complain, optional_file, say_beside};
 use crate::engine::blocks::Share;
@@ -15,10 +13,14 @@ use crate::error::{Error, Result, require};
 use crate::output::colour::{Format, Tone};
 use crate::output::destination::{Destination, check_distinct, check_not_read, write_all, write_synced};
 use crate::output::merge_report;
+use crate::output::metadata::{Metadata, Repeat, errors};
 use crate::output::show::{Layer, Show, units};
 use crate::plan::sensor::Sensor;
-use crate::render::Stops;
 use crate::render::checkpoints::read;
+use crate::render::image::name_in_text;
+use crate::render::{RenderRequest, Stops};
+use crate::text::quoted;
+use serde_json::Value;
 
 #[derive(Args)]
 pub(super) struct MergeArgs {
@@ -54,7 +56,7 @@ value_enum!(ToneArg => Tone {
     Linear,
 });
 
-pub(super) fn run(args: &MergeArgs, typed: &Typed) -> Result<()> {
+pub(super) fn run(args: &MergeArgs) -> Result<()> {
     let format = args.output.as_ref().map(|path| Format::of("-o", path)).transpose()?;
     if let Some(path) = &args.error_image {
         require(Format::of("--error-image", path)? == Format::Exr, "--error-image", path.display(), "must end in .exr")?;
@@ -91,7 +93,7 @@ pub(super) fn run(args: &MergeArgs, typed: &Typed) -> Result<()> {
             denoised: None,
         };
         files.extend(picture.zip(format).map(|(picture, format)| {
-            let metadata = |stops| of_merge(typed, &run, film, units(format, stops, show.tone), format);
+            let metadata = |stops| metadata(args.command(format), &run, film, units(format, stops, show.tone));
             let content = if format == Format::Exr { show.exr(film, &[], Some(&metadata(0.0))) } else { show.png(film, metadata).0 };
             (picture, content)
         }));
@@ -102,6 +104,17 @@ pub(super) fn run(args: &MergeArgs, typed: &Typed) -> Result<()> {
     checkpoint.iter().try_for_each(|file| write_synced(file, &run.to_bytes()))?;
     let wrote: String = all.iter().map(|file| format!("\nwrote {}", file.path().display())).collect();
     say_beside(&all, &format!("{}{wrote}", merge_report::text(&run, args.files.len(), film).trim_end()))
+}
+
+impl MergeArgs {
+    /// What makes the same picture.
+    fn command(&self, format: Format) -> String {
+        let request = RenderRequest { exposure: self.exposure, tone: self.tone.map(Tone::from), ..RenderRequest::default() };
+        let files = self.files.iter().map(|path| path.to_string_lossy().into_owned());
+        let output = ["-o".to_owned(), name_in_text(format).to_owned()];
+        let words = ["photonmill", "merge"].map(str::to_owned).into_iter().chain(files).chain(request.words()).chain(output);
+        words.map(quoted).collect::<Vec<_>>().join(" ")
+    }
 }
 
 /// A picture's film; of what else there is neither a picture nor a report can be made without the scene.
@@ -169,4 +182,27 @@ fn missing(run: &SavedRun, parts: &[Share]) -> Vec<String> {
         }
     };
     shares.filter_map(word).collect()
+}
+
+/// A picture that was put together from parts of a run.
+fn metadata(command: String, run: &SavedRun, film: &SceneFilm, units: String) -> Metadata {
+    let confidence = film.plan.confidence;
+    let [error, error_bound] = errors(&film.error(confidence).stated(), confidence);
+    Metadata {
+        photonmill: env!("CARGO_PKG_VERSION").to_owned(),
+        devices: run.identity.device.iter().cloned().collect(),
+        scene: run.identity.scene.clone(),
+        scene_hash: None,
+        seed: run.identity.settings.get("seed").and_then(Value::as_u64).unwrap_or_default(),
+        rounds: film.rounds,
+        degrees_of_freedom: film.error_freedom(),
+        error,
+        error_bound,
+        confidence,
+        denoiser: None,
+        units,
+        command,
+        settings: run.identity.settings.clone(),
+        repeat: Repeat::Not("was put together by merge; repeat the picture of one run that does all of it".to_owned()),
+    }
 }

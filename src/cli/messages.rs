@@ -4,10 +4,8 @@ use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
 
 use super::progress::print_line;
-use crate::engine::retry::{Remedy, in_words};
 use crate::engine::run::RunResult;
 use crate::error::{Error, Result};
-use crate::gpu::Gpu;
 use crate::output::destination::Destination;
 use crate::render::names::{as_option, spelled};
 
@@ -35,11 +33,6 @@ pub(super) fn complain(line: &str) {
     // Names of files and of things in them may hold anything; a complaint stays one line.
     let line: String = line.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect();
     print_line(&format!("photonmill: {line}"));
-}
-
-/// Reports a device that failed while it was at work.
-pub(super) fn device_failed(gpu: &Gpu, error: &Error, remedy: Remedy) {
-    complain(&format!("warning: {}", in_words(gpu, error, remedy)));
 }
 
 /// Text on stdout; a reader that has gone away, as `head` does, has seen enough.

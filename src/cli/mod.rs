@@ -8,7 +8,6 @@ mod devices;
 mod display;
 mod gallery;
 mod help;
-mod how_made;
 mod info;
 mod interrupt;
 mod manual;
@@ -24,10 +23,9 @@ mod render;
 mod repeat;
 mod request;
 mod run;
+mod selected;
 mod selfcheck;
-mod stop;
 mod study;
-mod typed;
 mod usage;
 mod values;
 mod view;
@@ -41,8 +39,7 @@ use clap::{ArgMatches, Args, ColorChoice, CommandFactory, FromArgMatches, Parser
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Options};
 use interrupt::{cancel_on_signal, exit_code, interruptible};
-use messages::{End, complain, device_failed, optional_file, say, say_beside, spell};
-use typed::Typed;
+use messages::{End, complain, optional_file, say, say_beside, spell};
 use values::parse_bytes;
 
 /// Photon mapping on any Vulkan GPU.
@@ -240,15 +237,15 @@ pub fn main() -> u8 {
     }
     let cancelled = cancel_on_signal();
     let result = match cli.command {
-        None => interruptible(|| run::run(&cli.run, &Typed::of(&matches, &command), &cancelled)),
+        None => interruptible(|| run::run(&cli.run, &cancelled)),
         Some(Command::Devices(args)) => devices::run(&args).map(|()| End::Finished),
         Some(Command::Render(args)) => render::run(&args, &cancelled),
-        Some(Command::View(args)) => view::run(&args, &Typed::of(&matches, &command), &cancelled),
+        Some(Command::View(args)) => view::run(&args, &cancelled),
         Some(Command::Repeat(args)) => repeat::run(args, &cancelled),
         Some(Command::Bake(args)) => bake::run(&args, &cancelled),
         Some(Command::Probe(args)) => probe::run(&args, &cancelled),
         Some(Command::Map(args)) => map::run(&args, &cancelled),
-        Some(Command::Merge(args)) => merge::run(&args, &Typed::of(&matches, &command)).map(|()| End::Finished),
+        Some(Command::Merge(args)) => merge::run(&args).map(|()| End::Finished),
         Some(Command::Plan(args)) => plan::run(&args).map(|()| End::Finished),
         Some(Command::Info(args)) => info::run(&args).map(|()| End::Finished),
         Some(Command::Compare(args)) => compare::run(&args).map(|()| End::Finished),

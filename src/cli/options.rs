@@ -5,33 +5,12 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::progress::ProgressReporter;
-use super::values::{MathArg, parse_integer, parse_within};
 use super::{DeviceArgs, JsonArg, TimingArgs, optional_file};
 use crate::engine::run::RunResult;
 use crate::error::{Result, require};
 use crate::gpu::{DeviceFacts, Gpu, Options};
 use crate::output::destination::Destination;
 use crate::output::trace_file;
-
-/// What the settings of both worlds have, whatever the defaults.
-#[derive(Args)]
-pub(super) struct CommonArgs {
-    /// Seed of the random numbers [default: 1]
-    #[arg(long, value_name = "N", value_parser = parse_within(0..=u64::MAX), allow_hyphen_values = true, help_heading = "Photons")]
-    pub(super) seed: Option<u64>,
-    /// Rounding of the arithmetic [default: fast]
-    #[arg(long, value_enum, value_name = "ROUNDING", help_heading = "Implementation")]
-    pub(super) math: Option<MathArg>,
-    /// Most photons traced at once; the result is the same to the bit [default: what fits on the device]
-    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Implementation")]
-    pub(super) chunk: Option<u32>,
-    /// Invocations per work group, a power of two [default: 128]
-    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Implementation")]
-    pub(super) group_size: Option<u32>,
-    /// Detect NaN and infinity, and print which photon, pixel, texel or point they come from
-    #[arg(long, help_heading = "Checks")]
-    pub(super) paranoid: bool,
-}
 
 /// Reports of a run as files.
 #[derive(Args)]

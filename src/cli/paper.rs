@@ -13,6 +13,7 @@ use crate::measure::paper::bench::Bench;
 use crate::measure::paper::{self, Reproduction, Request, published, tables, verdicts};
 use crate::output::destination::Folder;
 use crate::render::Seconds;
+use crate::render::values::Threads;
 use crate::text::counted;
 
 #[derive(Args)]
@@ -31,7 +32,7 @@ pub(super) struct PaperArgs {
     longest: Seconds,
     /// Also measure the CPU builder on this many threads, or on `all` [default: only on one]
     #[arg(long, value_name = "N|all", value_parser = parse_threads, allow_hyphen_values = true, help_heading = "Implementation")]
-    threads: Option<usize>,
+    threads: Option<Threads>,
     #[command(flatten)]
     progress: ProgressArgs,
     #[command(flatten)]
@@ -51,7 +52,7 @@ pub(super) fn run(args: &PaperArgs, cancelled: &AtomicBool) -> Result<End> {
     let request = Request {
         large: args.large.unwrap_or(if is_cpu { LARGE_ON_CPU } else { LARGE_ON_GPU }),
         repeats: args.repeats as usize,
-        threads: args.threads.unwrap_or(1),
+        threads: args.threads.map_or(1, |Threads(threads)| threads),
         longest_ms: 1e3 * args.longest.0,
     };
     reporter.note(&format!(
@@ -93,7 +94,7 @@ impl PaperArgs {
         require((1..=MAX_REPEATS).contains(&self.repeats), "--repeats", self.repeats, format!("must be from 1 to {MAX_REPEATS}"))?;
         let is_time = self.longest.0.is_finite() && self.longest.0 > 0.0;
         require(is_time, "--longest", self.longest, "must be a time above 0, such as 90s")?;
-        let threads = self.threads.unwrap_or(1);
+        let threads = self.threads.map_or(1, |Threads(threads)| threads);
         require((1..=MAX_THREADS).contains(&threads), "--threads", threads, format!("must be from 1 to {MAX_THREADS}, or all"))
     }
 }

@@ -15,6 +15,7 @@ use crate::engine::scene::RunResult;
 use crate::error::{Error, Result};
 use crate::output::destination::{Destination, check_distinct, write_all};
 use crate::output::scene_report;
+use crate::render::checkpoints::Checkpoints;
 use crate::render::points::{MAX_POINTS, point_of};
 use crate::render::{Event, Inputs, Observer, Receivers, prepare};
 use crate::text::{counted, echo, refusal};
@@ -46,7 +47,7 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
     let observer = Observer { cancelled, tell: &tell };
     let output = Destination::open("-o", &args.output)?;
     let reports = args.report.open()?;
-    let mut checkpoints = inputs.checkpoints(&observer)?;
+    let mut checkpoints = Checkpoints::open(request, &observer)?;
     let all = [vec![output.clone()], reports.destinations(), checkpoints.destinations()].concat();
     check_distinct(&all)?;
     checkpoints.check_not_read(&all, request.inputs().chain([args.points.as_path()]))?;

@@ -23,6 +23,7 @@ use crate::output::colour::Format;
 use crate::output::destination::{Destination, check_distinct, write_all};
 use crate::output::scene_report;
 use crate::output::show::{Layer, Show};
+use crate::render::checkpoints::Checkpoints;
 use crate::render::image::{check_format, show};
 use crate::render::{Event, Image, Inputs, Observer, Receivers, Seconds, prepare};
 use crate::settings::scene::{Filter, Part, SceneSettings};
@@ -83,7 +84,7 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
         require(Format::of("--error-image", path)? == Format::Exr, "--error-image", path.display(), "must end in .exr")?;
     }
     let reports = args.report.open()?;
-    let mut checkpoints = inputs.checkpoints(&observer)?;
+    let mut checkpoints = Checkpoints::open(request, &observer)?;
     let shows_parts = format == Some(Format::Exr) && show(request, (0, 0)).layers.into_iter().any(Layer::is_part);
     inputs = inputs.for_image(shows_parts || args.display.is_given(), checkpoints.resumed())?;
     let files = [picture.clone(), errors.clone(), inputs.save_settings()?].into_iter().flatten().collect();

@@ -3,18 +3,17 @@
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
-use clap::{Args, CommandFactory, FromArgMatches};
+use clap::Args;
 
 use super::options::DevicesOfRunArgs;
 use super::progress::{ProgressArgs, ProgressReporter};
-use super::typed::Typed;
-use super::{Cli, End, optional_file, say, usage};
+use super::{End, optional_file, say};
 use crate::error::{Error, Result};
 use crate::output::colour::Format;
 use crate::output::destination::{check_not_read, write_all};
 use crate::output::metadata::{Metadata, Repeat};
-use crate::render::repeat::{Repeated, RoundsOf, differing, repeat};
-use crate::render::{Event, Observer};
+use crate::render::repeat::{RoundsOf, differing, repeat, repeat_room};
+use crate::render::{Event, Observer, RenderRequest};
 use crate::scene::file;
 
 #[derive(Args)]
@@ -64,17 +63,9 @@ pub(super) fn run(args: RepeatArgs, cancelled: &AtomicBool) -> Result<End> {
         "" => {
             let elsewhere = "is for pictures of a scene's file, and this one is of the paper's box; leave it out";
             args.scene.map_or(Ok(()), |scene| Err(Error::setting("--scene", scene, elsewhere)))?;
-            let damaged = |reason: String| refuse(format!("says otherwise than photonmill does how it was made ({reason})"));
-            let (mut cli, typed) = of_box(arguments, made.rounds).map_err(damaged)?;
-            let folder = tempfile::tempdir().map_err(|error| refuse(format!("cannot be repeated: {}", error.kind())))?;
-            let place = folder.path().join(if format == Format::Png { "repeated.png" } else { "repeated.exr" });
-            cli.run.set(place.clone(), args.progress, args.device);
-            if matches!(super::run::run(&cli.run, &typed, cancelled)?, End::Cancelled) {
-                return Ok(End::Cancelled);
-            }
-            let content = file::read(&place).map_err(refuse)?;
-            let devices = Metadata::read(&content).map_err(refuse)?.devices;
-            Repeated { content, devices }
+            let request = RenderRequest { rounds: Some(made.rounds), ..RenderRequest::of_picture(&path, arguments)? };
+            let devices = || args.device.open_or_none(&reporter).map(Box::new);
+            repeat_room(&request, format, devices, &observer)?
         }
         _ => return Err(refuse("says otherwise than photonmill does how it was made (it is of no picture)".to_owned())),
     };
@@ -94,22 +85,4 @@ pub(super) fn run(args: RepeatArgs, cancelled: &AtomicBool) -> Result<End> {
     let wrote = args.output.map_or_else(String::new, |output| format!("\nwrote {}", output.display()));
     say(&format!("{}: repeated, all {} values are identical{wrote}", path.display(), differing.of))?;
     Ok(End::Finished)
-}
-
-/// The command line of a picture of the paper's box, of which nothing may be but what decides pixels.
-fn of_box(arguments: &[String], rounds: u32) -> std::result::Result<(Cli, Typed), String> {
-    // It asks for some output.
-    let more = [format!("--rounds={rounds}"), "-o=repeated.exr".to_owned()];
-    let words: Vec<String> = ["photonmill".to_owned()].into_iter().chain(arguments.iter().cloned()).chain(more).collect();
-    let known = Cli::command();
-    let matches = known
-        .clone()
-        .try_get_matches_from(&words)
-        .map_err(|error| usage::one_line(&error, &known, &words.iter().map(Into::into).collect::<Vec<_>>()))?;
-    let typed = Typed::of(&matches, &known);
-    if typed.words() != arguments {
-        return Err("it has options that decide no pixel".to_owned());
-    }
-    let cli = Cli::from_arg_matches(&matches).map_err(|error| error.to_string())?;
-    Ok((cli, typed))
 }

@@ -5,9 +5,8 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValue, PossibleValuesParser, ValueParser};
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches, value_parser};
 
-use super::help;
+use super::{help, spell};
 use crate::render::RenderRequest;
-use crate::render::names::{as_option, spelled};
 use crate::render::options::{self, ROWS, Row};
 use crate::render::values::Form;
 
@@ -20,6 +19,7 @@ pub(super) const BAKE: u32 = options::Command::Bake as u32;
 pub(super) const PROBE: u32 = options::Command::Probe as u32;
 pub(super) const MAP: u32 = options::Command::Map as u32;
 pub(super) const PLAN: u32 = options::Command::Plan as u32;
+pub(super) const BOX: u32 = options::Command::Box as u32;
 
 /// What a command line calls the scene.
 const SCENE: &str = "scene";
@@ -27,7 +27,8 @@ const SCENE: &str = "scene";
 impl<const COMMAND: u32> Args for RequestArgs<COMMAND> {
     fn augment_args(command: Command) -> Command {
         let scene = Arg::new(SCENE).value_name("SCENE").help(help::scene()).required(true);
-        rows(COMMAND).map(argument).fold(command.arg(scene), Command::arg)
+        let scene = (COMMAND != BOX).then_some(scene);
+        scene.into_iter().chain(rows(COMMAND).map(|row| argument(row, COMMAND))).fold(command, Command::arg)
     }
 
     fn augment_args_for_update(command: Command) -> Command {
@@ -37,7 +38,8 @@ impl<const COMMAND: u32> Args for RequestArgs<COMMAND> {
 
 impl<const COMMAND: u32> FromArgMatches for RequestArgs<COMMAND> {
     fn from_arg_matches(matches: &ArgMatches) -> Result<RequestArgs<COMMAND>, clap::Error> {
-        let mut request = RenderRequest::of(matches.get_one::<String>(SCENE).cloned().unwrap_or_default());
+        let scene = if COMMAND == BOX { None } else { matches.get_one::<String>(SCENE) };
+        let mut request = RenderRequest::of(scene.cloned().unwrap_or_default());
         for row in rows(COMMAND) {
             let value = (row.of)(&mut request);
             let read = "clap has read it once";
@@ -60,14 +62,13 @@ fn rows(command: u32) -> impl Iterator<Item = &'static Row> {
     ROWS.iter().filter(move |row| row.is_of(command))
 }
 
-fn argument(row: &'static Row) -> Arg {
-    let default = if row.default.is_empty() { String::new() } else { format!(" [default: {}]", row.default) };
+fn argument(row: &'static Row, command: u32) -> Arg {
     let argument = Arg::new(row.field)
         .long(row.option())
-        .help(spelled(&format!("{}{default}", row.help), as_option))
+        .help(spell(&row.help(command)))
         .help_heading(row.group.heading())
         .requires_all(row.requires)
-        .conflicts_with_all(row.conflicts);
+        .conflicts_with_all(row.conflicts.iter().filter(|other| rows(command).any(|row| row.field == **other)));
     let form = row.form();
     if form == Form::Flag {
         return argument.action(ArgAction::SetTrue);
@@ -87,7 +88,7 @@ fn parser(row: &'static Row) -> ValueParser {
         Form::Choice(choices) => {
             let value = |(name, meaning): &(&'static str, &'static str)| {
                 let value = PossibleValue::new(*name);
-                if meaning.is_empty() { value } else { value.help(spelled(meaning, as_option)) }
+                if meaning.is_empty() { value } else { value.help(spell(meaning)) }
             };
             PossibleValuesParser::new(choices.iter().map(value)).into()
         }

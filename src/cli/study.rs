@@ -137,7 +137,7 @@ mod tests {
                 RoomSettings { shininess: [Some(0.01); 5], ..defaults },
             ] {
                 let line = command::main_job(preset, &settings);
-                assert_eq!(parse(&line).run.settings(), settings, "{line}");
+                assert_eq!(parse(&line).run.request.0.room_settings(), settings, "{line}");
             }
         }
         let groups: Vec<Group> =
@@ -148,7 +148,7 @@ mod tests {
             match &configuration.line {
                 Line::Paper(settings) => {
                     let line = command::main_job(Preset::Modified, settings);
-                    let parsed = parse(&line).run.settings();
+                    let parsed = parse(&line).run.request.0.room_settings();
                     // Full light is of the paper's picture, which no study looks at.
                     assert_eq!(RoomSettings { full_light: settings.full_light, ..parsed }, *settings, "{line}");
                 }

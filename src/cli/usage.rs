@@ -5,7 +5,7 @@ use std::ffi::OsString;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Arg, ArgMatches, Command};
 
-use super::typed::{Selected, was_typed};
+use super::selected::{Selected, was_typed};
 use crate::error::Error;
 use crate::output::words::list;
 use crate::render::names::as_option;

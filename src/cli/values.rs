@@ -4,17 +4,11 @@ use std::fmt::Display;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
-use clap::ValueEnum;
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-
-use super::messages::spell;
-use crate::engine::blocks::Share;
 use crate::engine::replay::PhotonName;
 use crate::gpu::LEAST_MEMORY;
-use crate::render::values::{Value, meaning};
-pub(super) use crate::render::values::{parse_integer, parse_number, parse_numbers};
+use crate::render::values::{Threads, Value};
+pub(super) use crate::render::values::{parse_integer, parse_number};
 use crate::render::{Percent, Seconds, Stops};
-use crate::settings::{Builder, Math, WALL_NAMES};
 
 type Parsed<T> = Result<T, String>;
 
@@ -55,32 +49,6 @@ pub(super) fn parse_stops(text: &str) -> Parsed<Stops> {
     parse(text)
 }
 
-pub(super) fn parse_shard(text: &str) -> Parsed<Share> {
-    parse(text)
-}
-
-value_enum!(MathArg => Math {
-    /// As fast as the device can
-    Fast,
-    /// The same bits on every device that rounds to nearest
-    Strict,
-});
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum SwitchArg {
-    On,
-    Off,
-}
-
-/// What `--variant` names; `None` is auto.
-pub(super) type BuilderArg = Option<Builder>;
-
-/// Reads a [`BuilderArg`] that is one of `known`, or auto, which means what `auto` says.
-pub(super) fn builder_parser(known: impl IntoIterator<Item = Builder>, auto: &'static str) -> impl TypedValueParser<Value = BuilderArg> {
-    let values = known.into_iter().map(|builder| PossibleValue::new(builder.name()).help(spell(meaning(builder))));
-    PossibleValuesParser::new(values.chain([PossibleValue::new("auto").help(auto)]))
-        .map(|name| Builder::ALL.into_iter().find(|builder| builder.name() == name))
-}
-
 /// A whole number within a range.
 pub(super) fn parse_within<T>(allowed: RangeInclusive<T>) -> impl Fn(&str) -> Parsed<T> + Clone + Send + Sync
 where
@@ -102,18 +70,8 @@ pub(super) fn parse_bytes(text: &str) -> Parsed<u64> {
     bytes.filter(|bytes| (LEAST_MEMORY as f64..1e18).contains(bytes)).map(|bytes| bytes as u64).ok_or(allowed)
 }
 
-pub(super) fn parse_shininess(text: &str) -> Parsed<[f32; 5]> {
-    match parse_numbers::<f32, 1>(text) {
-        Ok([all]) => Ok([all; 5]),
-        Err(_) => parse_numbers::<f32, 5>(text).map_err(|_| format!("must be one number, or five for {}", WALL_NAMES.join(","))),
-    }
-}
-
-pub(super) fn parse_threads(text: &str) -> Parsed<usize> {
-    if text == "all" {
-        return Ok(std::thread::available_parallelism().map_or(1, usize::from));
-    }
-    parse_integer(text).map_err(|_| "must be a number of threads, or all".to_owned())
+pub(super) fn parse_threads(text: &str) -> Parsed<Threads> {
+    parse(text)
 }
 
 /// `3:4711`, `3:4711:caustic`.

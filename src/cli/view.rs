@@ -7,11 +7,12 @@ use glam::DVec3;
 
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::request::{RequestArgs, VIEW};
-use super::typed::Typed;
 use super::values::{parse_percent, parse_seconds};
 use super::{DeviceArgs, End};
 use crate::error::{Error, Result};
 use crate::render::image::kept;
+use crate::render::options::ROWS;
+use crate::render::values::Variant;
 use crate::render::viewpoint::size_of;
 use crate::render::{Event, Inputs, Observer, Percent, PreparedScene, RenderRequest, Seconds};
 use crate::scene::{Camera, Scene};
@@ -37,24 +38,17 @@ pub(super) struct ViewArgs {
 
 /// In place of a scene.
 const BOX: &str = "box";
-/// Options that decide how the paper's box is lit here; it has more of them without a window.
-const OF_BOX: [&str; 3] = ["--photons", "--seed", "--size"];
+/// Fields of the paper's box here; it has more of them without a window.
+const OF_BOX: [&str; 4] = ["photons", "seed", "size", "variant"];
 
 /// Refuses what would have no effect.
-fn check_box(typed: &Typed) -> Result<()> {
-    let words = typed.words();
-    let of_scenes = words.iter().filter(|word| word.starts_with("--")).find(|word| !OF_BOX.contains(&option_of(word)));
-    let Some(word) = of_scenes else { return Ok(()) };
-    let (option, value) = word.split_once('=').unwrap_or((word, "on"));
+fn check_box(request: &RenderRequest) -> Result<()> {
+    let given = ROWS.iter().filter(|row| !OF_BOX.contains(&row.field)).find_map(|row| Some((row, row.text(request)?)));
     let allowed = "is an option of scenes; in a window the paper's box takes --photons, --seed, --size and --variant";
-    Err(Error::Setting { option: option.to_owned().leak(), value: value.to_owned(), allowed: allowed.to_owned() })
+    given.map_or(Ok(()), |(row, value)| Err(Error::setting(row.field, value, allowed)))
 }
 
-fn option_of(word: &str) -> &str {
-    word.split('=').next().unwrap_or_default()
-}
-
-pub(super) fn run(args: &ViewArgs, typed: &Typed, cancelled: &AtomicBool) -> Result<End> {
+pub(super) fn run(args: &ViewArgs, cancelled: &AtomicBool) -> Result<End> {
     let request = &args.request.0;
     let reporter = ProgressReporter::new(&args.progress);
     let tell = |event: Event| reporter.event(event);
@@ -63,10 +57,13 @@ pub(super) fn run(args: &ViewArgs, typed: &Typed, cancelled: &AtomicBool) -> Res
     let (error, seconds) = (args.error.map(Percent::share), args.time.map(|Seconds(seconds)| seconds));
     let stop = Stop { error, seconds, ..Stop::default() };
     let (subject, size) = if is_box {
-        check_box(typed)?;
+        check_box(request)?;
         let usual = RoomSettings::default();
-        let settings =
-            RoomSettings { builder: request.variant.unwrap_or(usual.builder), seed: request.seed.unwrap_or(usual.seed), ..usual };
+        let settings = RoomSettings {
+            builder: request.variant.and_then(Variant::builder).unwrap_or(usual.builder),
+            seed: request.seed.unwrap_or(usual.seed),
+            ..usual
+        };
         let photons = request.photons.unwrap_or(settings.photons);
         RoomSettings { stop, photons, ..settings.clone() }.validate()?;
         // Its camera is none of a scene.

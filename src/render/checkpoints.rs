@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::events::{Event, Tell};
+use super::events::{Event, Observer, Tell};
 use super::request::RenderRequest;
-use super::values::{Percent, Seconds};
+use super::values::Seconds;
 use crate::engine::blocks::Share;
 use crate::engine::saved::SavedRun;
 use crate::engine::watch::{Keep, Later, SaveRun};
@@ -67,44 +67,9 @@ impl<W> Snapshot<W> {
 /// Between two checkpoints.
 const USUAL_EVERY: f64 = 30.0;
 
-/// What of a run ends in a checkpoint, or goes on from one; without a field of a request that asks for it, nothing.
-#[derive(Debug, Clone, Default)]
-pub struct CheckpointRequest {
-    pub checkpoint: Option<PathBuf>,
-    pub every: Option<Seconds>,
-    pub resume: Option<PathBuf>,
-    pub shard: Option<Share>,
-}
-
-impl CheckpointRequest {
-    pub fn of(request: &RenderRequest) -> CheckpointRequest {
-        let RenderRequest { checkpoint, every, resume, shard, .. } = request;
-        CheckpointRequest { checkpoint: checkpoint.clone(), every: *every, resume: resume.clone(), shard: *shard }
-    }
-
-    /// Fails now where the file could not be written later, or what is to be gone on with cannot be read.
-    pub fn open<'a>(&self, tell: Tell<'a>) -> Result<Checkpoints<'a>> {
-        let checkpoint = self.checkpoint.as_ref().map(|path| Destination::open_file("checkpoint", path)).transpose()?;
-        let every = self.every.map_or(USUAL_EVERY, |Seconds(seconds)| seconds);
-        require((0.001..=1e6).contains(&every), "every", every, "must be from 1ms to 1000000s")?;
-        let resume = self.resume.as_ref().map(|path| Ok((path.clone(), read("resume", path)?))).transpose()?;
-        Ok(Checkpoints {
-            tell,
-            checkpoint,
-            every: Duration::from_secs_f64(every),
-            resume,
-            share: self.shard.unwrap_or_default(),
-            snapshot: None,
-            display: None,
-            written: Instant::now(),
-            has_checkpoint: false,
-            failed: None,
-        })
-    }
-}
-
 /// Refuses what only all shards together can know.
-pub fn check_shard(shard: Option<Share>, error: Option<Percent>, total_photons: Option<u64>, bias: bool) -> Result<()> {
+fn check_shard(request: &RenderRequest) -> Result<()> {
+    let &RenderRequest { shard, error, total_photons, bias, .. } = request;
     let Some(shard) = shard else { return Ok(()) };
     let only_merged = "cannot be known to one shard; give `rounds`, leave it out with `shard`, and look at the error of the merge";
     if let Some(error) = error {
@@ -125,6 +90,28 @@ pub fn read(option: &'static str, path: &PathBuf) -> Result<SavedRun> {
 }
 
 impl<'a> Checkpoints<'a> {
+    /// What a request asks for, if anything. Fails now where the file could not be written later, or what is to be gone on with cannot be
+    /// read.
+    pub fn open(request: &RenderRequest, observer: &Observer<'a>) -> Result<Checkpoints<'a>> {
+        check_shard(request)?;
+        let checkpoint = request.checkpoint.as_ref().map(|path| Destination::open_file("checkpoint", path)).transpose()?;
+        let every = request.every.map_or(USUAL_EVERY, |Seconds(seconds)| seconds);
+        require((0.001..=1e6).contains(&every), "every", every, "must be from 1ms to 1000000s")?;
+        let resume = request.resume.as_ref().map(|path| Ok((path.clone(), read("resume", path)?))).transpose()?;
+        Ok(Checkpoints {
+            tell: observer.tell,
+            checkpoint,
+            every: Duration::from_secs_f64(every),
+            resume,
+            share: request.shard.unwrap_or_default(),
+            snapshot: None,
+            display: None,
+            written: Instant::now(),
+            has_checkpoint: false,
+            failed: None,
+        })
+    }
+
     /// Calls `write` at this interval while the run goes on, but not at its end.
     pub fn set_snapshot(&mut self, every: Duration, write: Write<'a>) {
         self.snapshot = Some(Snapshot::new(every, write));

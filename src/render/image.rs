@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::checkpoints::Checkpoints;
 use super::denoise::{self, denoised};
 use super::events::Observer;
-use super::options::{Decides, ROWS};
+use super::options::ROWS;
 use super::prepare::{Inputs, Prepared, Receivers, Run};
 use super::request::RenderRequest;
 use super::scene::PreparedScene;
@@ -51,7 +51,7 @@ impl PreparedScene {
     pub fn render(&self, gpus: &mut Vec<Gpu>, camera: Option<&Camera>, request: &RenderRequest, observer: &Observer) -> Result<Image> {
         request.check_camera()?;
         let inputs = Inputs::open(request)?.ended(gpus[0].facts().kind);
-        let mut checkpoints = inputs.checkpoints(observer)?;
+        let mut checkpoints = Checkpoints::open(request, observer)?;
         let inputs = inputs.for_image(true, checkpoints.resumed())?;
         let prepared = self.prepare(inputs, Receivers::Image(camera), observer)?;
         let image = prepared.image(gpus, &mut checkpoints, observer)?;
@@ -240,7 +240,7 @@ impl Image {
 /// A request with nothing in it but what decides its image, however much work is done for it.
 pub fn kept(request: &RenderRequest) -> RenderRequest {
     let mut kept = RenderRequest::of(request.scene.clone());
-    for row in ROWS.iter().filter(|row| row.decides == Decides::Picture) {
+    for row in ROWS.iter().filter(|row| row.is_kept(request)) {
         if let Some(text) = row.text(request) {
             (row.of)(&mut kept).read(&text).expect("a value is read as it is written");
         }
@@ -264,10 +264,15 @@ fn command(request: &RenderRequest, run: &RunResult, output: &str) -> String {
         rounds: Some(run.film.rounds),
         ..kept(request)
     };
-    let options = ROWS.iter().filter_map(|row| Some((row, row.text(&request)?))).flat_map(|(row, value)| {
+    command_line("render", &request, output)
+}
+
+/// A command line for a shell, with `output` as its file.
+pub(super) fn command_line(command: &str, request: &RenderRequest, output: &str) -> String {
+    let options = ROWS.iter().filter_map(|row| Some((row, row.text(request)?))).flat_map(|(row, value)| {
         let value = (row.form() != Form::Flag).then_some(value);
         [Some(format!("--{}", row.option())), value].into_iter().flatten()
     });
-    let words = ["photonmill".to_owned(), "render".to_owned(), request.scene.clone()].into_iter().chain(options);
+    let words = ["photonmill", command, &request.scene].into_iter().filter(|word| !word.is_empty()).map(str::to_owned).chain(options);
     words.chain(["-o".to_owned(), output.to_owned()]).map(quoted).collect::<Vec<String>>().join(" ")
 }

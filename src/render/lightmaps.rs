@@ -62,7 +62,7 @@ impl PreparedScene {
     /// The irradiance of all surfaces that scatter light, texel by texel.
     pub fn bake(&self, gpus: &mut Vec<Gpu>, bake: &BakeRequest, request: &RenderRequest, observer: &Observer) -> Result<Lightmaps> {
         let inputs = Inputs::open(request)?;
-        let mut checkpoints = inputs.checkpoints(observer)?;
+        let mut checkpoints = Checkpoints::open(request, observer)?;
         let (lightmaps, written) = self.bake_on(|| Ok(gpus), bake, inputs, &mut checkpoints, &[], observer)?;
         written?;
         checkpoints.finish()?;

@@ -52,6 +52,7 @@ pub mod points;
 pub mod prepare;
 pub mod repeat;
 mod request;
+pub mod room;
 pub mod scene;
 pub mod tuned_settings;
 pub mod values;

@@ -53,6 +53,8 @@ pub enum Command {
     Probe = 1 << 3,
     Map = 1 << 4,
     Plan = 1 << 5,
+    /// Without a name: the paper's box.
+    Box = 1 << 6,
 }
 
 const R: u32 = Command::Render as u32;
@@ -61,9 +63,11 @@ const B: u32 = Command::Bake as u32;
 const P: u32 = Command::Probe as u32;
 const M: u32 = Command::Map as u32;
 const L: u32 = Command::Plan as u32;
+const X: u32 = Command::Box as u32;
 const RUNS: u32 = R | B | P | L;
 const SEEN: u32 = R | V | L;
-const ALL: u32 = RUNS | V | M;
+const SCENES: u32 = RUNS | V | M;
+const ALL: u32 = SCENES | X;
 
 pub struct Row {
     /// As a field is called; a command's option has `-` for `_`.
@@ -73,9 +77,11 @@ pub struct Row {
     pub group: Group,
     pub decides: Decides,
     commands: u32,
-    pub help: &'static str,
+    help: &'static str,
     /// What holds where it is not given, in words; empty where the help says enough.
-    pub default: &'static str,
+    default: &'static str,
+    /// Both of the paper's box, where they are others.
+    of_box: &'static [(&'static str, &'static str)],
     /// Fields without which it means nothing, and fields that exclude it.
     pub requires: &'static [&'static str],
     pub conflicts: &'static [&'static str],
@@ -84,7 +90,7 @@ pub struct Row {
 
 macro_rules! rows {
     ($($group:ident { $($field:ident $value:literal $decides:ident $commands:tt $help:literal
-        $(default $default:literal)? $(requires $requires:literal)? $(conflicts [$($conflict:literal),*])?;)* })*) => {
+        $(default $default:literal)? $(box $help_of_box:literal default $default_of_box:literal)? $(requires $requires:literal)? $(conflicts [$($conflict:literal),*])?;)* })*) => {
         &[$($(Row {
             field: stringify!($field),
             value: $value,
@@ -93,6 +99,7 @@ macro_rules! rows {
             commands: $commands,
             help: $help,
             default: concat!($($default)?),
+            of_box: &[$(($help_of_box, $default_of_box))?],
             requires: &[$($requires)?],
             conflicts: &[$($($conflict),*)?],
             of: |request| &mut request.$field,
@@ -114,20 +121,22 @@ pub const ROWS: &[Row] = rows! {
             requires "output";
     }
     Scene {
-        radiometric "" Picture ALL
+        radiometric "" Picture SCENES
             "Take the intensities of the lights of a glTF file as W/sr and W/m2" default "candela and lux, divided by 683 lm/W";
-        at "SECONDS" Picture ALL
+        at "SECONDS" Picture SCENES
             "Take nodes, skins and morph targets as the file's first animation has them at this time" default "at rest";
-        environment "R,G,B|FILE" Picture ALL
+        environment "R,G,B|FILE" Picture SCENES
             "Light from beyond the scene in place of the file's own: W/m2/sr, one number or three for red, green and blue, or a picture of all directions (equirectangular, .hdr or .exr)"
             default "the file's; 1 if nothing in the file emits light";
-        sun "AZIMUTH,ELEVATION" Picture ALL
+        sun "AZIMUTH,ELEVATION" Picture SCENES
             "Add a sun, degrees clockwise from -z as seen from above and above the horizon, and the clear sky that belongs to it unless `environment` is given";
-        environment_rotate "DEGREES" Picture ALL
+        environment_rotate "DEGREES" Picture SCENES
             "Turn the environment's picture about the vertical, degrees, counter-clockwise as seen from above; not the sky of `sun`";
-        environment_strength "FACTOR" Picture ALL "Multiply the environment's light, or that of `sun` and its sky";
+        environment_strength "FACTOR" Picture SCENES "Multiply the environment's light, or that of `sun` and its sky";
         camera "NAME" Picture SEEN "Camera by name" default "the first one; one that sees the whole scene if it has none";
-        eye "X,Y,Z" Picture SEEN "Where the camera stands, metres, in place of where the scene has it";
+        eye "X,Y,Z" Picture (SEEN | X) "Where the camera stands, metres, in place of where the scene has it"
+            box "Position of the eye for the Phong weight, metres"
+            default "0,0,1";
         look_at "X,Y,Z" Picture SEEN "What it looks at, metres" default "straight on, as the scene's camera does";
         up "X,Y,Z" Picture SEEN "What is up in its picture, as a direction" default "0,1,0 with `look_at`";
         fov "DEGREES" Picture SEEN
@@ -140,52 +149,73 @@ pub const ROWS: &[Row] = rows! {
             "Diameter of the camera's lens, metres: what is not in focus is blurred" default "0, a pinhole";
         focus "METRES" Picture SEEN
             "Distance of the plane in focus, metres" default "that of what the middle of the picture shows" requires "aperture";
+        emission "LAW" Picture X
+            "Angular distribution of emission: constant over the hemisphere, or proportional to the cosine" default "uniform";
+        shininess "N|N,N,N,N,N" Picture X
+            "Phong exponent of all walls, or five of them for left,right,floor,ceiling,back"
+            default "none, the walls are Lambertian; 2 with `preset` phong, 5 with `preset` rounds";
+        phong_direction "DIRECTION" Picture X
+            "Direction that the Phong weight compares with the direction to the eye: the mirror direction, or the sampled one"
+            default "mirror";
+        reflectance "SHARE" Picture X "Probability that a wall reflects a photon" default "0.75";
+        light_radius "METRES" Picture X "Radius of the two disc lights, metres" default "0.05";
+        light_power "W,W" Picture X
+            "Power of the light on the floor and of the light on the left wall, watts" default "1,1";
     }
     WhenToStop {
-        error "PERCENT" Nothing RUNS
+        error "PERCENT" Nothing (RUNS | X)
             "Stop once the relative error is at most this: 2%. It is of light that surfaces scatter; lamps, the sky and unlit surfaces that are seen directly are left out";
-        measure "MEASURE" Picture RUNS
+        measure "MEASURE" Picture (RUNS | X)
             "What the error is: the RMSE over the mean, or the root of relMSE, whose epsilon is (1 % of the mean)^2" default "rmse";
-        confidence "PERCENT" Picture RUNS "Confidence level of the error bound" default "95%";
-        time "TIME" Nothing RUNS "Stop after rounds of this time: 2s, 500ms, 3m. Does not include start-up and the pilot";
-        total_photons "N" Nothing RUNS "Stop once this many photons have been traced, summed over all rounds and maps";
-        bias "" Nothing RUNS
-            "Measure the bias, which is the blur by the search radius, in extra runs where `measure` is relmse. Otherwise it is estimated from the run's own blocks. With `error` it counts as part of the error";
-        checkpoint "FILE" Nothing RUNS
+        confidence "PERCENT" Picture (RUNS | X) "Confidence level of the error bound" default "95%";
+        time "TIME" Nothing (RUNS | X) "Stop after rounds of this time: 2s, 500ms, 3m. Does not include start-up and the pilot";
+        total_photons "N" Nothing (RUNS | X) "Stop once this many photons have been traced, summed over all rounds and maps";
+        bias "" Nothing (RUNS | X)
+            "Measure the bias, which is the blur by the search radius, in extra runs: of the paper's box, and where `measure` is relmse. Otherwise it is estimated from the run's own blocks. With `error` it counts as part of the error";
+        checkpoint "FILE" Nothing (RUNS | X)
             "Write all sums into this file from time to time and at the end, so that `resume` can go on with them";
-        every "TIME" Nothing RUNS "Time between two checkpoints" default "30s" requires "checkpoint";
-        resume "FILE" Nothing RUNS
+        every "TIME" Nothing (RUNS | X) "Time between two checkpoints" default "30s" requires "checkpoint";
+        resume "FILE" Nothing (RUNS | X)
             "Go on with the blocks of rounds that a checkpoint holds; the result is that of a run without a break, to the bit";
-        shard "K/N" Nothing RUNS
+        shard "K/N" Nothing (RUNS | X)
             "Do every N-th block of rounds, from the K-th on (K from 1 to N); `photonmill merge` adds the checkpoints of all of them"
             requires "checkpoint";
     }
     Photons {
+        preset "NAME" Picture X "Experiment of the paper that sets the defaults" default "modified";
         photons "N" Work ALL
-            "Photons of the global map, per round" default "131072; what a pilot finds best of a picture that ends at an error or a time";
-        caustic_photons "N" Work ALL
+            "Photons of the global map, per round" default "131072; what a pilot finds best of a picture that ends at an error or a time"
+            box "Photons per round, summed over all lights"
+            default "5000";
+        caustic_photons "N" Work SCENES
             "Photons of the caustic map, per round" default "the same as `photons`; what a pilot finds best";
-        bounces "N" Picture ALL "Cut photons off after this many bounces" default "none; Russian roulette ends paths";
-        aim "SWITCH" Picture ALL
+        bounces "N" Picture ALL "Cut photons off after this many bounces" default "none; Russian roulette ends paths"
+            box "Maximum number of bounces of a photon"
+            default "15; 2 with `preset` naive";
+        aim "SWITCH" Picture SCENES
             "Aim photons of the caustic map at mirrors and glass (projection maps), and light of a sky or sun at the openings that it comes in through"
             default "on";
         map "FILE" Picture RUNS
             "Take the photons from a file of `photonmill map` instead of tracing them: the same light for another camera, radius or kernel"
             conflicts ["photons", "caustic_photons", "bounces", "aim", "illumination"];
-        rounds "N" Work RUNS
+        rounds "N" Work (RUNS | X)
             "Number of independent rounds, of which the result is the mean"
-            default "as many as the goals take, up to 65536; 32 of points, texels and shards without a goal";
+            default "as many as the goals take, up to 65536; 32 of points, texels and shards without a goal"
+            box "Number of rounds, whose photons are summed"
+            default "1; 100 with `preset` rounds; as many as needed with `error`, `time` or `total_photons`, 1048576 at most";
         block "N" Picture RUNS
             "Rounds of a block, a power of two. Samples are stratified over a block, and errors come from the spread of blocks; `rounds` is rounded up to whole blocks"
             default "4, less with more `samples`";
+        rng "GENERATOR" Picture X
+            "Random number generator" default "rand48 with the paper's 5000 photons per round, otherwise philox";
         seed "N" Picture ALL "Seed of the random numbers" default "1";
     }
     LightTransport {
-        illumination "METHOD" Picture ALL "Source of direct light and caustics" default "split";
-        settings "FILE" Work ALL
+        illumination "METHOD" Picture SCENES "Source of direct light and caustics" default "split";
+        settings "FILE" Work SCENES
             "Take what a pilot has chosen from a file of `save_settings`, and run no pilot; options that are given go before it";
-        with "EFFECT" Picture ALL "Simulate an effect even if the scene does not need it; `photonmill plan` lists them";
-        without "EFFECT" Picture ALL "Leave an effect out even if the scene needs it";
+        with "EFFECT" Picture SCENES "Simulate an effect even if the scene does not need it; `photonmill plan` lists them";
+        without "EFFECT" Picture SCENES "Leave an effect out even if the scene needs it";
         shadow_rays "N" Work RUNS
             "Shadow rays per visible point and round" default "4; what a pilot finds best of a picture that ends at an error or a time";
         final_gather "" Picture RUNS
@@ -203,19 +233,39 @@ pub const ROWS: &[Row] = rows! {
             default "24; what a pilot finds best of a picture that ends at an error or a time";
         caustic_neighbours "N" Work RUNS
             "The same for the caustic map" default "6, or a quarter of `neighbours`; or what a pilot finds best";
-        radius "METRES" Picture RUNS
-            "Radius of the density estimate of the global map in the first round, metres" default "what holds `neighbours`";
+        radius "METRES" Picture (RUNS | X)
+            "Radius of the density estimate of the global map in the first round, metres" default "what holds `neighbours`"
+            box "Radius of the density estimate, metres"
+            default "0.05; 0.025 with `preset` rounds";
         caustic_radius "METRES" Picture RUNS "The same for the caustic map" default "what holds `caustic_neighbours`";
         alpha "ALPHA" Picture RUNS
             "How the radius shrinks from round to round, as alpha of Knaus and Zwicker (2011): above 0 and at most 1, which keeps the radius"
             default "0.667" conflicts ["fixed_radius"];
         fixed_radius "" Picture RUNS "Keep the radius, like `alpha` 1";
         kernel "KERNEL" Picture RUNS "Kernel of the density estimate: weight of a photon by its distance" default "box";
-        edge_correction "SWITCH" Picture RUNS
-            "Divide by the part of the search disc that lies on the surface, not by the whole disc" default "on";
+        edge_correction "SWITCH" Picture (RUNS | X)
+            "Divide by the part of the search disc that lies on the surface, not by the whole disc" default "on"
+            box "Divide by the part of the search disc that lies on the wall, not by the whole disc, for irradiance and radiosity; the paper's illumination stays uncorrected"
+            default "on";
+        full_light "N" Picture X
+            "Photons within the radius, per round, that are shown as full illumination"
+            default "90 per 5000 photons of a round; 10 per 5000 with `preset` rounds";
+        nearest "K" Picture X
+            "Use only the K nearest photons of each round, 2 to 1024, none farther away than the radius; needs `gather` kdtree"
+            default "all within the radius";
+        mesh "N" Picture X "Texels along each side of a wall" default "64";
     }
     Implementation {
-        variant "BUILDER" Nothing (RUNS | V) "Builder of the photon maps; all give bit-identical results" default "auto";
+        variant "BUILDER" Nothing (RUNS | V | X) "Builder of the photon maps; all give bit-identical results" default "auto"
+            box "Builder of the photon map; all GPU builders give bit-identical results"
+            default "atomic; naive with `preset` naive";
+        gather "SEARCH" Picture X
+            "How photons near a point are found; all give bit-identical results" default "grid";
+        sums "NUMBERS" Picture X "Number format of the film's sums" default "integer";
+        counters "N" Nothing X
+            "Counters of `variant` atomic, a power of two up to 64, which work groups use round-robin; the result is the same to the bit"
+            default "1; on a GPU 8 from two million photons at once";
+        threads "N|all" Nothing X "Threads of `variant` cpu, or `all`" default "1, as in the paper";
         math "ROUNDING" Picture ALL "Rounding of the arithmetic" default "fast";
         chunk "N" Nothing ALL
             "Most photons traced at once; the result is the same to the bit" default "what fits on the device";
@@ -227,6 +277,19 @@ pub const ROWS: &[Row] = rows! {
 };
 
 impl Row {
+    /// What it is, and what holds where it is not given, in a command.
+    pub fn help(&self, command: u32) -> String {
+        let own = (self.help, self.default);
+        let (help, default) = if command == Command::Box as u32 { self.of_box.first().copied().unwrap_or(own) } else { own };
+        if default.is_empty() { help.to_owned() } else { format!("{help} [default: {default}]") }
+    }
+
+    /// Whether metadata keep what a request says of it. The paper's box has as many photons as are asked for, as no pilot chooses.
+    pub fn is_kept(&self, request: &RenderRequest) -> bool {
+        let is_of_box = request.scene.is_empty();
+        self.decides == Decides::Picture || (is_of_box && self.field == "photons")
+    }
+
     /// Whether a command has it, by the command's number.
     pub fn is_of(&self, command: u32) -> bool {
         self.commands & command != 0

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::checkpoints::Checkpoints;
 use super::events::Observer;
 use super::prepare::{Inputs, Receivers, Run};
 use super::request::RenderRequest;
@@ -32,7 +33,7 @@ impl PreparedScene {
         let allowed = format!("must be from 1 to {MAX_POINTS}, the number of points");
         require((1..=MAX_POINTS).contains(&points.len()), "points", points.len(), allowed)?;
         let inputs = Inputs::open(request)?;
-        let mut checkpoints = inputs.checkpoints(observer)?;
+        let mut checkpoints = Checkpoints::open(request, observer)?;
         let run = self.prepare(inputs, Receivers::Points(points), observer)?.run(gpus, &mut checkpoints, observer)?;
         checkpoints.finish()?;
         Ok(run)

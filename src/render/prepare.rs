@@ -11,7 +11,7 @@ use std::time::Instant;
 use glam::DVec3;
 
 use super::bias::{bias_before, rounds_after};
-use super::checkpoints::{CheckpointRequest, Checkpoints, check_shard};
+use super::checkpoints::Checkpoints;
 use super::events::{Event, Observer};
 use super::request::RenderRequest;
 use super::scene::{PreparedScene, geometry};
@@ -80,13 +80,6 @@ impl<'a> Inputs<'a> {
     /// For an image of which nothing says when it ends: an error ends it, or the time that suits the device.
     pub fn ended(self, kind: &str) -> Inputs<'a> {
         Inputs { settings: self.request.ended(self.settings, kind), ..self }
-    }
-
-    /// What writes checkpoints, and what the run goes on with.
-    pub fn checkpoints<'b>(&self, observer: &Observer<'b>) -> Result<Checkpoints<'b>> {
-        let &RenderRequest { shard, error, total_photons, bias, .. } = self.request;
-        check_shard(shard, error, total_photons, bias)?;
-        CheckpointRequest::of(self.request).open(observer.tell)
     }
 
     /// Where the settings go that a pilot chooses.

@@ -5,21 +5,26 @@ use std::fmt::Display;
 use std::ops::DerefMut;
 use std::path::Path;
 
+use super::checkpoints::Checkpoints;
 use super::denoise;
 use super::events::Observer;
 use super::image::show;
-use super::options::{Decides, row};
+use super::options::row;
 use super::prepare::{Inputs, Receivers, prepare};
 use super::request::RenderRequest;
+use super::room::{self, PreparedRoom};
 use super::tuned_settings::TunedSettings;
+use crate::engine::room::film::estimate_walls;
 use crate::engine::scene::map_file::MapFile;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::output::colour::Format;
+use crate::output::image::overview;
 use crate::output::metadata::{Metadata, devices};
-use crate::output::{colour, exr_file};
+use crate::output::{colour, exr_file, room_report};
 use crate::plan::work_division::Division;
 use crate::scene::built_in;
+use crate::scene::open_box::open_box;
 use crate::settings::Math;
 use crate::settings::tile_samples::TileSamples;
 
@@ -37,7 +42,13 @@ pub struct RoundsOf {
 }
 
 impl RenderRequest {
-    /// The request of an image, from the words that its metadata keep; fails with what they are not.
+    /// The request of an image, from what its metadata keep.
+    pub fn of_picture(path: &Path, words: &[String]) -> Result<RenderRequest> {
+        let damaged = |reason| format!("says otherwise than photonmill does how it was made ({reason})");
+        RenderRequest::of_words(words).map_err(|reason| Error::Picture { path: path.to_owned(), reason: damaged(reason) })
+    }
+
+    /// The same; fails with what the words are not.
     fn of_words(words: &[String]) -> std::result::Result<RenderRequest, String> {
         let mut request = RenderRequest::default();
         for word in words {
@@ -50,7 +61,7 @@ impl RenderRequest {
             };
             let (name, value) = option.split_once('=').unwrap_or((option, "on"));
             let known = row(name).filter(|row| row.option() == name).ok_or_else(|| format!("--{name} is no option of this version"))?;
-            if known.decides != Decides::Picture {
+            if !known.is_kept(&request) {
                 return Err(format!("it has --{name}, which decides no pixel"));
             }
             (known.of)(&mut request).read(value).map_err(|allowed| format!("--{name} {value}: {allowed}"))?;
@@ -71,7 +82,7 @@ pub fn repeat<Devices: DerefMut<Target = Vec<Gpu>>>(
     let refuse = |reason: String| Error::Picture { path: path.to_owned(), reason };
     let damaged = |reason: &dyn Display| refuse(format!("says otherwise than photonmill does how it was made ({reason})"));
     let tuned = TunedSettings::of_picture(made, rounds.division, rounds.tiles.clone()).map_err(|error| damaged(&error))?;
-    let mut request = RenderRequest::of_words(arguments).map_err(|reason| damaged(&reason))?;
+    let mut request = RenderRequest::of_picture(path, arguments)?;
     request.check_camera().map_err(|error| damaged(&error))?;
     if let Some(scene) = scene {
         scene.clone_into(&mut request.scene);
@@ -100,13 +111,30 @@ pub fn repeat<Devices: DerefMut<Target = Vec<Gpu>>>(
         let (before, now) = (made.devices.join("; "), here.join("; "));
         observer.warn(format!("made on {before}, and repeated on {now}, which may round otherwise"));
     }
-    let mut checkpoints = prepared.inputs.checkpoints(observer)?;
+    let mut checkpoints = Checkpoints::open(&request, observer)?;
     let image = prepared.image(&mut gpus, &mut checkpoints, observer)?;
     if image.run.is_cancelled() {
         return Err(Error::Interrupted);
     }
     let (content, _) = image.file(&request, format, observer);
     Ok(Repeated { content, devices: image.devices() })
+}
+
+/// Lights the paper's box again.
+pub fn repeat_room<Devices: DerefMut<Target = Vec<Gpu>>>(
+    request: &RenderRequest,
+    format: Format,
+    devices_of: impl FnOnce() -> Result<Devices>,
+    observer: &Observer,
+) -> Result<Repeated> {
+    let settings = request.room_settings();
+    settings.validate()?;
+    let prepared = PreparedRoom { request, scene: open_box(&settings), settings };
+    let mut checkpoints = Checkpoints::open(request, observer)?;
+    let result = prepared.run(&mut *devices_of()?, &mut checkpoints, observer)?.finished()?;
+    let walls = estimate_walls(&result.film, &prepared.scene, &result.plan);
+    let metadata = room::metadata(request, &result, &room_report::error(&result, &prepared.scene), format);
+    Ok(Repeated { content: overview(&prepared.scene, &walls).encode(format, Some(&metadata)), devices: metadata.devices })
 }
 
 /// Values that differ, of how many.

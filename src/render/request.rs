@@ -4,18 +4,19 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
-use super::values::{Layers, Percent, Seconds, Stops, SunPosition};
+use super::values::{Layers, Percent, Seconds, Shininess, Stops, SunPosition, Threads, Variant, Watts};
 use crate::engine::blocks;
 use crate::output::colour::Tone;
 use crate::plan::work_division::Free;
+use crate::rng::Rng;
 use crate::scene::Reading;
 use crate::scene::picture_size::PictureSize;
 use crate::scene::surroundings::{Environment, Surroundings};
 use crate::settings::scene::{Effect, Filter, Illumination, Kernel, MAX_ROUNDS, Part, SceneSettings, Stop};
 use crate::settings::stop::Measure;
-use crate::settings::{Builder, Math};
+use crate::settings::{EmissionLaw, Gather, Math, PhongDirection, Preset, Sums};
 
-/// `None`: as usual. Each field is the option of the same name, with `-` for `_`, and means what `photonmill render --help` says of it; so
+/// `None`: as usual. Some fields are of scenes, some of the paper's box, and most of both. Each field is the option of the same name, with `-` for `_`, and means what `photonmill render --help` says of it; so
 /// do Python's keyword arguments.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RenderRequest {
@@ -43,6 +44,12 @@ pub struct RenderRequest {
     pub size: Option<PictureSize>,
     pub aperture: Option<f64>,
     pub focus: Option<f64>,
+    pub emission: Option<EmissionLaw>,
+    pub shininess: Option<Shininess>,
+    pub phong_direction: Option<PhongDirection>,
+    pub reflectance: Option<f32>,
+    pub light_radius: Option<f64>,
+    pub light_power: Option<Watts>,
 
     pub error: Option<Percent>,
     pub measure: Option<Measure>,
@@ -55,6 +62,7 @@ pub struct RenderRequest {
     pub resume: Option<PathBuf>,
     pub shard: Option<blocks::Share>,
 
+    pub preset: Option<Preset>,
     pub photons: Option<u32>,
     pub caustic_photons: Option<u32>,
     pub bounces: Option<u32>,
@@ -62,6 +70,7 @@ pub struct RenderRequest {
     pub map: Option<PathBuf>,
     pub rounds: Option<u32>,
     pub block: Option<u32>,
+    pub rng: Option<Rng>,
     pub seed: Option<u64>,
 
     pub illumination: Option<Illumination>,
@@ -83,9 +92,15 @@ pub struct RenderRequest {
     pub fixed_radius: bool,
     pub kernel: Option<Kernel>,
     pub edge_correction: Option<bool>,
+    pub full_light: Option<f64>,
+    pub nearest: Option<u32>,
+    pub mesh: Option<u32>,
 
-    /// `--variant`.
-    pub variant: Option<Builder>,
+    pub variant: Option<Variant>,
+    pub gather: Option<Gather>,
+    pub sums: Option<Sums>,
+    pub counters: Option<u32>,
+    pub threads: Option<Threads>,
     pub math: Option<Math>,
     pub chunk: Option<u32>,
     pub group_size: Option<u32>,
@@ -172,7 +187,7 @@ impl RenderRequest {
             part: self.part.unwrap_or(usual.part),
             keeps_parts: usual.keeps_parts,
             filter: self.filter.unwrap_or(usual.filter),
-            builder: self.variant.or(usual.builder),
+            builder: self.variant.and_then(Variant::builder).or(usual.builder),
             math: self.math.unwrap_or(usual.math),
             paranoid: self.paranoid,
             stop,

@@ -12,11 +12,12 @@ use glam::DVec3;
 use crate::engine::blocks;
 use crate::output::colour::Tone;
 use crate::output::show::Layer;
+use crate::rng::Rng;
 use crate::scene::picture_size::{PictureSize, parse_size};
 use crate::scene::surroundings::Environment;
 use crate::settings::scene::{Effect, Filter, Illumination, Kernel, Part};
 use crate::settings::stop::Measure;
-use crate::settings::{Builder, Math};
+use crate::settings::{Builder, EmissionLaw, Gather, Math, PhongDirection, Preset, Sums, WALL_NAMES};
 
 type Parsed<T> = Result<T, String>;
 
@@ -142,6 +143,18 @@ pub struct SunPosition {
     pub elevation: f64,
 }
 
+/// Phong exponents of the box's walls.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shininess(pub [f32; 5]);
+
+/// Power of the two lights of the box.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Watts(pub [f64; 2]);
+
+/// Threads of the CPU.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Threads(pub usize);
+
 /// Layers of an EXR.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layers(pub Vec<Layer>);
@@ -247,17 +260,13 @@ impl Word for bool {
     }
 }
 
-/// A number that `T` does not hold becomes 0 or the largest of `T`. The setting must allow neither: validation, which knows
-/// its range, then refuses both.
-pub fn parse_integer<T: TryFrom<u64>>(text: &str) -> Parsed<T> {
-    let number = match text.parse::<i128>() {
-        Ok(number) => number,
-        Err(error) if *error.kind() == IntErrorKind::PosOverflow => i128::MAX,
-        Err(error) if *error.kind() == IntErrorKind::NegOverflow => 0,
-        Err(_) => return Err("must be a whole number".to_owned()),
-    };
-    let largest = u64::MAX >> (64 - 8 * size_of::<T>());
-    Ok(T::try_from(number.clamp(0, largest.into()) as u64).ok().expect("the number is in the range of T"))
+/// A whole number that `T` does not hold becomes 0, which no setting allows: validation, which knows the range, then refuses it.
+pub fn parse_integer<T: TryFrom<i128> + Default>(text: &str) -> Parsed<T> {
+    match text.parse::<i128>() {
+        Ok(number) => Ok(T::try_from(number).unwrap_or_default()),
+        Err(error) if matches!(error.kind(), IntErrorKind::PosOverflow | IntErrorKind::NegOverflow) => Ok(T::default()),
+        Err(_) => Err("must be a whole number".to_owned()),
+    }
 }
 
 impl Word for u32 {
@@ -344,6 +353,23 @@ words! {
     PictureSize as Form::Other, parse_size, size_word;
     blocks::Share as Form::Other, parse_shard, |shard| format!("{}/{}", shard.number + 1, shard.of);
     Layers as Form::Other, parse_layers, layers_word;
+    Shininess as Form::Other, parse_shininess, |shininess| commas(&shininess.0);
+    Watts as Form::Numbers(2), |text| parse_numbers(text).map(Watts), |watts| commas(&watts.0);
+    Threads as Form::Other, parse_threads, |threads| threads.0.to_string();
+}
+
+fn parse_shininess(text: &str) -> Parsed<Shininess> {
+    match parse_numbers::<f32, 1>(text) {
+        Ok([all]) => Ok(Shininess([all; 5])),
+        Err(_) => parse_numbers(text).map(Shininess).map_err(|_| format!("must be one number, or five for {}", WALL_NAMES.join(","))),
+    }
+}
+
+fn parse_threads(text: &str) -> Parsed<Threads> {
+    if text == "all" {
+        return Ok(Threads(std::thread::available_parallelism().map_or(1, usize::from)));
+    }
+    parse_integer(text).map(Threads).map_err(|_| "must be a number of threads, or all".to_owned())
 }
 
 pub fn parse_stops(text: &str) -> Parsed<Stops> {
@@ -444,6 +470,36 @@ choices! {
         Math::Fast = "fast", "As fast as the device can";
         Math::Strict = "strict", "The same bits on every device that rounds to nearest";
     }
+    Preset {
+        Preset::Naive = "naive", "Figure 1: the naive implementation, 2 bounces";
+        Preset::Modified = "modified", "Figure 2: the modified implementation, 15 bounces";
+        Preset::Phong = "phong", "Figure 3: the same with Phong walls of exponent 2";
+        Preset::Rounds = "rounds", "Figure 4: 100 rounds, radius 0.025 m, Phong exponent 5";
+    }
+    Rng {
+        Rng::Rand48 = "rand48", "The paper's drand48, leap-frogged";
+        Rng::Mt = "mt", "The paper's alternative, the Mersenne Twister";
+        Rng::Philox = "philox", "Counter-based";
+        Rng::Sobol = "sobol", "Owen-scrambled Sobol' points (quasi-Monte Carlo)";
+    }
+    Gather {
+        Gather::Brute = "brute", "Test every photon, as in the paper";
+        Gather::Grid = "grid", "A sorted uniform grid; the CPU builder splats photons onto texels instead";
+        Gather::KdTree = "kdtree", "A kd-tree";
+    }
+    Sums {
+        Sums::Integer = "integer", "64-bit fixed point: the same bits in any order of addition";
+        Sums::F32 = "f32", "32-bit floats";
+        Sums::Compensated = "compensated", "Pairs of 32-bit floats (compensated summation)";
+    }
+    EmissionLaw {
+        EmissionLaw::Uniform = "uniform", "";
+        EmissionLaw::Cosine = "cosine", "";
+    }
+    PhongDirection {
+        PhongDirection::Mirror = "mirror", "";
+        PhongDirection::Sampled = "sampled", "";
+    }
     Illumination {
         Illumination::Split = "split", "Direct light by shadow rays, caustics from a map of their own, the rest from the global map";
         Illumination::Photons = "photons", "Everything from one photon map, as in the paper";
@@ -484,30 +540,45 @@ pub const fn meaning(builder: Builder) -> &'static str {
     }
 }
 
-/// Those of scenes; `auto` is as if none were given.
-impl Value for Option<Builder> {
-    fn form(&self) -> Form {
-        const AUTO: (&str, &str) =
-            ("auto", "Persistent; ballot with `math` strict, and where the device fails the check of what persistent needs");
-        const CHOICES: [(&str, &str); Builder::ON_GPU.len() + 1] = {
-            let mut choices = [AUTO; Builder::ON_GPU.len() + 1];
+/// Which builder of photon maps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Variant {
+    /// For scenes as if none were given; for the paper's box the one that is fastest on the device.
+    Auto,
+    Of(Builder),
+}
+
+impl Variant {
+    pub fn builder(self) -> Option<Builder> {
+        match self {
+            Variant::Auto => None,
+            Variant::Of(builder) => Some(builder),
+        }
+    }
+}
+
+impl Word for Variant {
+    const FORM: Form = {
+        const CHOICES: [(&str, &str); Builder::ALL.len() + 1] = {
+            let auto = "Of scenes persistent, but ballot with `math` strict and where the device fails the check of what persistent needs; of the paper's box the fastest, timed on the first photons";
+            let mut choices = [("auto", auto); Builder::ALL.len() + 1];
             let mut place = 0;
-            while place < Builder::ON_GPU.len() {
-                choices[place] = (Builder::ON_GPU[place].name(), meaning(Builder::ON_GPU[place]));
+            while place < Builder::ALL.len() {
+                choices[place] = (Builder::ALL[place].name(), meaning(Builder::ALL[place]));
                 place += 1;
             }
             choices
         };
         Form::Choice(&CHOICES)
+    };
+
+    fn parse(text: &str) -> Parsed<Variant> {
+        let found = Builder::ALL.into_iter().find(|builder| builder.name() == text).map(Variant::Of);
+        let known = || format!("must be one of {}, auto", Builder::ALL.map(Builder::name).join(", "));
+        found.or((text == "auto").then_some(Variant::Auto)).ok_or_else(known)
     }
 
-    fn read(&mut self, text: &str) -> Parsed<()> {
-        let known = || format!("must be one of {}, auto", Builder::ON_GPU.map(Builder::name).join(", "));
-        let found = Builder::ON_GPU.into_iter().find(|builder| builder.name() == text);
-        (found.is_some() || text == "auto").then(|| *self = found).ok_or_else(known)
-    }
-
-    fn text(&self) -> Option<String> {
-        self.map(|builder| builder.name().to_owned())
+    fn word(&self) -> String {
+        self.builder().map_or("auto", Builder::name).to_owned()
     }
 }

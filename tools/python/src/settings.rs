@@ -87,12 +87,9 @@ impl Argument<'_, '_> {
         let text = self.text(row)?;
         let field = (row.of)(request);
         field.read_os(text.as_ref()).map_err(|allowed| self.refused(&allowed))?;
-        // What does not fit became the least or the largest that does.
-        match field.text().filter(|read| row.form() == Form::Integer && *read != text) {
-            Some(end) if end == "0" => Err(self.refused("must be 0 or more")),
-            Some(end) => Err(self.refused(&format!("must be at most {end}"))),
-            None => Ok(()),
-        }
+        // What does not fit was not taken.
+        let is_cut = row.form() == Form::Integer && field.text().as_ref() != Some(&text);
+        if is_cut { Err(self.refused("must be 0 or more, and at most 4294967295")) } else { Ok(()) }
     }
 
     /// The value as the command line has it.
