@@ -1,5 +1,6 @@
 //! `photonmill view`: a window.
 
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use clap::Args;
@@ -10,15 +11,13 @@ use super::request::{RequestArgs, VIEW};
 use super::values::{parse_percent, parse_seconds};
 use super::{DeviceArgs, End};
 use crate::error::{Error, Result};
-use crate::render::image::kept;
 use crate::render::options::ROWS;
-use crate::render::values::Variant;
 use crate::render::viewpoint::size_of;
 use crate::render::{Event, Inputs, Observer, Percent, PreparedScene, RenderRequest, Seconds};
-use crate::scene::{Camera, Scene};
+use crate::scene::Camera;
 use crate::settings::RoomSettings;
 use crate::settings::scene::{SceneSettings, Stop};
-use crate::view::{self, Request, Subject};
+use crate::view::{self, Subject, ViewRequest};
 
 #[derive(Args)]
 pub(super) struct ViewArgs {
@@ -58,46 +57,23 @@ pub(super) fn run(args: &ViewArgs, cancelled: &AtomicBool) -> Result<End> {
     let stop = Stop { error, seconds, ..Stop::default() };
     let (subject, size) = if is_box {
         check_box(request)?;
-        let usual = RoomSettings::default();
-        let settings = RoomSettings {
-            builder: request.variant.and_then(Variant::builder).unwrap_or(usual.builder),
-            seed: request.seed.unwrap_or(usual.seed),
-            ..usual
-        };
-        let photons = request.photons.unwrap_or(settings.photons);
-        RoomSettings { stop, photons, ..settings.clone() }.validate()?;
+        let settings = request.room_settings();
+        RoomSettings { stop, ..settings }.validate()?;
         // Its camera is none of a scene.
         let camera = Camera::looking_at("box", DVec3::Z, DVec3::ZERO, DVec3::Y, 1.0);
         let size = request.size.map(|_| size_of(request.size, &camera, &observer)).transpose()?;
-        (Subject::Box(Box::new(settings)), size.map(<[u32; 2]>::from))
+        (Subject::Box, size.map(<[u32; 2]>::from))
     } else {
-        let inputs = Inputs::open(request)?;
-        let settings = inputs.settings.clone();
-        SceneSettings { stop, ..settings.clone() }.validate()?;
-        let scene = PreparedScene::read(request, &observer)?;
+        request.check_camera()?;
+        let settings = Inputs::open(request)?.settings;
+        SceneSettings { stop, ..settings }.validate()?;
+        let scene = Arc::new(PreparedScene::read(request, &observer)?);
         let (camera, size) = request.viewpoint(&scene.scene, None, &observer)?;
-        let scene = Box::new(Scene::clone(&scene.scene));
-        (Subject::Scene { scene, camera, settings: Box::new(settings) }, request.size.map(|_| size))
+        (Subject::Scene { scene, camera }, request.size.map(|_| size))
     };
     reporter.finish();
-    // What the window says anew is left out.
-    let kept = RenderRequest {
-        camera: None,
-        eye: None,
-        look_at: None,
-        up: None,
-        fov: None,
-        orthographic: None,
-        size: None,
-        aperture: None,
-        focus: None,
-        without: Vec::new(),
-        ..kept(request)
-    };
-    let words = if is_box { kept.words().split_off(1) } else { [vec!["render".to_owned()], kept.words()].concat() };
-    let error = args.error.map(|error| format!("--error={error}"));
-    let time = args.time.map(|time| format!("--time={time}"));
-    let command = words.into_iter().chain(error).chain(time).collect();
-    view::run(Request { subject, photons: request.photons, size, command, options: args.device.options(), cancelled })?;
+    let scene = if is_box { String::new() } else { request.scene.clone() };
+    let request = RenderRequest { scene, error: args.error, time: args.time, size: None, ..request.clone() };
+    view::run(ViewRequest { subject, request, size, options: args.device.options(), cancelled })?;
     Ok(End::Finished)
 }

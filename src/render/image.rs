@@ -268,7 +268,7 @@ fn command(request: &RenderRequest, run: &RunResult, output: &str) -> String {
 }
 
 /// A command line for a shell, with `output` as its file.
-pub(super) fn command_line(command: &str, request: &RenderRequest, output: &str) -> String {
+pub fn command_line(command: &str, request: &RenderRequest, output: &str) -> String {
     let options = ROWS.iter().filter_map(|row| Some((row, row.text(request)?))).flat_map(|(row, value)| {
         let value = (row.form() != Form::Flag).then_some(value);
         [Some(format!("--{}", row.option())), value].into_iter().flatten()

@@ -64,10 +64,12 @@ const P: u32 = Command::Probe as u32;
 const M: u32 = Command::Map as u32;
 const L: u32 = Command::Plan as u32;
 const X: u32 = Command::Box as u32;
-const RUNS: u32 = R | B | P | L;
+/// Those that light a scene to its end, and what they share with `plan`, which shows what they would do.
+const LIT: u32 = R | B | P;
+const RUNS: u32 = LIT | L;
 const SEEN: u32 = R | V | L;
 const SCENES: u32 = RUNS | V | M;
-const ALL: u32 = SCENES | X;
+const ALL: u32 = LIT | V | M | X;
 
 pub struct Row {
     /// As a field is called; a command's option has `-` for `_`.
@@ -163,33 +165,33 @@ pub const ROWS: &[Row] = rows! {
             "Power of the light on the floor and of the light on the left wall, watts" default "1,1";
     }
     WhenToStop {
-        error "PERCENT" Nothing (RUNS | X)
+        error "PERCENT" Nothing (LIT | X)
             "Stop once the relative error is at most this: 2%. It is of light that surfaces scatter; lamps, the sky and unlit surfaces that are seen directly are left out";
-        measure "MEASURE" Picture (RUNS | X)
+        measure "MEASURE" Picture (LIT | X)
             "What the error is: the RMSE over the mean, or the root of relMSE, whose epsilon is (1 % of the mean)^2" default "rmse";
-        confidence "PERCENT" Picture (RUNS | X) "Confidence level of the error bound" default "95%";
-        time "TIME" Nothing (RUNS | X) "Stop after rounds of this time: 2s, 500ms, 3m. Does not include start-up and the pilot";
-        total_photons "N" Nothing (RUNS | X) "Stop once this many photons have been traced, summed over all rounds and maps";
-        bias "" Nothing (RUNS | X)
+        confidence "PERCENT" Picture (LIT | X) "Confidence level of the error bound" default "95%";
+        time "TIME" Nothing (LIT | X) "Stop after rounds of this time: 2s, 500ms, 3m. Does not include start-up and the pilot";
+        total_photons "N" Nothing (LIT | X) "Stop once this many photons have been traced, summed over all rounds and maps";
+        bias "" Nothing (LIT | X)
             "Measure the bias, which is the blur by the search radius, in extra runs: of the paper's box, and where `measure` is relmse. Otherwise it is estimated from the run's own blocks. With `error` it counts as part of the error";
-        checkpoint "FILE" Nothing (RUNS | X)
+        checkpoint "FILE" Nothing (LIT | X)
             "Write all sums into this file from time to time and at the end, so that `resume` can go on with them";
-        every "TIME" Nothing (RUNS | X) "Time between two checkpoints" default "30s" requires "checkpoint";
-        resume "FILE" Nothing (RUNS | X)
+        every "TIME" Nothing (LIT | X) "Time between two checkpoints" default "30s" requires "checkpoint";
+        resume "FILE" Nothing (LIT | X)
             "Go on with the blocks of rounds that a checkpoint holds; the result is that of a run without a break, to the bit";
-        shard "K/N" Nothing (RUNS | X)
+        shard "K/N" Nothing (LIT | X)
             "Do every N-th block of rounds, from the K-th on (K from 1 to N); `photonmill merge` adds the checkpoints of all of them"
             requires "checkpoint";
     }
     Photons {
         preset "NAME" Picture X "Experiment of the paper that sets the defaults" default "modified";
-        photons "N" Work ALL
+        photons "N" Work (SCENES | X)
             "Photons of the global map, per round" default "131072; what a pilot finds best of a picture that ends at an error or a time"
             box "Photons per round, summed over all lights"
             default "5000";
         caustic_photons "N" Work SCENES
             "Photons of the caustic map, per round" default "the same as `photons`; what a pilot finds best";
-        bounces "N" Picture ALL "Cut photons off after this many bounces" default "none; Russian roulette ends paths"
+        bounces "N" Picture (SCENES | X) "Cut photons off after this many bounces" default "none; Russian roulette ends paths"
             box "Maximum number of bounces of a photon"
             default "15; 2 with `preset` naive";
         aim "SWITCH" Picture SCENES
@@ -238,11 +240,11 @@ pub const ROWS: &[Row] = rows! {
             box "Radius of the density estimate, metres"
             default "0.05; 0.025 with `preset` rounds";
         caustic_radius "METRES" Picture RUNS "The same for the caustic map" default "what holds `caustic_neighbours`";
-        alpha "ALPHA" Picture RUNS
+        alpha "ALPHA" Picture LIT
             "How the radius shrinks from round to round, as alpha of Knaus and Zwicker (2011): above 0 and at most 1, which keeps the radius"
             default "0.667" conflicts ["fixed_radius"];
-        fixed_radius "" Picture RUNS "Keep the radius, like `alpha` 1";
-        kernel "KERNEL" Picture RUNS "Kernel of the density estimate: weight of a photon by its distance" default "box";
+        fixed_radius "" Picture LIT "Keep the radius, like `alpha` 1";
+        kernel "KERNEL" Picture LIT "Kernel of the density estimate: weight of a photon by its distance" default "box";
         edge_correction "SWITCH" Picture (RUNS | X)
             "Divide by the part of the search disc that lies on the surface, not by the whole disc" default "on"
             box "Divide by the part of the search disc that lies on the wall, not by the whole disc, for irradiance and radiosity; the paper's illumination stays uncorrected"
@@ -267,9 +269,9 @@ pub const ROWS: &[Row] = rows! {
             default "1; on a GPU 8 from two million photons at once";
         threads "N|all" Nothing X "Threads of `variant` cpu, or `all`" default "1, as in the paper";
         math "ROUNDING" Picture ALL "Rounding of the arithmetic" default "fast";
-        chunk "N" Nothing ALL
+        chunk "N" Nothing (SCENES | X)
             "Most photons traced at once; the result is the same to the bit" default "what fits on the device";
-        group_size "N" Nothing ALL "Invocations per work group, a power of two" default "128";
+        group_size "N" Nothing (SCENES | X) "Invocations per work group, a power of two" default "128";
     }
     Checks {
         paranoid "" Nothing ALL "Detect NaN and infinity, and print which photon, pixel, texel or point they come from";

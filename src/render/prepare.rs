@@ -47,10 +47,10 @@ pub struct Inputs<'a> {
     /// What the request asks for; a pilot may choose some of it.
     pub settings: SceneSettings,
     /// Photons that need not be traced.
-    map: Option<MapFile>,
+    pub(super) map: Option<MapFile>,
     /// What a pilot has chosen before.
-    tuned: Option<TunedSettings>,
-    save_settings: Option<Destination>,
+    pub(super) tuned: Option<TunedSettings>,
+    pub(super) save_settings: Option<Destination>,
     pub(super) denoiser: Option<Arc<Denoiser>>,
 }
 
@@ -66,7 +66,7 @@ impl<'a> Inputs<'a> {
         Inputs::with(request, map, tuned)
     }
 
-    /// The same with settings that need not be read.
+    /// The same with files that are open.
     pub(super) fn with(request: &'a RenderRequest, map: Option<MapFile>, tuned: Option<TunedSettings>) -> Result<Inputs<'a>> {
         let settings = request.settings(tuned.as_ref().map(TunedSettings::settings).as_ref());
         let settings = match &map {
@@ -198,6 +198,11 @@ impl Prepared<'_> {
     /// What a device within these limits would do, but for what a trial round finds.
     pub fn plan_within(&self, limits: &Limits) -> Result<ScenePlan> {
         self.of_map(ScenePlan::new(&self.scene, &self.geometry, &self.inputs.settings, self.sensor, limits)?)
+    }
+
+    /// What a device does, with what a trial round finds; of a device that works to its end.
+    pub fn plan_on(&self, gpu: &Gpu) -> Result<ScenePlan> {
+        self.of_map(trial::plan(gpu, &self.scene, &self.view(), &self.inputs.settings, self.sensor)?)
     }
 
     /// What a device does, with what a trial round finds.

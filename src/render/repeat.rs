@@ -12,19 +12,16 @@ use super::image::show;
 use super::options::row;
 use super::prepare::{Inputs, Receivers, prepare};
 use super::request::RenderRequest;
-use super::room::{self, PreparedRoom};
+use super::room;
 use super::tuned_settings::TunedSettings;
-use crate::engine::room::film::estimate_walls;
 use crate::engine::scene::map_file::MapFile;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::output::colour::Format;
-use crate::output::image::overview;
 use crate::output::metadata::{Metadata, devices};
-use crate::output::{colour, exr_file, room_report};
+use crate::output::{colour, exr_file};
 use crate::plan::work_division::Division;
 use crate::scene::built_in;
-use crate::scene::open_box::open_box;
 use crate::settings::Math;
 use crate::settings::tile_samples::TileSamples;
 
@@ -60,10 +57,8 @@ impl RenderRequest {
                 continue;
             };
             let (name, value) = option.split_once('=').unwrap_or((option, "on"));
-            let known = row(name).filter(|row| row.option() == name).ok_or_else(|| format!("--{name} is no option of this version"))?;
-            if !known.is_kept(&request) {
-                return Err(format!("it has --{name}, which decides no pixel"));
-            }
+            let known = row(name).filter(|row| row.option() == name && row.is_kept(&request));
+            let known = known.ok_or_else(|| format!("it has options that decide no pixel: --{name}"))?;
             (known.of)(&mut request).read(value).map_err(|allowed| format!("--{name} {value}: {allowed}"))?;
         }
         Ok(request)
@@ -92,7 +87,8 @@ pub fn repeat<Devices: DerefMut<Target = Vec<Gpu>>>(
     }
     request.rounds = Some(made.rounds);
     let map = request.map.as_ref().map(|path| MapFile::open("map", path)).transpose()?;
-    let inputs = Inputs::with(&request, map, Some(tuned))?;
+    // They are the picture's own, whatever scene they were chosen for.
+    let inputs = Inputs { tuned: None, ..Inputs::with(&request, map, Some(tuned))? };
     let inputs = inputs.for_image(format == Format::Exr && show(&request, (0, 0)).layers.into_iter().any(|layer| layer.is_part()), None)?;
     if let (Some(before), Some(now)) = (&made.denoiser, inputs.denoiser.as_deref().map(denoise::name))
         && *before != now
@@ -127,14 +123,11 @@ pub fn repeat_room<Devices: DerefMut<Target = Vec<Gpu>>>(
     devices_of: impl FnOnce() -> Result<Devices>,
     observer: &Observer,
 ) -> Result<Repeated> {
-    let settings = request.room_settings();
-    settings.validate()?;
-    let prepared = PreparedRoom { request, scene: open_box(&settings), settings };
-    let mut checkpoints = Checkpoints::open(request, observer)?;
-    let result = prepared.run(&mut *devices_of()?, &mut checkpoints, observer)?.finished()?;
-    let walls = estimate_walls(&result.film, &prepared.scene, &result.plan);
-    let metadata = room::metadata(request, &result, &room_report::error(&result, &prepared.scene), format);
-    Ok(Repeated { content: overview(&prepared.scene, &walls).encode(format, Some(&metadata)), devices: metadata.devices })
+    let image = room::render(&mut *devices_of()?, request, observer)?;
+    if image.result.is_cancelled() {
+        return Err(Error::Interrupted);
+    }
+    Ok(Repeated { content: image.file(format), devices: image.devices() })
 }
 
 /// Values that differ, of how many.

@@ -1,6 +1,7 @@
 //! The paper's box: from a request to a run.
 
 use std::cell::OnceCell;
+use std::path::Path;
 
 use super::bias::{bias_before, rounds_after};
 use super::checkpoints::Checkpoints;
@@ -12,7 +13,7 @@ use crate::engine::choose_builder::{Choice, choose_builder};
 use crate::engine::error_bound::FilmError;
 use crate::engine::identity::settings_with_effect;
 use crate::engine::retry::{run_on, until_done};
-use crate::engine::room::film::RoomFilm;
+use crate::engine::room::film::{RoomFilm, estimate_walls};
 use crate::engine::room::{self, RunResult};
 use crate::engine::saved::SavedFilm;
 use crate::engine::several_devices::Work;
@@ -22,11 +23,15 @@ use crate::error::{Result, require};
 use crate::gpu::Gpu;
 use crate::ledger::Fates;
 use crate::output::colour::Format;
+use crate::output::destination::{Destination, write_all};
+use crate::output::image::overview;
 use crate::output::metadata::{Metadata, Repeat, devices, errors};
 use crate::output::report::{goals, up_to};
+use crate::output::room_report;
 use crate::plan::work_division::Division;
 use crate::plan::{Limits, RoomPlan};
 use crate::rng::Rng;
+use crate::scene::open_box::open_box;
 use crate::scene::room::RoomScene;
 use crate::settings::scene::SceneSettings;
 use crate::settings::stop::Stop;
@@ -188,6 +193,44 @@ fn fastest(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings, observer: &Obs
     Ok(taken)
 }
 
+/// The picture of the box.
+pub struct RoomImage<'a> {
+    pub result: RunResult,
+    scene: RoomScene,
+    request: &'a RenderRequest,
+}
+
+/// Lights the box that a request asks for, on the CPU where there is no device.
+pub fn render<'a>(gpus: &mut Vec<Gpu>, request: &'a RenderRequest, observer: &Observer) -> Result<RoomImage<'a>> {
+    let settings = request.room_settings();
+    settings.validate()?;
+    let prepared = PreparedRoom { request, scene: open_box(&settings), settings };
+    let mut checkpoints = Checkpoints::open(request, observer)?;
+    let result = prepared.run(gpus, &mut checkpoints, observer)?;
+    checkpoints.finish()?;
+    Ok(RoomImage { result, scene: prepared.scene, request })
+}
+
+impl RoomImage<'_> {
+    pub fn devices(&self) -> Vec<String> {
+        devices_of(&self.result)
+    }
+
+    /// Writes a `.png` or an `.exr`, as the file's name ends.
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<()> {
+        let path = path.as_ref();
+        let format = Format::of("output", path)?;
+        write_all([(Destination::open("output", path)?, self.file(format))])
+    }
+
+    /// The content of such a file.
+    pub fn file(&self, format: Format) -> Vec<u8> {
+        let walls = estimate_walls(&self.result.film, &self.scene, &self.result.plan);
+        let metadata = metadata(self.request, &self.result, &room_report::error(&self.result, &self.scene), format);
+        overview(&self.scene, &walls).encode(format, Some(&metadata))
+    }
+}
+
 /// What a picture of the box says of how it was made; its command line makes it again.
 pub fn metadata(request: &RenderRequest, outcome: &RunResult, error: &FilmError, format: Format) -> Metadata {
     let settings = &outcome.plan.settings;
@@ -196,10 +239,9 @@ pub fn metadata(request: &RenderRequest, outcome: &RunResult, error: &FilmError,
     let request = kept(request);
     let builder = outcome.device.is_none().then_some(Variant::Of(Builder::Cpu));
     let with_rounds = RenderRequest { rounds: Some(outcome.film.rounds), variant: builder, ..request.clone() };
-    let devices = devices(outcome.device.iter().chain(&outcome.more_devices));
     Metadata {
         photonmill: env!("CARGO_PKG_VERSION").to_owned(),
-        devices: if devices.is_empty() { vec!["cpu".to_owned()] } else { devices },
+        devices: devices_of(outcome),
         scene: "open-box".to_owned(),
         scene_hash: None,
         seed: settings.seed,
@@ -228,4 +270,9 @@ pub fn metadata(request: &RenderRequest, outcome: &RunResult, error: &FilmError,
             }
         },
     }
+}
+
+fn devices_of(result: &RunResult) -> Vec<String> {
+    let devices = devices(result.device.iter().chain(&result.more_devices));
+    if devices.is_empty() { vec!["cpu".to_owned()] } else { devices }
 }

@@ -314,9 +314,6 @@ pub fn parse_colour(text: &str) -> Parsed<[f32; 3]> {
     if all.iter().all(|value| value.is_finite() && *value >= 0.0) { Ok(all) } else { Err("must be 0 or more and finite".to_owned()) }
 }
 
-/// Metres; far more than rays are computed with.
-pub const MAX_COORDINATE: f64 = 1e12;
-
 fn commas<T: Display>(numbers: &[T]) -> String {
     numbers.iter().map(T::to_string).collect::<Vec<_>>().join(",")
 }
@@ -347,7 +344,7 @@ words! {
     Percent as Form::Percent, str::parse, Percent::to_string;
     Seconds as Form::Time, str::parse, Seconds::to_string;
     Stops as Form::Number, parse_stops, |stops| stops.0.to_string();
-    DVec3 as Form::Numbers(3), parse_point, |point| commas(&point.to_array());
+    DVec3 as Form::Numbers(3), |text| parse_numbers(text).map(DVec3::from_array), |point| commas(&point.to_array());
     SunPosition as Form::Numbers(2), parse_sun, |sun| commas(&[sun.azimuth, sun.elevation]);
     Environment as Form::Other, parse_environment, environment_word;
     PictureSize as Form::Other, parse_size, size_word;
@@ -375,13 +372,6 @@ fn parse_threads(text: &str) -> Parsed<Threads> {
 pub fn parse_stops(text: &str) -> Parsed<Stops> {
     let stops = parse_number(text)?;
     if (-64.0..=64.0).contains(&stops) { Ok(Stops(stops)) } else { Err("must be from -64 to 64 stops".to_owned()) }
-}
-
-fn parse_point(text: &str) -> Parsed<DVec3> {
-    let point = parse_numbers::<f64, 3>(text).map(DVec3::from_array);
-    let is_allowed = |point: &DVec3| point.is_finite() && point.abs().max_element() <= MAX_COORDINATE;
-    let allowed = || format!("must be three numbers with commas between them, each from -{MAX_COORDINATE:e} to {MAX_COORDINATE:e}");
-    point.ok().filter(is_allowed).ok_or_else(allowed)
 }
 
 fn parse_sun(text: &str) -> Parsed<SunPosition> {

@@ -4,7 +4,6 @@ use glam::{DVec2, DVec3};
 
 use super::events::{Event, Observer};
 use super::request::RenderRequest;
-use super::values::MAX_COORDINATE;
 use crate::error::{Error, Result, require};
 use crate::scene::picture_size::PictureSize;
 use crate::scene::{Camera, Lens, Projection, Scene};
@@ -14,6 +13,8 @@ const MOST_APERTURE: f64 = 1e6;
 const MOST_FOCUS: f64 = 1e12;
 /// Degrees.
 const MOST_FOV: f64 = 179.0;
+/// Metres; far more than rays are computed with.
+const MAX_COORDINATE: f64 = 1e12;
 
 impl RenderRequest {
     /// Before a scene is read, which may take long.
@@ -35,6 +36,12 @@ impl RenderRequest {
                 height,
                 format!("must be above 0 and at most {MAX_COORDINATE:e} metres"),
             )?;
+        }
+        for (field, point) in [("eye", self.eye), ("look_at", self.look_at), ("up", self.up)] {
+            let Some(point) = point else { continue };
+            let is_near = point.is_finite() && point.abs().max_element() <= MAX_COORDINATE;
+            let allowed = format!("must be three numbers with commas between them, each from -{MAX_COORDINATE:e} to {MAX_COORDINATE:e}");
+            require(is_near, field, text(point), allowed)?;
         }
         let is_direction = |point: DVec3| point.length() > 0.0;
         if let Some(up) = self.up {

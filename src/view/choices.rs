@@ -1,6 +1,8 @@
 //! What the user of a window chooses: what is shown, and of which run.
 
-use super::Subject;
+use super::{Subject, ViewRequest};
+use crate::render::RenderRequest;
+use crate::render::values::Variant;
 use crate::settings::scene::{Effect, SceneSettings};
 use crate::settings::{Builder, RoomSettings};
 
@@ -38,16 +40,21 @@ const ROUNDS: u32 = 1 << 16;
 const ROUNDS_OF_BOX: u32 = 1 << 12;
 
 impl RunChoices {
-    /// What was asked for, or is usual on a class of devices. `photons` is what the user has typed.
-    pub fn of(subject: &Subject, photons: Option<u32>, kind: &str) -> RunChoices {
-        let (builder, own, without) = match subject {
-            Subject::Scene { settings, .. } => (settings.builder, settings.photons, settings.without.clone()),
-            Subject::Box(settings) => (Some(settings.builder), settings.photons, Vec::new()),
+    /// What was asked for, or is usual on a class of devices.
+    pub fn of(view: &ViewRequest, kind: &str) -> RunChoices {
+        let request = &view.request;
+        let (builder, own) = match &view.subject {
+            Subject::Scene { .. } => (request.variant.and_then(Variant::builder), SceneSettings::default().photons),
+            Subject::Box => {
+                let settings = request.room_settings();
+                (Some(settings.builder), settings.photons)
+            }
         };
-        let is_slow = kind == "cpu" && matches!(subject, Subject::Scene { .. });
+        let is_slow = kind == "cpu" && matches!(view.subject, Subject::Scene { .. });
         let usual = if is_slow { own.min(PHOTONS_ON_CPU) } else { own };
-        let usual_photons = photons.is_none().then_some(usual);
-        RunChoices { builder, photons: photons.unwrap_or(usual), usual_photons, radius_factor: 1.0, without }
+        let usual_photons = request.photons.is_none().then_some(usual);
+        let without = request.without.clone();
+        RunChoices { builder, photons: request.photons.unwrap_or(usual), usual_photons, radius_factor: 1.0, without }
     }
 
     pub fn toggle(&mut self, effect: Effect) {
@@ -70,62 +77,52 @@ impl RunChoices {
         (share * f64::from(self.photons)).round().max(1.0) as u32
     }
 
-    /// Settings of a run without end.
-    pub fn of_scene(&self, usual: &SceneSettings) -> SceneSettings {
-        SceneSettings {
-            builder: self.builder,
-            photons: self.photons,
-            caustic_photons: self.caustic_photons(usual),
-            neighbours: self.neighbours(usual.neighbours),
-            caustic_neighbours: self.neighbours(usual.caustic_neighbours),
+    /// What a picture of a scene in a file is asked for.
+    pub fn of_scene(&self, request: &RenderRequest) -> RenderRequest {
+        let usual = request.settings(None);
+        let other = |is_other: bool, value: u32| is_other.then_some(value);
+        let (photons, radius) = (self.usual_photons != Some(self.photons), self.radius_factor != 1.0);
+        RenderRequest {
+            variant: self.builder.map(Variant::Of),
+            photons: other(photons, self.photons),
+            caustic_photons: other(photons, self.caustic_photons(&usual)),
+            neighbours: other(radius, self.neighbours(usual.neighbours)).or(request.neighbours),
+            caustic_neighbours: other(radius, self.neighbours(usual.caustic_neighbours)).or(request.caustic_neighbours),
             without: self.without.clone(),
-            rounds: ROUNDS,
-            keeps_parts: true,
-            ..usual.clone()
+            ..request.clone()
         }
     }
 
-    pub fn of_box(&self, usual: &RoomSettings) -> RoomSettings {
-        RoomSettings {
-            builder: self.builder.unwrap_or(usual.builder),
-            photons: self.photons,
-            radius: usual.radius * self.radius_factor,
+    /// What a run without end is asked for, which the window shows.
+    pub fn live(&self, request: &RenderRequest) -> RenderRequest {
+        let usual = request.settings(None);
+        RenderRequest {
+            photons: Some(self.photons),
+            caustic_photons: Some(self.caustic_photons(&usual)),
+            error: None,
+            time: None,
+            rounds: Some(ROUNDS),
+            ..self.of_scene(request)
+        }
+    }
+
+    /// What the paper's box is asked for; it ends after so many rounds, or none are given.
+    pub fn of_box(&self, request: &RenderRequest, rounds: Option<u32>) -> RenderRequest {
+        let usual = RenderRequest { photons: None, ..request.clone() }.room_settings();
+        RenderRequest {
+            variant: Some(Variant::Of(self.builder.unwrap_or(usual.builder))),
+            photons: Some(self.photons),
+            radius: Some(usual.radius * self.radius_factor),
             // As many more photons lie within the radius.
-            full_light: usual.full_light * f64::from(self.photons) / f64::from(usual.photons) * self.radius_factor.powi(2),
-            rounds: ROUNDS_OF_BOX,
-            ..usual.clone()
+            full_light: Some(usual.full_light * f64::from(self.photons) / f64::from(usual.photons) * self.radius_factor.powi(2)),
+            rounds: rounds.map(|rounds| rounds.max(1)),
+            ..request.clone()
         }
     }
 
-    /// The same as options of `photonmill render`.
-    pub fn options(&self, usual: &SceneSettings) -> Vec<(&'static str, String)> {
-        let settings = self.of_scene(usual);
-        let mut options: Vec<(&str, String)> = self.builder.map(|builder| ("--variant", builder.name().to_owned())).into_iter().collect();
-        if self.usual_photons != Some(self.photons) {
-            options.push(("--photons", settings.photons.to_string()));
-            options.push(("--caustic-photons", settings.caustic_photons.to_string()));
-        }
-        if self.radius_factor != 1.0 {
-            options.push(("--neighbours", settings.neighbours.to_string()));
-            options.push(("--caustic-neighbours", settings.caustic_neighbours.to_string()));
-        }
-        if !self.without.is_empty() {
-            options.push(("--without", self.without.iter().map(|effect| effect.name()).collect::<Vec<_>>().join(",")));
-        }
-        options
-    }
-
-    /// The same as options of the box, of so many rounds, where nothing else ends it.
-    pub fn options_of_box(&self, usual: &RoomSettings, rounds: Option<u32>) -> Vec<(&'static str, String)> {
-        let settings = self.of_box(usual);
-        let rounds = rounds.map(|rounds| ("--rounds", rounds.max(1).to_string()));
-        let others = [
-            ("--variant", settings.builder.name().to_owned()),
-            ("--photons", settings.photons.to_string()),
-            ("--radius", settings.radius.to_string()),
-            ("--full-light", settings.full_light.to_string()),
-        ];
-        others.into_iter().chain(rounds).collect()
+    /// The same for a run without end.
+    pub fn live_box(&self, request: &RenderRequest) -> RoomSettings {
+        RenderRequest { error: None, time: None, ..self.of_box(request, Some(ROUNDS_OF_BOX)) }.room_settings()
     }
 }
 
@@ -140,12 +137,13 @@ mod tests {
     #[test]
     fn an_effect_goes_and_comes_back() {
         let mut run = choices();
+        let words = |run: &RunChoices| run.of_scene(&RenderRequest::default()).words();
         run.toggle(Effect::Direct);
         assert_eq!(run.without, [Effect::Direct]);
-        assert_eq!(run.options(&SceneSettings::default()), [("--without", "direct".to_owned())]);
+        assert_eq!(words(&run), ["--without=direct"]);
         run.toggle(Effect::Direct);
         assert_eq!(run, choices());
-        assert_eq!(run.options(&SceneSettings::default()), []);
+        assert_eq!(words(&run), [""; 0]);
     }
 
     /// A radius of twice the width holds four times the photons; light of the box stays as bright, and so it does with fewer photons.
@@ -154,11 +152,11 @@ mod tests {
         let mut run = choices();
         run.scale_radius(2.0);
         let usual = SceneSettings::default();
-        assert_eq!(run.of_scene(&usual).neighbours, 4 * usual.neighbours);
+        assert_eq!(run.live(&RenderRequest::default()).neighbours, Some(4 * usual.neighbours));
         let of_box = RoomSettings::default();
-        let settings = RunChoices { photons: of_box.photons, ..run }.of_box(&of_box);
+        let settings = RunChoices { photons: of_box.photons, ..run }.live_box(&RenderRequest::default());
         assert_eq!((settings.radius, settings.full_light), (2.0 * of_box.radius, 4.0 * of_box.full_light));
-        let settings = RunChoices::of(&Subject::Box(Box::new(of_box.clone())), Some(of_box.photons / 5), "cpu").of_box(&of_box);
+        let settings = RunChoices { photons: of_box.photons / 5, ..choices() }.live_box(&RenderRequest::default());
         assert_eq!((settings.photons, settings.full_light), (of_box.photons / 5, of_box.full_light / 5.0));
     }
 }

@@ -9,34 +9,32 @@ mod panel;
 pub mod picture;
 mod session;
 
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use crate::error::{Error, Result};
 use crate::gpu::window::Presenter;
 use crate::gpu::{Gpu, Options};
-use crate::scene::{Camera, Scene};
-use crate::settings::RoomSettings;
-use crate::settings::scene::SceneSettings;
+use crate::render::{PreparedScene, RenderRequest};
+use crate::scene::Camera;
 use choices::{Choices, RunChoices};
 use events::Events;
 
 use session::{Next, Session};
 
-/// What is looked at.
+/// What is looked at: by a camera of its own, or the paper's box.
 pub enum Subject {
-    Scene { scene: Box<Scene>, camera: Camera, settings: Box<SceneSettings> },
-    Box(Box<RoomSettings>),
+    Scene { scene: Arc<PreparedScene>, camera: Camera },
+    Box,
 }
 
 /// What `photonmill view` is asked for.
-pub struct Request<'a> {
+pub struct ViewRequest<'a> {
     pub subject: Subject,
-    /// Per round, as typed.
-    pub photons: Option<u32>,
+    /// What the picture in a file is asked for, but for its camera and what the user of the window chooses.
+    pub request: RenderRequest,
     /// Of the picture; `None` for what suits the window and the device.
     pub size: Option<[u32; 2]>,
-    /// The command that makes such a picture in a file, with the options that were typed, up to its camera and its choices.
-    pub command: Vec<String>,
     pub options: Options,
     pub cancelled: &'a AtomicBool,
 }
@@ -50,15 +48,15 @@ const PANEL_WINDOW: u32 = 600;
 const ZOOM_OF_CPU: u32 = 4;
 
 /// Shows a window until it is closed.
-pub fn run(request: Request) -> Result<()> {
+pub fn run(request: ViewRequest) -> Result<()> {
     let interface = egui::Context::default();
     let name = match &request.subject {
-        Subject::Scene { scene, .. } => scene.name.clone(),
-        Subject::Box(_) => "the paper's box".to_owned(),
+        Subject::Scene { scene, .. } => scene.scene.name.clone(),
+        Subject::Box => "the paper's box".to_owned(),
     };
     let aspect = match &request.subject {
         Subject::Scene { camera, .. } => camera.aspect.unwrap_or(USUAL_ASPECT).clamp(0.5, 2.0),
-        Subject::Box(_) => USUAL_ASPECT,
+        Subject::Box => USUAL_ASPECT,
     };
     let usual = [(aspect * f64::from(WINDOW_HEIGHT)) as u32, WINDOW_HEIGHT];
     // A small picture is shown with large pixels.
@@ -72,7 +70,7 @@ pub fn run(request: Request) -> Result<()> {
     let is_slow = gpu.facts().kind == "cpu" && matches!(request.subject, Subject::Scene { .. });
     let zoom = if is_slow && request.size.is_none() { ZOOM_OF_CPU } else { 1 };
     let mut presenter = Presenter::new(&gpu)?;
-    let run = RunChoices::of(&request.subject, request.photons, gpu.facts().kind);
+    let run = RunChoices::of(&request, gpu.facts().kind);
     let mut choices =
         Choices { shows: crate::constants::SHOW_ALL, stops: 0.0, has_photons: false, is_open: window[0] >= PANEL_WINDOW, zoom, run };
     let mut session = Session::new(&gpu, &request, interface, name);

@@ -1,8 +1,9 @@
 //! A run that is looked at, until it must begin anew with other settings or another size.
 
 use std::path::PathBuf;
-use std::process::{Child, Command, Stdio};
-use std::sync::atomic::Ordering;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use egui::Context;
@@ -14,19 +15,22 @@ use super::events::Events;
 use super::live::{Live, Rate};
 use super::panel::{self, PHOTON_COLOURS, Requests, Status};
 use super::picture::{Exposure, Picture};
-use super::{Request, Subject};
+use super::{Subject, ViewRequest};
 use crate::engine::room::live::LiveRoom;
 use crate::engine::scene::live::{DotPlace, LiveScene};
-use crate::engine::scene::{View, trial};
 use crate::error::Result;
 use crate::gpu::window::Presenter;
 use crate::gpu::{Commands, Gpu};
 use crate::output::colour::png_of_codes;
 use crate::plan::scene::ScenePlan;
-use crate::plan::sensor::Sensor;
+use crate::render::image::command_line;
+use crate::render::names::{as_option, spelled};
+use crate::render::{Inputs, Observer, Receivers, RenderRequest, Stops, room};
 use crate::scene::geometry::Geometry;
 use crate::scene::open_box::open_box;
-use crate::scene::{Camera, Lens, Projection};
+use crate::scene::picture_size::PictureSize;
+use crate::scene::{Camera, Projection};
+use crate::settings::scene::Part;
 
 /// How a run that was looked at ended.
 pub enum Next {
@@ -40,7 +44,7 @@ pub enum Next {
 /// What stays from run to run.
 pub struct Session<'a> {
     gpu: &'a Gpu,
-    request: &'a Request<'a>,
+    request: &'a ViewRequest<'a>,
     interface: Context,
     status: Status,
     camera: MovingCamera,
@@ -50,7 +54,7 @@ pub struct Session<'a> {
     /// What the user is told for a while.
     said: Option<Instant>,
     files: u32,
-    child: Option<(Child, PathBuf)>,
+    rendering: Option<Rendering>,
 }
 
 /// Rounds are run for so long before the window is shown again.
@@ -63,22 +67,23 @@ const STOPS_OF_PHOTONS: f32 = 2.0;
 const SAID: Duration = Duration::from_secs(8);
 
 impl<'a> Session<'a> {
-    pub fn new(gpu: &'a Gpu, request: &'a Request<'a>, interface: Context, title: String) -> Session<'a> {
+    pub fn new(gpu: &'a Gpu, request: &'a ViewRequest<'a>, interface: Context, title: String) -> Session<'a> {
         let camera = match &request.subject {
-            Subject::Scene { scene, camera, .. } => {
+            Subject::Scene { scene, camera } => {
+                let scene = &scene.scene;
                 let (min, max) = scene.bounds();
                 let ahead = scene.distance_along(camera.eye, camera.forward).filter(|distance| distance.is_finite());
                 MovingCamera::new(camera.clone(), ahead.unwrap_or(0.5 * (max - min).length()).max(1e-9))
             }
-            Subject::Box(settings) => {
-                let room = open_box(settings);
+            Subject::Box => {
+                let room = open_box(&request.request.room_settings());
                 let middle = 0.5 * (room.min_corner + room.max_corner);
                 let half = 0.5 * (room.max_corner - room.min_corner).max_element();
                 let eye = middle + half * DVec3::new(0.7, 0.5, 3.2);
                 MovingCamera::new(Camera::looking_at("box", eye, middle, DVec3::Y, 0.8), eye.distance(middle))
             }
         };
-        let status = Status { title, device: gpu.facts().label(), is_box: matches!(request.subject, Subject::Box(_)), ..Status::default() };
+        let status = Status { title, device: gpu.facts().label(), is_box: matches!(request.subject, Subject::Box), ..Status::default() };
         Session {
             gpu,
             request,
@@ -89,7 +94,7 @@ impl<'a> Session<'a> {
             wants_exposure: true,
             said: None,
             files: 0,
-            child: None,
+            rendering: None,
         }
     }
 
@@ -108,19 +113,18 @@ impl<'a> Session<'a> {
         (self.status.noise, self.status.unseen) = (f64::INFINITY, 0.0);
         self.wait_frame(events, presenter, &picture, choices)?;
         match &self.request.subject {
-            Subject::Scene { scene, settings, .. } => {
-                let settings = choices.run.of_scene(settings);
-                settings.validate()?;
-                let geometry = Geometry::new(&scene.without(&settings.without))?;
-                let view = View { geometry: &geometry, camera: Some(&self.camera.camera), phases: &[] };
-                let sensor = Sensor::Picture { width: size[0], height: size[1] };
-                let plan = trial::plan(self.gpu, scene, &view, &settings, sensor)?;
-                let live = LiveScene::new(self.gpu, &geometry, &self.camera.camera, &plan, self.request.cancelled)?;
-                self.take_plan(&plan, &geometry, choices);
+            Subject::Scene { scene, .. } => {
+                let request = RenderRequest { size: Some(width_and_height(size)), ..choices.run.live(&self.request.request) };
+                let mut inputs = Inputs::open(&request)?;
+                inputs.settings.keeps_parts = true;
+                let prepared = scene.prepare(inputs, Receivers::Image(Some(&self.camera.camera)), &Observer::default())?;
+                let plan = prepared.plan_on(self.gpu)?;
+                let live = LiveScene::new(self.gpu, &prepared.geometry, &self.camera.camera, &plan, self.request.cancelled)?;
+                self.take_plan(&plan, &prepared.geometry, choices);
                 self.frames(Live::Scene(Box::new(live)), &picture, events, presenter, choices)
             }
-            Subject::Box(settings) => {
-                let settings = choices.run.of_box(settings);
+            Subject::Box => {
+                let settings = choices.run.live_box(&self.request.request);
                 let scene = open_box(&settings);
                 let plan = LiveRoom::plan(self.gpu, &scene, &settings)?;
                 let live = LiveRoom::new(self.gpu, &scene, &plan, self.request.cancelled)?;
@@ -240,10 +244,10 @@ impl<'a> Session<'a> {
                 live.show_photons(PHOTON_COLOURS.map(|colour| word_of(colour, presenter.blue_first())), place, &picture.pixels)?;
             }
             live.commands().submit()?;
-            self.status.command = self.command(choices, None);
+            self.status.command = self.command(choices);
             let (requests, fits) = self.interface_frame(events, presenter, picture, choices, false)?;
             if requests.close || events.is_closed() || self.request.cancelled.load(Ordering::Relaxed) {
-                self.end_child();
+                self.end_rendering();
                 return Ok(Next::Close);
             }
             self.act(requests, &mut live, picture, presenter, choices)?;
@@ -287,12 +291,12 @@ impl<'a> Session<'a> {
                 Err(error) => format!("{}: cannot be written ({error})", path.display()),
             });
         }
-        match (requests.render, &self.child) {
-            (true, None) => self.begin_render(choices),
-            (true, Some((_, path))) => self.say(format!("{} is still being rendered", path.display())),
+        match (requests.render, &self.rendering) {
+            (true, None) => self.begin_rendering(choices),
+            (true, Some(rendering)) => self.say(format!("{} is still being rendered", rendering.path.display())),
             _ => {}
         }
-        self.look_after_child();
+        self.look_after_rendering();
         Ok(())
     }
 
@@ -307,102 +311,125 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Another process of this program renders the picture as it is seen now.
-    fn begin_render(&mut self, choices: &Choices) {
+    /// Renders the picture as it is seen now beside the window, on a device of its own.
+    fn begin_rendering(&mut self, choices: &Choices) {
         let path = self.free_name("png");
-        let words = self.words(choices, Some(&path.display().to_string()));
-        let started = std::env::current_exe().and_then(|program| {
-            Command::new(program).args(&words).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn()
-        });
-        match started {
-            Ok(child) => {
-                self.say(format!("rendering {} ...", path.display()));
-                self.said = None;
-                self.child = Some((child, path));
+        // Here, as the validation layer's table of devices has no lock (1.3.239).
+        let gpu = match Gpu::open(&self.request.options) {
+            Ok(gpu) => gpu,
+            Err(error) => return self.say(error.to_string()),
+        };
+        let (request, cancelled) = (self.image_request(choices), Arc::new(AtomicBool::new(false)));
+        let scene = match &self.request.subject {
+            Subject::Scene { scene, .. } => Some(scene.clone()),
+            Subject::Box => None,
+        };
+        let thread = std::thread::spawn({
+            let (path, cancelled) = (path.clone(), cancelled.clone());
+            move || {
+                let mut gpus = vec![gpu];
+                let observer = Observer { cancelled: &cancelled, ..Observer::default() };
+                let written = match scene {
+                    Some(scene) => scene.render(&mut gpus, None, &request, &observer).and_then(|image| image.save(&path, &observer)),
+                    None => room::render(&mut gpus, &request, &observer).and_then(|image| image.save(&path)),
+                };
+                (gpus, written)
             }
-            Err(error) => self.say(format!("cannot render: {error}")),
-        }
+        });
+        self.say(format!("rendering {} ...", path.display()));
+        self.said = None;
+        self.rendering = Some(Rendering { thread, path, cancelled });
     }
 
-    fn look_after_child(&mut self) {
-        let Some((child, path)) = &mut self.child else { return };
-        let Ok(Some(status)) = child.try_wait() else { return };
-        let message = match status.success() {
-            true => format!("wrote {}", path.display()),
-            false => {
-                let mut text = String::new();
-                let _ = child.stderr.take().map(|mut stderr| std::io::Read::read_to_string(&mut stderr, &mut text));
-                text.lines().last().unwrap_or("the render failed").to_owned()
-            }
-        };
-        self.child = None;
+    fn look_after_rendering(&mut self) {
+        let Some(rendering) = self.rendering.take_if(|rendering| rendering.thread.is_finished()) else { return };
+        let message = rendering.end();
         self.say(message);
     }
 
-    /// A render that is still under way goes on without the window; its file comes where it was said.
-    fn end_child(&mut self) {
-        if let Some((_, path)) = self.child.take() {
-            println!("{} is still being rendered", path.display());
+    /// A picture that is still being rendered is finished without the window, unless the program is interrupted.
+    fn end_rendering(&mut self) {
+        let Some(rendering) = self.rendering.take() else { return };
+        println!("{} is still being rendered", rendering.path.display());
+        while !rendering.thread.is_finished() {
+            rendering.cancelled.store(self.request.cancelled.load(Ordering::Relaxed), Ordering::Relaxed);
+            std::thread::sleep(FRAME);
         }
+        println!("{}", rendering.end());
     }
 
-    /// Of the program, for the picture as it is seen now.
-    fn words(&self, choices: &Choices, output: Option<&str>) -> Vec<String> {
-        let mut words = self.request.command.clone();
-        let mut add = |option: &str, value: String| words.push(format!("{option}={value}"));
+    /// What the picture as it is seen now is asked for.
+    fn image_request(&self, choices: &Choices) -> RenderRequest {
+        let request = &self.request.request;
         match &self.request.subject {
-            Subject::Scene { settings, .. } => {
-                for (option, value) in camera_options(&self.camera) {
-                    add(option, value);
-                }
-                add("--size", format!("{}x{}", self.status.size[0], self.status.size[1]));
-                choices.run.options(settings).into_iter().for_each(|(option, value)| add(option, value));
-                if let Some(part) = part_of(choices.shows) {
-                    add("--part", part.to_owned());
-                }
-                add("--exposure", format!("{:.2}", choices.stops));
-            }
-            Subject::Box(settings) => {
-                let ends = self.request.command.iter().any(|word| word.starts_with("--error=") || word.starts_with("--time="));
-                let options = choices.run.options_of_box(settings, (!ends).then_some(self.status.rounds));
-                options.into_iter().for_each(|(option, value)| add(option, value));
+            Subject::Scene { .. } => RenderRequest {
+                size: Some(width_and_height(self.status.size)),
+                part: part_of(choices.shows),
+                exposure: Some(Stops((100.0 * choices.stops).round() / 100.0)),
+                ..seen_from(&self.camera, choices.run.of_scene(request))
+            },
+            Subject::Box => {
+                let ends = request.error.is_some() || request.time.is_some();
+                choices.run.of_box(request, (!ends).then_some(self.status.rounds))
             }
         }
-        words.push("-o".into());
-        words.push(output.unwrap_or("picture.png").to_owned());
-        words
     }
 
-    fn command(&self, choices: &Choices, output: Option<&str>) -> String {
-        let words = self.words(choices, output);
-        ["photonmill".to_owned()].into_iter().chain(words.into_iter().map(crate::text::quoted)).collect::<Vec<_>>().join(" ")
+    fn command(&self, choices: &Choices) -> String {
+        let command = if self.status.is_box { "" } else { "render" };
+        command_line(command, &self.image_request(choices), "picture.png")
     }
 }
 
-fn part_of(shows: u32) -> Option<&'static str> {
-    let parts = ["direct", "specular", "caustic", "indirect"];
-    shows.checked_sub(crate::constants::SHOW_DIRECT).and_then(|part| parts.get(part as usize).copied())
+/// A picture that is rendered into a file; its devices are closed by the thread that opened them.
+struct Rendering {
+    thread: JoinHandle<(Vec<Gpu>, Result<()>)>,
+    path: PathBuf,
+    cancelled: Arc<AtomicBool>,
+}
+
+impl Rendering {
+    /// What came of it, once it has ended.
+    fn end(self) -> String {
+        match self.thread.join() {
+            Ok((_, Ok(()))) => format!("wrote {}", self.path.display()),
+            Ok((_, Err(error))) => spelled(&error.to_string(), as_option),
+            Err(_) => "the render failed".to_owned(),
+        }
+    }
+}
+
+fn width_and_height([width, height]: [u32; 2]) -> PictureSize {
+    PictureSize::WidthAndHeight(width, height)
+}
+
+fn part_of(shows: u32) -> Option<Part> {
+    shows.checked_sub(crate::constants::SHOW_DIRECT).and_then(|part| Part::EACH.get(part as usize).copied())
 }
 
 /// Nine digits, which tell apart what single precision does.
-fn short(value: f64) -> String {
-    format!("{value:.8e}").parse().map_or_else(|_| value.to_string(), |rounded: f64| rounded.to_string())
+fn short(value: f64) -> f64 {
+    format!("{value:.8e}").parse().unwrap_or(value)
 }
 
-/// Options that put a camera where this one is.
-fn camera_options(moving: &MovingCamera) -> Vec<(&'static str, String)> {
+/// A request with a camera where this one is.
+fn seen_from(moving: &MovingCamera, request: RenderRequest) -> RenderRequest {
     let MovingCamera { camera, pivot } = moving;
-    let point = |point: DVec3| point.to_array().map(short).join(",");
-    let target = camera.eye + *pivot * camera.forward;
-    let mut options = vec![("--eye", point(camera.eye)), ("--look-at", point(target)), ("--up", point(camera.up))];
-    match camera.projection {
-        Projection::Perspective { vertical_view } => options.push(("--fov", short(vertical_view.to_degrees()))),
-        Projection::Orthographic { half_height } => options.push(("--orthographic", short(2.0 * half_height))),
+    let (fov, orthographic) = match camera.projection {
+        Projection::Perspective { vertical_view } => (Some(short(vertical_view.to_degrees())), None),
+        Projection::Orthographic { half_height } => (None, Some(short(2.0 * half_height))),
+    };
+    RenderRequest {
+        camera: None,
+        eye: Some(camera.eye.map(short)),
+        look_at: Some((camera.eye + *pivot * camera.forward).map(short)),
+        up: Some(camera.up.map(short)),
+        fov,
+        orthographic,
+        aperture: camera.lens.map(|lens| short(2.0 * lens.radius)),
+        focus: camera.lens.map(|lens| short(lens.focus)),
+        ..request
     }
-    if let Some(Lens { radius, focus }) = camera.lens {
-        options.extend([("--aperture", short(2.0 * radius)), ("--focus", short(focus))]);
-    }
-    options
 }
 
 /// A colour as the window has it.

@@ -245,7 +245,7 @@ fn files_say_how_they_were_made() {
         assert_eq!(made.settings["samples"], 2);
     }
     // The command makes the same picture.
-    assert_eq!(exr.command, "photonmill render cornell --size 8x8 --seed 7 --photons 500 --samples 2 --rounds 8 -o picture.exr");
+    assert_eq!(exr.command, "photonmill render cornell --size 8x8 --photons 500 --rounds 8 --seed 7 --samples 2 -o picture.exr");
     let line = exr.command.strip_prefix("photonmill ").unwrap();
     place.succeed(&format!("{line} -q"));
     assert!(place.content("picture.exr") == place.content("a.exr"), "equal results are equal files");

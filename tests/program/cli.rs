@@ -295,11 +295,10 @@ fn interrupted(signal: &str, code: i32) {
 #[test]
 fn a_run_says_what_it_does() {
     let place = Place::new();
-    let line = "--variant cpu --photons 300 --mesh 4 --error 0.0002 -o a.png";
+    let line = "--variant cpu --photons 300 --mesh 4 --error 0.0002% -o a.png";
     let mut run = place.start(&format!("{line} --time 3600s"));
     assert_eq!(run.line_with(""), "photonmill: device: CPU");
     let plan = run.line_with("");
-    // The error is what was understood of a number without a unit.
     let words = "plan: open box|300 photons|15 bounces|radius 0.05 m|MiB|an error of 0.0002 % (95 % confidence)|or 3600 s";
     assert_says(&plan, words.split('|'));
     let step = run.line_with("photons/s");
