@@ -7,8 +7,9 @@ use serde_json::{Map, Value, json};
 
 use super::names::{GEOMETRY, Names};
 use super::{Layout, MeshLightmap};
+use crate::scene::layers::{Layers, METALLIC_ROUGHNESS, Medium, NormalMap, PARAMETERS, Parameter, TextureUse, UvTransform};
 use crate::scene::light::{LUMENS_PER_WATT, LightKind};
-use crate::scene::material::{Coverage, Layers, Medium, NormalMap, TextureUse, UvTransform};
+use crate::scene::material::Coverage;
 use crate::scene::texture::{Filter, Wrap};
 use crate::scene::{Camera, Light, Material, Mesh, Projection, Scene, Surface};
 
@@ -308,32 +309,27 @@ impl Document {
         };
         let mut value = json!({
             "name": material.name,
-            "pbrMetallicRoughness": {
-                "baseColorFactor": base_colour.extend(alpha).to_array(),
-                "metallicFactor": layers.metallic,
-                "roughnessFactor": layers.roughness,
-            },
+            METALLIC_ROUGHNESS: {"baseColorFactor": base_colour.extend(alpha).to_array()},
             "alphaMode": alpha_mode,
             "doubleSided": material.two_sided,
         });
         if let Coverage::Mask { cutoff, .. } = coverage {
             value["alphaCutoff"] = json!(cutoff);
         }
-        let set = |object: &mut Value, name: &str, used: Option<TextureUse>| {
-            if let Some(used) = used {
-                object[name] = of_texture(used);
-            }
+        let of_normal_map = |map: NormalMap| {
+            let mut value = of_texture(map.texture);
+            value["scale"] = json!(map.scale);
+            value
         };
-        let set_normal_map = |object: &mut Value, name: &str, map: Option<NormalMap>| {
-            if let Some(map) = map {
-                object[name] = of_texture(map.texture);
-                object[name]["scale"] = json!(map.scale);
-            }
-        };
-        set(&mut value["pbrMetallicRoughness"], "baseColorTexture", material.base_colour_texture);
-        set(&mut value["pbrMetallicRoughness"], "metallicRoughnessTexture", layers.metallic_roughness_texture);
-        set(&mut value, "emissiveTexture", material.emission_texture);
-        set_normal_map(&mut value, "normalTexture", normal_map);
+        if let Some(used) = material.base_colour_texture {
+            value[METALLIC_ROUGHNESS]["baseColorTexture"] = of_texture(used);
+        }
+        if let Some(used) = material.emission_texture {
+            value["emissiveTexture"] = of_texture(used);
+        }
+        if let Some(map) = normal_map {
+            value["normalTexture"] = of_normal_map(map);
+        }
 
         let mut extensions = Map::new();
         let mut add = |name: &'static str, content: Value| {
@@ -356,67 +352,25 @@ impl Document {
                 json!({"thicknessFactor": 1.0, "attenuationDistance": metres, "attenuationColor": transmittance.to_array()});
             add("KHR_materials_volume", after_a_metre);
         }
-        let ior = |of: &Layers| json!({"ior": of.ior});
-        let dispersion = |of: &Layers| json!({"dispersion": of.dispersion});
-        let specular = |of: &Layers| {
-            let mut value = json!({"specularFactor": of.specular, "specularColorFactor": of.specular_colour.to_array()});
-            set(&mut value, "specularTexture", of.specular_texture);
-            set(&mut value, "specularColorTexture", of.specular_colour_texture);
-            value
-        };
-        let transmission = |of: &Layers| {
-            let mut value = json!({"transmissionFactor": of.transmission});
-            set(&mut value, "transmissionTexture", of.transmission_texture);
-            value
-        };
-        let beyond = |of: &Layers| {
-            let mut value = json!({"diffuseTransmissionFactor": of.diffuse_transmission,
-                "diffuseTransmissionColorFactor": of.diffuse_transmission_colour.to_array()});
-            set(&mut value, "diffuseTransmissionTexture", of.diffuse_transmission_texture);
-            set(&mut value, "diffuseTransmissionColorTexture", of.diffuse_transmission_colour_texture);
-            value
-        };
-        let film = |of: &Layers| {
-            let [least, most] = of.film_thickness;
-            let mut value = json!({"iridescenceFactor": of.iridescence, "iridescenceIor": of.film_ior,
-                "iridescenceThicknessMinimum": least, "iridescenceThicknessMaximum": most});
-            set(&mut value, "iridescenceTexture", of.iridescence_texture);
-            set(&mut value, "iridescenceThicknessTexture", of.film_thickness_texture);
-            value
-        };
-        let stretch = |of: &Layers| {
-            let mut value = json!({"anisotropyStrength": of.anisotropy, "anisotropyRotation": of.anisotropy_rotation});
-            set(&mut value, "anisotropyTexture", of.anisotropy_texture);
-            value
-        };
-        let coat = |of: &Layers| {
-            let mut value = json!({"clearcoatFactor": of.coat, "clearcoatRoughnessFactor": of.coat_roughness});
-            set(&mut value, "clearcoatTexture", of.coat_texture);
-            set(&mut value, "clearcoatRoughnessTexture", of.coat_roughness_texture);
-            set_normal_map(&mut value, "clearcoatNormalTexture", of.coat_normal_map);
-            value
-        };
-        let sheen = |of: &Layers| {
-            let mut value = json!({"sheenColorFactor": of.sheen_colour.to_array(), "sheenRoughnessFactor": of.sheen_roughness});
-            set(&mut value, "sheenColorTexture", of.sheen_colour_texture);
-            set(&mut value, "sheenRoughnessTexture", of.sheen_roughness_texture);
-            value
-        };
-        // What is as usual is left out.
-        let own_and_usual = |part: &dyn Fn(&Layers) -> Value| [layers, Layers::default()].map(|of| part(&of));
-        for (name, [own, usual]) in [
-            ("KHR_materials_ior", own_and_usual(&ior)),
-            ("KHR_materials_dispersion", own_and_usual(&dispersion)),
-            ("KHR_materials_specular", own_and_usual(&specular)),
-            ("KHR_materials_transmission", own_and_usual(&transmission)),
-            ("KHR_materials_diffuse_transmission", own_and_usual(&beyond)),
-            ("KHR_materials_iridescence", own_and_usual(&film)),
-            ("KHR_materials_anisotropy", own_and_usual(&stretch)),
-            ("KHR_materials_clearcoat", own_and_usual(&coat)),
-            ("KHR_materials_sheen", own_and_usual(&sheen)),
-        ] {
-            if own != usual {
-                add(name, own);
+        for (group, parameters) in PARAMETERS {
+            let members = |mut layers: Layers| -> Map<String, Value> {
+                let member = |(member, parameter): &(&str, Parameter)| {
+                    let value = match parameter {
+                        Parameter::Number(_, _, of) => json!(of(&mut layers)),
+                        Parameter::Colour(_, _, of) => json!(of(&mut layers).to_array()),
+                        Parameter::NumberTexture(_, of) | Parameter::ColourTexture(_, of) => of_texture((*of(&mut layers))?),
+                        Parameter::NormalMap(_, of) => of_normal_map((*of(&mut layers))?),
+                    };
+                    Some(((*member).to_owned(), value))
+                };
+                parameters.iter().filter_map(member).collect()
+            };
+            let own = members(layers);
+            if *group == METALLIC_ROUGHNESS {
+                value[group].as_object_mut().expect("it has the base colour").extend(own);
+            } else if own != members(Layers::default()) {
+                // What is as usual is left out.
+                add(group, own.into());
             }
         }
         if !extensions.is_empty() {

@@ -13,6 +13,7 @@ pub mod file;
 pub mod film;
 pub mod geometry;
 pub mod gltf;
+pub mod layers;
 pub mod light;
 pub mod light_tree;
 pub mod linear_picture;

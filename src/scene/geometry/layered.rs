@@ -91,31 +91,9 @@ fn record((material, kinds): (&Material, LobeKinds)) -> LayeredMaterial {
 /// Adds what each material looks up behind the textures of the scene.
 pub(super) fn add_lookups(scene: &Scene, records: &mut [LayeredMaterial], textures: &mut Vec<TextureInfo>) {
     for (material, record) in scene.materials.iter().zip(records) {
-        let of = &material.layers;
-        let map = |map: Option<NormalMap>| map.map(|map| map.texture);
-        let lookups = [
-            (LAYER_METALLIC_ROUGHNESS, of.metallic_roughness_texture),
-            (LAYER_ANISOTROPY, of.anisotropy_texture),
-            (LAYER_SPECULAR, of.specular_texture),
-            (LAYER_SPECULAR_COLOUR, of.specular_colour_texture),
-            (LAYER_TRANSMISSION, of.transmission_texture),
-            (LAYER_DIFFUSE_TRANSMISSION, of.diffuse_transmission_texture),
-            (LAYER_DIFFUSE_TRANSMISSION_COLOUR, of.diffuse_transmission_colour_texture),
-            (LAYER_IRIDESCENCE, of.iridescence_texture),
-            (LAYER_IRIDESCENCE_THICKNESS, of.film_thickness_texture),
-            (LAYER_COAT, of.coat_texture),
-            (LAYER_COAT_ROUGHNESS, of.coat_roughness_texture),
-            (LAYER_COAT_NORMAL, map(of.coat_normal_map)),
-            (LAYER_SHEEN_COLOUR, of.sheen_colour_texture),
-            (LAYER_SHEEN_ROUGHNESS, of.sheen_roughness_texture),
-            (LAYER_NORMAL, map(material.normal_map)),
-        ];
         record.first_lookup = textures.len() as u32;
-        for (layer, used) in lookups {
-            if let Some(used) = used {
-                let lookup = lookup(textures[used.texture], layer, used, scene.textures[used.texture].wrap);
-                textures.push(lookup);
-            }
+        for (layer, used) in material.layer_textures() {
+            textures.push(lookup(textures[used.texture], layer, used, scene.textures[used.texture].wrap));
         }
         record.end_lookup = textures.len() as u32;
     }
@@ -142,9 +120,9 @@ pub(super) fn is_needed(scene: &Scene) -> bool {
 /// How the textures of a material's layers, those of each set of coordinates, look up what lies far from 0; `None` where they do so in
 /// several ways.
 pub(super) fn turns(material: &Material, textures: &[Texture]) -> [Option<Turns>; 2] {
-    let layers = Material { base_colour_texture: None, emission_texture: None, ..material.clone() };
     [0, 1].map(|set| {
-        let mut all = layers.textures().filter(|used| used.uv_set == set).map(|used| (used.transform, textures[used.texture].wrap));
+        let of_set = material.layer_textures().map(|(_, used)| used).filter(|used| used.uv_set == set);
+        let mut all = of_set.map(|used| (used.transform, textures[used.texture].wrap));
         let first = all.next()?;
         all.all(|other| other == first).then(|| Turns::new(first.0, first.1)).flatten()
     })

@@ -126,6 +126,7 @@ pub fn load(path: &Path, reading: Reading, progress: Progress) -> Result<Scene> 
         buffers.push(json!({"byteLength": unpacked.len()}));
     }
     let transforms = transforms::of_nodes(&json);
+    let material_values = json["materials"].as_array().cloned().unwrap_or_default();
     let mut root = malformed::root(json).map_err(refuse)?;
     // Before anything else: what a file needs an extension for may look missing without it.
     let is_unread = |name: &&str| !READ_EXTENSIONS.contains(name) && !OPTIONAL_EXTENSIONS.contains(name);
@@ -155,6 +156,7 @@ pub fn load(path: &Path, reading: Reading, progress: Progress) -> Result<Scene> 
         triangle_count: 0,
         wanted_textures: Vec::new(),
         texture_places: HashMap::new(),
+        material_values,
         materials: HashMap::new(),
         material_places: HashMap::new(),
         is_quantized: document.extensions_used().any(|extension| extension == "KHR_mesh_quantization"),
@@ -249,6 +251,8 @@ pub(super) struct Loader {
     /// The scene's textures, in order.
     wanted_textures: Vec<Wanted>,
     texture_places: HashMap<Wanted, usize>,
+    /// All materials as the file has them.
+    material_values: Vec<Value>,
     /// Materials that meshes use, by their number in the file; `None`: that of primitives that name none.
     materials: HashMap<Option<usize>, Material>,
     /// Their places in the scene, by what they are without: normal map, that of the coat, anisotropy.

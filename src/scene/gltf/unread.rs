@@ -11,23 +11,11 @@ use serde::de::value::Error as Fault;
 use serde_json::{Value, json};
 
 use super::{LeftOut, READ_EXTENSIONS, VISIBILITY, called, image_light, named};
+use crate::scene::layers::PARAMETERS;
 use crate::text::echo;
 
 const LIGHTS: &str = "/extensions/KHR_lights_punctual";
 const SPEC_GLOSS: &str = "KHR_materials_pbrSpecularGlossiness";
-/// Each of these says that it must not stand beside [`SPEC_GLOSS`].
-const NOT_BESIDE_SPEC_GLOSS: [&str; 10] = [
-    "KHR_materials_anisotropy",
-    "KHR_materials_clearcoat",
-    "KHR_materials_diffuse_transmission",
-    "KHR_materials_dispersion",
-    "KHR_materials_ior",
-    "KHR_materials_iridescence",
-    "KHR_materials_sheen",
-    "KHR_materials_specular",
-    "KHR_materials_transmission",
-    "KHR_materials_volume",
-];
 
 /// Lists keep their length, as their members are named by numbers. Gives the numbers of the scene's nodes that are not hidden.
 pub(super) fn take_out(root: &mut Value, is_posed: bool, left_out: &mut LeftOut) -> BTreeSet<usize> {
@@ -261,7 +249,8 @@ fn take_out_of_material(material: &mut Value, owner: &str, left_out: &mut LeftOu
     let Some(extensions) = material.get_mut("extensions").and_then(Value::as_object_mut) else { return };
     extensions.retain(|name, _| is_read(name));
     if extensions.contains_key(SPEC_GLOSS) && !extensions.contains_key("KHR_materials_unlit") {
-        for name in NOT_BESIDE_SPEC_GLOSS {
+        // Each says that it must not stand beside the other.
+        for name in PARAMETERS.iter().map(|(group, _)| *group).chain(["KHR_materials_volume"]) {
             if extensions.remove(name).is_some() {
                 left_out.add(format!("the extension {name} beside {SPEC_GLOSS}, where glTF forbids it"), owner);
             }
