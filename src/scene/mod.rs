@@ -11,6 +11,7 @@ pub mod contact_offsets;
 pub mod daylight;
 pub mod file;
 pub mod film;
+pub mod frame;
 pub mod geometry;
 pub mod gltf;
 pub mod layers;

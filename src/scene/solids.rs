@@ -4,7 +4,8 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use glam::DVec3;
 
-use super::Scene;
+use super::layers::Medium;
+use super::{Material, Scene};
 
 /// Triangles that are connected by their corners' places, of one material.
 struct Shell {
@@ -211,12 +212,14 @@ pub enum Order {
     Unclear(u32),
 }
 
+/// What makes solids' media different: index of refraction, its spread over colours, and what is absorbed.
+pub fn medium(material: &Material) -> Option<(f32, f32, Medium)> {
+    material.enclosed_medium().map(|medium| (material.layers.ior, material.layers.ior_spread(), medium))
+}
+
 /// As far as places just inside of their shells tell.
 pub fn order(scene: &Scene) -> Order {
-    let medium = |material: usize| {
-        let of = &scene.materials[material];
-        of.enclosed_medium().map(|medium| (of.layers.ior, of.layers.ior_spread(), medium))
-    };
+    let medium = |material: usize| medium(&scene.materials[material]);
     let mut media = scene.meshes.iter().filter_map(|mesh| medium(mesh.material));
     let Some(first) = media.next() else { return Order::Entry };
     if media.all(|other| other == first) {
