@@ -243,7 +243,7 @@ impl<'a> Packed<'a> {
                     None => {
                         let mut accessor = like;
                         accessor["count"] = json!(points);
-                        accessor["componentType"] = json!(attribute.component_type);
+                        accessor["componentType"] = json!(attribute.kind.as_gl_enum());
                         for member in ["byteOffset", "sparse"] {
                             accessor.as_object_mut().expect("it has a type").remove(member);
                         }

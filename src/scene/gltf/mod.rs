@@ -14,13 +14,14 @@ mod ktx2;
 mod lights;
 mod malformed;
 mod materials;
-mod meshes;
+pub mod meshes;
 pub mod source;
 mod tangents;
 mod textures;
 mod transforms;
 mod unread;
 mod uri;
+pub mod writer;
 
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, HashMap};

@@ -4,18 +4,20 @@ use std::path::{Path, PathBuf};
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
+use gltf::accessor::{DataType, Dimensions};
+use gltf::json::validation::Checked;
+use serde::Deserialize;
 use serde_json::{Value, json};
 
+use super::accessor::{integer, kind_of, largest, stored};
 use super::compressed::{self, Target};
-use super::{malformed, one_line, read_file, uri};
+use super::malformed::{self, Chunk};
+use super::{one_line, read_file, uri};
 use crate::error::{Error, Result};
 
 /// The chunk of a `.glb` file that is its first buffer.
 const BINARY_CHUNK: [u8; 4] = *b"BIN\0";
 const JSON_CHUNK: [u8; 4] = *b"JSON";
-
-/// Kind and content.
-pub type Chunk = ([u8; 4], Vec<u8>);
 
 /// A file as it was written.
 pub struct File {
@@ -41,7 +43,7 @@ pub struct Elements {
     /// Numbers in one element.
     pub components: usize,
     pub count: usize,
-    pub component_type: u64,
+    pub kind: DataType,
 }
 
 /// A file that another names.
@@ -56,11 +58,10 @@ impl File {
         let refuse = |reason: String| Error::Scene { path: path.to_owned(), object: "the file".into(), reason: one_line(&reason) };
         let content = read_file(path).map_err(refuse)?;
         let is_binary = content.starts_with(b"glTF");
-        let mut chunks = if is_binary { chunks(&content).map_err(refuse)? } else { vec![(JSON_CHUNK, content)] }.into_iter();
-        let text = chunks.next().filter(|(kind, _)| *kind == JSON_CHUNK).ok_or_else(|| refuse("has no JSON".into()))?.1;
+        let parts = malformed::parts(&content).map_err(refuse)?;
+        let other_chunks = if is_binary { malformed::other_chunks(&content, &parts).map_err(refuse)? } else { Vec::new() };
+        let malformed::Parts { json: text, mut binary } = parts;
         let mut json = malformed::json(&text).map_err(refuse)?;
-        let mut other_chunks: Vec<_> = chunks.collect();
-        let mut binary = other_chunks.iter().position(|(kind, _)| *kind == BINARY_CHUNK).map(|place| other_chunks.remove(place).1);
         let is_unpacked = unpack(path, &mut json, &mut binary)?;
         let mut buffers = Vec::new();
         for (index, buffer) in json["buffers"].as_array().into_iter().flatten().enumerate() {
@@ -95,21 +96,20 @@ impl File {
         let json = &self.json["accessors"][accessor];
         let refuse = |reason: &str| self.refuse(what, format!("has the accessor {accessor}, which {reason}"));
         let number = |value: &Value| value.as_u64().and_then(|number| usize::try_from(number).ok());
-        let component_type = json["componentType"].as_u64().unwrap_or_default();
-        let number_bytes = number_bytes(component_type).ok_or_else(|| refuse("has no numbers that glTF knows"))?;
-        let (columns, rows) = match json["type"].as_str() {
-            Some("SCALAR") => (1, 1),
-            Some("VEC2") => (1, 2),
-            Some("VEC3") => (1, 3),
-            Some("VEC4") => (1, 4),
-            Some("MAT2") => (2, 2),
-            Some("MAT3") => (3, 3),
-            Some("MAT4") => (4, 4),
-            _ => return Err(refuse("has a type that glTF does not know")),
+        let kind = kind_of(&json["componentType"]).ok_or_else(|| refuse("has no numbers that glTF knows"))?;
+        let Ok(Checked::Valid(dimensions)) = Checked::<Dimensions>::deserialize(&json["type"]) else {
+            return Err(refuse("has a type that glTF does not know"));
+        };
+        let components = dimensions.multiplicity();
+        let columns = match dimensions {
+            Dimensions::Mat2 => 2,
+            Dimensions::Mat3 => 3,
+            Dimensions::Mat4 => 4,
+            _ => 1,
         };
         // Columns of matrices begin at multiples of four bytes.
-        let column_bytes = if columns > 1 { (rows * number_bytes).next_multiple_of(4) } else { rows * number_bytes };
-        let size = columns * column_bytes;
+        let column_bytes = components / columns * kind.size();
+        let size = if columns > 1 { columns * column_bytes.next_multiple_of(4) } else { column_bytes };
         let count = number(&json["count"]).ok_or_else(|| refuse("says no count"))?;
         let mut bytes = match json.get("bufferView") {
             Some(view) => self.slice(view, number(&json["byteOffset"]).unwrap_or(0), count, size).map_err(|reason| refuse(&reason))?,
@@ -117,19 +117,19 @@ impl File {
         };
         if let Some(sparse) = json.get("sparse") {
             let replaced = number(&sparse["count"]).ok_or_else(|| refuse("is sparse and says no count"))?;
-            let index_bytes =
-                number_bytes_of(&sparse["indices"]["componentType"]).ok_or_else(|| refuse("has sparse indices of no type"))?;
+            let index_kind = kind_of(&sparse["indices"]["componentType"]).ok_or_else(|| refuse("has sparse indices of no type"))?;
+            let index_bytes = index_kind.size();
             let part = |name: &str, size: usize| {
                 let offset = number(&sparse[name]["byteOffset"]).unwrap_or(0);
                 self.slice(&sparse[name]["bufferView"], offset, replaced, size).map_err(|reason| refuse(&reason))
             };
             let (indices, values) = (part("indices", index_bytes)?, part("values", size)?);
             for (index, value) in indices.chunks_exact(index_bytes).zip(values.chunks_exact(size)) {
-                let place = size * unsigned(index) as usize;
+                let place = size * integer(index) as usize;
                 bytes.get_mut(place..place + size).ok_or_else(|| refuse("replaces an element that is not there"))?.copy_from_slice(value);
             }
         }
-        Ok(Elements { bytes, size, components: columns * rows, count, component_type })
+        Ok(Elements { bytes, size, components, count, kind })
     }
 
     /// `count` elements of `size` bytes from `offset` in a buffer view, one after another.
@@ -157,42 +157,13 @@ impl Elements {
     /// A number of an element as it is stored; matrices have gaps and are not asked for.
     pub fn number(&self, element: usize, component: usize) -> f64 {
         let width = self.size / self.components;
-        let bytes = &self.bytes[element * self.size + component * width..][..width];
-        match self.component_type {
-            5120 => f64::from(bytes[0] as i8),
-            5122 => f64::from(unsigned(bytes) as u16 as i16),
-            5126 => f64::from(f32::from_bits(unsigned(bytes))),
-            _ => f64::from(unsigned(bytes)),
-        }
+        stored(&self.bytes[element * self.size + component * width..][..width], self.kind)
     }
 
     /// What whole numbers are divided by where they stand for shares.
     pub fn largest(&self) -> f64 {
-        match self.component_type {
-            5120 => 127.0,
-            5121 => 255.0,
-            5122 => 32_767.0,
-            5123 => 65_535.0,
-            _ => 1.0,
-        }
+        largest(self.kind)
     }
-}
-
-fn number_bytes(component_type: u64) -> Option<usize> {
-    match component_type {
-        5120 | 5121 => Some(1),
-        5122 | 5123 => Some(2),
-        5125 | 5126 => Some(4),
-        _ => None,
-    }
-}
-
-fn number_bytes_of(component_type: &Value) -> Option<usize> {
-    component_type.as_u64().and_then(number_bytes)
-}
-
-fn unsigned(bytes: &[u8]) -> u32 {
-    bytes.iter().rev().fold(0, |value, byte| value << 8 | u32::from(*byte))
 }
 
 /// Unpacks what is compressed, behind what a free binary part has, else into one more buffer; whether something was.
@@ -219,21 +190,6 @@ fn unpack(path: &Path, json: &mut Value, binary: &mut Option<Vec<u8>>) -> Result
         }
     }
     Ok(true)
-}
-
-/// The chunks of a `.glb` file.
-fn chunks(content: &[u8]) -> std::result::Result<Vec<Chunk>, String> {
-    // Its head.
-    malformed::parts(content)?;
-    let mut rest = content.get(12..).unwrap_or_default();
-    let mut chunks = Vec::new();
-    while let Some((head, after)) = rest.split_at_checked(8) {
-        let length = unsigned(&head[..4]) as usize;
-        let (chunk, after) = after.split_at_checked(length).ok_or("has a chunk that runs past its end")?;
-        chunks.push(([head[4], head[5], head[6], head[7]], chunk.to_vec()));
-        rest = after;
-    }
-    Ok(chunks)
 }
 
 /// A `.glb` file of these parts; each is filled up to a multiple of four bytes.
