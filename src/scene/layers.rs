@@ -61,134 +61,6 @@ impl Medium {
     pub const CLEAR: Medium = Medium { transmittance: Vec3::ONE, metres: 1.0 };
 }
 
-/// glTF's metallic-roughness model and what its extensions add. Factors multiply textures; the guide's page
-/// [materials](crate::guide::materials) has the formulas.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Layers {
-    pub metallic: f32,
-    pub roughness: f32,
-    /// Roughness in green, metalness in blue.
-    pub metallic_roughness_texture: Option<TextureUse>,
-    /// How much rougher the base is along one direction than across it, 0 to 1; the texture has it in blue.
-    pub anisotropy: f32,
-    /// Radians that turn the direction counter-clockwise from the tangent; the texture has a direction in red and green, from -1 to 1.
-    pub anisotropy_rotation: f32,
-    pub anisotropy_texture: Option<TextureUse>,
-    /// Of the dielectric; 0: it reflects as if the index were infinite.
-    pub ior: f32,
-    /// Scales what the dielectric reflects; the texture has it in alpha.
-    pub specular: f32,
-    pub specular_texture: Option<TextureUse>,
-    /// Tints what the dielectric reflects along the normal.
-    pub specular_colour: Vec3,
-    pub specular_colour_texture: Option<TextureUse>,
-    /// Share of what enters the dielectric that it lets through; the texture has it in red.
-    pub transmission: f32,
-    pub transmission_texture: Option<TextureUse>,
-    /// Share of the diffuse lobe that scatters to the other side; the texture has it in alpha.
-    pub diffuse_transmission: f32,
-    pub diffuse_transmission_texture: Option<TextureUse>,
-    pub diffuse_transmission_colour: Vec3,
-    pub diffuse_transmission_colour_texture: Option<TextureUse>,
-    /// `None`: a thin wall.
-    pub medium: Option<Medium>,
-    /// 20 over the Abbe number of what it encloses; 0: all colours have the same index.
-    pub dispersion: f32,
-    /// Share of the surface under a thin film; the texture has it in red.
-    pub iridescence: f32,
-    pub iridescence_texture: Option<TextureUse>,
-    pub film_ior: f32,
-    /// Nanometres, where the texture is 0 and where it is 1, or missing; it has them in green.
-    pub film_thickness: [f32; 2],
-    pub film_thickness_texture: Option<TextureUse>,
-    /// Share of the surface under a clear coat; the texture has it in red.
-    pub coat: f32,
-    pub coat_texture: Option<TextureUse>,
-    pub coat_roughness: f32,
-    /// In green.
-    pub coat_roughness_texture: Option<TextureUse>,
-    /// The coat's own; without one it has the normals of the mesh.
-    pub coat_normal_map: Option<NormalMap>,
-    pub sheen_colour: Vec3,
-    pub sheen_colour_texture: Option<TextureUse>,
-    pub sheen_roughness: f32,
-    /// In alpha.
-    pub sheen_roughness_texture: Option<TextureUse>,
-    /// The base colour is shown to the eye as radiance, W/m2/sr; no lobe is left.
-    pub is_unlit: bool,
-}
-
-impl Layers {
-    /// Half of what lies between its indices of refraction for red and for blue (KHR_materials_dispersion).
-    pub fn ior_spread(&self) -> f32 {
-        // Of more than the range of indices nothing is left to see.
-        (0.5 * (self.ior - 1.0).max(0.0) * (self.dispersion / 20.0)).min(100.0)
-    }
-
-    /// The factors alone.
-    pub fn without_textures(mut self) -> Layers {
-        for (_, parameter) in PARAMETERS.iter().flat_map(|(_, members)| *members) {
-            match parameter {
-                Parameter::NumberTexture(_, of) | Parameter::ColourTexture(_, of) => *of(&mut self) = None,
-                Parameter::NormalMap(_, of) => *of(&mut self) = None,
-                Parameter::Number(..) | Parameter::Colour(..) => {}
-            }
-        }
-        self
-    }
-
-    /// Every use of a texture, with the number that kernels know it by, in the order of [`PARAMETERS`].
-    pub fn textures(mut self) -> impl Iterator<Item = (u32, TextureUse)> {
-        PARAMETERS.iter().flat_map(|(_, members)| *members).filter_map(move |(_, parameter)| match parameter {
-            Parameter::NumberTexture(layer, of) | Parameter::ColourTexture(layer, of) => Some((*layer, (*of(&mut self))?)),
-            Parameter::NormalMap(layer, of) => Some((*layer, (*of(&mut self))?.texture)),
-            Parameter::Number(..) | Parameter::Colour(..) => None,
-        })
-    }
-}
-
-impl Default for Layers {
-    /// What a glTF material is that says nothing.
-    fn default() -> Layers {
-        Layers {
-            metallic: 1.0,
-            roughness: 1.0,
-            metallic_roughness_texture: None,
-            anisotropy: 0.0,
-            anisotropy_rotation: 0.0,
-            anisotropy_texture: None,
-            ior: 1.5,
-            specular: 1.0,
-            specular_texture: None,
-            specular_colour: Vec3::ONE,
-            specular_colour_texture: None,
-            transmission: 0.0,
-            transmission_texture: None,
-            diffuse_transmission: 0.0,
-            diffuse_transmission_texture: None,
-            diffuse_transmission_colour: Vec3::ONE,
-            diffuse_transmission_colour_texture: None,
-            medium: None,
-            dispersion: 0.0,
-            iridescence: 0.0,
-            iridescence_texture: None,
-            film_ior: 1.3,
-            film_thickness: [100.0, 400.0],
-            film_thickness_texture: None,
-            coat: 0.0,
-            coat_texture: None,
-            coat_roughness: 0.0,
-            coat_roughness_texture: None,
-            coat_normal_map: None,
-            sheen_colour: Vec3::ZERO,
-            sheen_colour_texture: None,
-            sheen_roughness: 0.0,
-            sheen_roughness_texture: None,
-            is_unlit: false,
-        }
-    }
-}
-
 /// What a number of a file may be.
 #[derive(Debug, Clone, Copy)]
 pub enum Range {
@@ -220,90 +92,141 @@ pub enum Parameter {
 /// The object that every glTF material has.
 pub const METALLIC_ROUGHNESS: &str = "pbrMetallicRoughness";
 
-/// Members of glTF's materials, by the extension that has them. Files are read and written by it; what is missing has the value of
-/// [`Layers::default`]. Textures of the scene are numbered in this order.
-pub const PARAMETERS: &[(&str, &[(&str, Parameter)])] = {
-    use Parameter::*;
-    use Range::*;
-    &[
-        (
-            METALLIC_ROUGHNESS,
-            &[
-                ("metallicFactor", Number("the metallic factor", UpTo(1.0), |of| &mut of.metallic)),
-                ("roughnessFactor", Number("the roughness factor", UpTo(1.0), |of| &mut of.roughness)),
-                ("metallicRoughnessTexture", NumberTexture(LAYER_METALLIC_ROUGHNESS, |of| &mut of.metallic_roughness_texture)),
-            ],
-        ),
-        ("KHR_materials_ior", &[("ior", Number("the index of refraction", IndexOrZero, |of| &mut of.ior))]),
-        (
-            "KHR_materials_anisotropy",
-            &[
-                ("anisotropyStrength", Number("the anisotropy strength", UpTo(1.0), |of| &mut of.anisotropy)),
-                ("anisotropyRotation", Number("the anisotropy rotation", Angle, |of| &mut of.anisotropy_rotation)),
-                ("anisotropyTexture", NumberTexture(LAYER_ANISOTROPY, |of| &mut of.anisotropy_texture)),
-            ],
-        ),
-        (
-            "KHR_materials_specular",
-            &[
-                ("specularFactor", Number("the specular factor", UpTo(1.0), |of| &mut of.specular)),
-                ("specularTexture", NumberTexture(LAYER_SPECULAR, |of| &mut of.specular_texture)),
-                ("specularColorFactor", Colour("the specular colour", ANY, |of| &mut of.specular_colour)),
-                ("specularColorTexture", ColourTexture(LAYER_SPECULAR_COLOUR, |of| &mut of.specular_colour_texture)),
-            ],
-        ),
-        (
-            "KHR_materials_transmission",
-            &[
-                ("transmissionFactor", Number("the transmission factor", UpTo(1.0), |of| &mut of.transmission)),
-                ("transmissionTexture", NumberTexture(LAYER_TRANSMISSION, |of| &mut of.transmission_texture)),
-            ],
-        ),
-        (
-            "KHR_materials_diffuse_transmission",
-            &[
-                ("diffuseTransmissionFactor", Number("the diffuse transmission factor", UpTo(1.0), |of| &mut of.diffuse_transmission)),
-                ("diffuseTransmissionTexture", NumberTexture(LAYER_DIFFUSE_TRANSMISSION, |of| &mut of.diffuse_transmission_texture)),
-                (
-                    "diffuseTransmissionColorFactor",
-                    Colour("the diffuse transmission colour", 1.0, |of| &mut of.diffuse_transmission_colour),
-                ),
-                (
-                    "diffuseTransmissionColorTexture",
-                    ColourTexture(LAYER_DIFFUSE_TRANSMISSION_COLOUR, |of| &mut of.diffuse_transmission_colour_texture),
-                ),
-            ],
-        ),
-        ("KHR_materials_dispersion", &[("dispersion", Number("the dispersion", UpTo(ANY), |of| &mut of.dispersion))]),
-        (
-            "KHR_materials_iridescence",
-            &[
-                ("iridescenceFactor", Number("the iridescence factor", UpTo(1.0), |of| &mut of.iridescence)),
-                ("iridescenceTexture", NumberTexture(LAYER_IRIDESCENCE, |of| &mut of.iridescence_texture)),
-                ("iridescenceIor", Number("a film of the index of refraction", Index, |of| &mut of.film_ior)),
-                ("iridescenceThicknessMinimum", Number("the thickness of its film", UpTo(ANY), |of| &mut of.film_thickness[0])),
-                ("iridescenceThicknessMaximum", Number("the thickness of its film", UpTo(ANY), |of| &mut of.film_thickness[1])),
-                ("iridescenceThicknessTexture", NumberTexture(LAYER_IRIDESCENCE_THICKNESS, |of| &mut of.film_thickness_texture)),
-            ],
-        ),
-        (
-            "KHR_materials_clearcoat",
-            &[
-                ("clearcoatFactor", Number("the clear coat factor", UpTo(1.0), |of| &mut of.coat)),
-                ("clearcoatTexture", NumberTexture(LAYER_COAT, |of| &mut of.coat_texture)),
-                ("clearcoatRoughnessFactor", Number("the clear coat roughness", UpTo(1.0), |of| &mut of.coat_roughness)),
-                ("clearcoatRoughnessTexture", NumberTexture(LAYER_COAT_ROUGHNESS, |of| &mut of.coat_roughness_texture)),
-                ("clearcoatNormalTexture", NormalMap(LAYER_COAT_NORMAL, |of| &mut of.coat_normal_map)),
-            ],
-        ),
-        (
-            "KHR_materials_sheen",
-            &[
-                ("sheenColorFactor", Colour("the sheen colour", 1.0, |of| &mut of.sheen_colour)),
-                ("sheenColorTexture", ColourTexture(LAYER_SHEEN_COLOUR, |of| &mut of.sheen_colour_texture)),
-                ("sheenRoughnessFactor", Number("the sheen roughness", UpTo(1.0), |of| &mut of.sheen_roughness)),
-                ("sheenRoughnessTexture", NumberTexture(LAYER_SHEEN_ROUGHNESS, |of| &mut of.sheen_roughness_texture)),
-            ],
-        ),
-    ]
-};
+/// Declares [`Layers`] and [`PARAMETERS`]: by the extension that has them fields with their defaults, and members of the file with the kind of
+/// parameter that each is.
+macro_rules! layers {
+    ($($group:literal { $(
+        $(#[$doc:meta])* $field:ident: $type:ty = $default:expr $(, $member:literal $kind:ident($($argument:expr),*) $([$index:literal])?)*;
+    )* })*) => {
+        /// glTF's metallic-roughness model and what its extensions add. Factors multiply textures; the guide's page
+        /// [materials](crate::guide::materials) has the formulas.
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub struct Layers {
+            $($($(#[$doc])* pub $field: $type,)*)*
+        }
+
+        impl Default for Layers {
+            /// What a glTF material is that says nothing.
+            fn default() -> Layers {
+                Layers { $($($field: $default,)*)* }
+            }
+        }
+
+        /// Members of glTF's materials, by the extension that has them. Files are read and written by it; what is missing has the value of
+        /// [`Layers::default`]. Textures of the scene are numbered in this order.
+        pub const PARAMETERS: &[(&str, &[(&str, Parameter)])] = {
+            use Range::*;
+            &[$(($group, &[$($(($member, Parameter::$kind($($argument,)* |of| &mut of.$field$([$index])?)),)*)*])),*]
+        };
+    };
+}
+
+layers! {
+    "pbrMetallicRoughness" {
+        metallic: f32 = 1.0, "metallicFactor" Number("the metallic factor", UpTo(1.0));
+        roughness: f32 = 1.0, "roughnessFactor" Number("the roughness factor", UpTo(1.0));
+        /// Roughness in green, metalness in blue.
+        metallic_roughness_texture: Option<TextureUse> = None, "metallicRoughnessTexture" NumberTexture(LAYER_METALLIC_ROUGHNESS);
+    }
+    "KHR_materials_ior" {
+        /// Of the dielectric; 0: it reflects as if the index were infinite.
+        ior: f32 = 1.5, "ior" Number("the index of refraction", IndexOrZero);
+    }
+    "KHR_materials_anisotropy" {
+        /// How much rougher the base is along one direction than across it, 0 to 1; the texture has it in blue.
+        anisotropy: f32 = 0.0, "anisotropyStrength" Number("the anisotropy strength", UpTo(1.0));
+        /// Radians that turn the direction counter-clockwise from the tangent; the texture has a direction in red and green, from -1 to 1.
+        anisotropy_rotation: f32 = 0.0, "anisotropyRotation" Number("the anisotropy rotation", Angle);
+        anisotropy_texture: Option<TextureUse> = None, "anisotropyTexture" NumberTexture(LAYER_ANISOTROPY);
+    }
+    "KHR_materials_specular" {
+        /// Scales what the dielectric reflects; the texture has it in alpha.
+        specular: f32 = 1.0, "specularFactor" Number("the specular factor", UpTo(1.0));
+        specular_texture: Option<TextureUse> = None, "specularTexture" NumberTexture(LAYER_SPECULAR);
+        /// Tints what the dielectric reflects along the normal.
+        specular_colour: Vec3 = Vec3::ONE, "specularColorFactor" Colour("the specular colour", ANY);
+        specular_colour_texture: Option<TextureUse> = None, "specularColorTexture" ColourTexture(LAYER_SPECULAR_COLOUR);
+    }
+    "KHR_materials_transmission" {
+        /// Share of what enters the dielectric that it lets through; the texture has it in red.
+        transmission: f32 = 0.0, "transmissionFactor" Number("the transmission factor", UpTo(1.0));
+        transmission_texture: Option<TextureUse> = None, "transmissionTexture" NumberTexture(LAYER_TRANSMISSION);
+    }
+    "KHR_materials_diffuse_transmission" {
+        /// Share of the diffuse lobe that scatters to the other side; the texture has it in alpha.
+        diffuse_transmission: f32 = 0.0, "diffuseTransmissionFactor" Number("the diffuse transmission factor", UpTo(1.0));
+        diffuse_transmission_texture: Option<TextureUse> = None, "diffuseTransmissionTexture" NumberTexture(LAYER_DIFFUSE_TRANSMISSION);
+        diffuse_transmission_colour: Vec3 = Vec3::ONE, "diffuseTransmissionColorFactor" Colour("the diffuse transmission colour", 1.0);
+        diffuse_transmission_colour_texture: Option<TextureUse> = None,
+            "diffuseTransmissionColorTexture" ColourTexture(LAYER_DIFFUSE_TRANSMISSION_COLOUR);
+    }
+    "KHR_materials_volume" {
+        /// `None`: a thin wall.
+        medium: Option<Medium> = None;
+    }
+    "KHR_materials_dispersion" {
+        /// 20 over the Abbe number of what it encloses; 0: all colours have the same index.
+        dispersion: f32 = 0.0, "dispersion" Number("the dispersion", UpTo(ANY));
+    }
+    "KHR_materials_iridescence" {
+        /// Share of the surface under a thin film; the texture has it in red.
+        iridescence: f32 = 0.0, "iridescenceFactor" Number("the iridescence factor", UpTo(1.0));
+        iridescence_texture: Option<TextureUse> = None, "iridescenceTexture" NumberTexture(LAYER_IRIDESCENCE);
+        film_ior: f32 = 1.3, "iridescenceIor" Number("a film of the index of refraction", Index);
+        /// Nanometres, where the texture is 0 and where it is 1, or missing; it has them in green.
+        film_thickness: [f32; 2] = [100.0, 400.0],
+            "iridescenceThicknessMinimum" Number("the thickness of its film", UpTo(ANY)) [0],
+            "iridescenceThicknessMaximum" Number("the thickness of its film", UpTo(ANY)) [1];
+        film_thickness_texture: Option<TextureUse> = None, "iridescenceThicknessTexture" NumberTexture(LAYER_IRIDESCENCE_THICKNESS);
+    }
+    "KHR_materials_clearcoat" {
+        /// Share of the surface under a clear coat; the texture has it in red.
+        coat: f32 = 0.0, "clearcoatFactor" Number("the clear coat factor", UpTo(1.0));
+        coat_texture: Option<TextureUse> = None, "clearcoatTexture" NumberTexture(LAYER_COAT);
+        coat_roughness: f32 = 0.0, "clearcoatRoughnessFactor" Number("the clear coat roughness", UpTo(1.0));
+        /// In green.
+        coat_roughness_texture: Option<TextureUse> = None, "clearcoatRoughnessTexture" NumberTexture(LAYER_COAT_ROUGHNESS);
+        /// The coat's own; without one it has the normals of the mesh.
+        coat_normal_map: Option<NormalMap> = None, "clearcoatNormalTexture" NormalMap(LAYER_COAT_NORMAL);
+    }
+    "KHR_materials_sheen" {
+        sheen_colour: Vec3 = Vec3::ZERO, "sheenColorFactor" Colour("the sheen colour", 1.0);
+        sheen_colour_texture: Option<TextureUse> = None, "sheenColorTexture" ColourTexture(LAYER_SHEEN_COLOUR);
+        sheen_roughness: f32 = 0.0, "sheenRoughnessFactor" Number("the sheen roughness", UpTo(1.0));
+        /// In alpha.
+        sheen_roughness_texture: Option<TextureUse> = None, "sheenRoughnessTexture" NumberTexture(LAYER_SHEEN_ROUGHNESS);
+    }
+    "KHR_materials_unlit" {
+        /// The base colour is shown to the eye as radiance, W/m2/sr; no lobe is left.
+        is_unlit: bool = false;
+    }
+}
+
+impl Layers {
+    /// Half of what lies between its indices of refraction for red and for blue (KHR_materials_dispersion).
+    pub fn ior_spread(&self) -> f32 {
+        // Of more than the range of indices nothing is left to see.
+        (0.5 * (self.ior - 1.0).max(0.0) * (self.dispersion / 20.0)).min(100.0)
+    }
+
+    /// The factors alone.
+    pub fn without_textures(mut self) -> Layers {
+        for (_, parameter) in PARAMETERS.iter().flat_map(|(_, members)| *members) {
+            match parameter {
+                Parameter::NumberTexture(_, of) | Parameter::ColourTexture(_, of) => *of(&mut self) = None,
+                Parameter::NormalMap(_, of) => *of(&mut self) = None,
+                Parameter::Number(..) | Parameter::Colour(..) => {}
+            }
+        }
+        self
+    }
+
+    /// Every use of a texture, with the number that kernels know it by, in the order of [`PARAMETERS`].
+    pub fn textures(mut self) -> impl Iterator<Item = (u32, TextureUse)> {
+        PARAMETERS.iter().flat_map(|(_, members)| *members).filter_map(move |(_, parameter)| match parameter {
+            Parameter::NumberTexture(layer, of) | Parameter::ColourTexture(layer, of) => Some((*layer, (*of(&mut self))?)),
+            Parameter::NormalMap(layer, of) => Some((*layer, (*of(&mut self))?.texture)),
+            Parameter::Number(..) | Parameter::Colour(..) => None,
+        })
+    }
+}

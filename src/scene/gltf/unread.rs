@@ -250,8 +250,8 @@ fn take_out_of_material(material: &mut Value, owner: &str, left_out: &mut LeftOu
     extensions.retain(|name, _| is_read(name));
     if extensions.contains_key(SPEC_GLOSS) && !extensions.contains_key("KHR_materials_unlit") {
         // Each says that it must not stand beside the other.
-        for name in PARAMETERS.iter().map(|(group, _)| *group).chain(["KHR_materials_volume"]) {
-            if extensions.remove(name).is_some() {
+        for name in PARAMETERS.iter().map(|(group, _)| group) {
+            if extensions.remove(*name).is_some() {
                 left_out.add(format!("the extension {name} beside {SPEC_GLOSS}, where glTF forbids it"), owner);
             }
         }
