@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use glam::{DVec3, Vec3};
 
+use super::connected::bits;
 use super::contact::{self, Contact, Kind};
 use super::frame::{Frame, has_area};
 use super::overlap::{self, Sheet};
@@ -105,11 +106,6 @@ pub fn apply(scene: &mut Scene) {
     for ((mesh, vertex), way) in Offsets::of(scene, &contact::kinds(scene)).0 {
         scene.meshes[mesh as usize].positions[vertex as usize] += way;
     }
-}
-
-/// The sum turns -0 into 0.
-fn bits(position: DVec3) -> [u64; 3] {
-    (position + DVec3::ZERO).to_array().map(f64::to_bits)
 }
 
 /// Whether two triangles have the same corners and face the same way.

@@ -35,6 +35,7 @@ use serde_json::{Value, json};
 
 use super::file::read as read_file;
 use super::geometry::PLACE_ERROR;
+use super::layers::PARAMETERS;
 use super::light::LUMENS_PER_WATT;
 use super::{Material, Mesh, Progress, Reading, Scene, solids};
 use crate::error::{Error, Result};
@@ -48,26 +49,16 @@ use transforms::Transform;
 
 /// Hides nodes and all below them.
 const VISIBILITY: &str = "KHR_node_visibility";
-const READ_EXTENSIONS: [&str; 24] = [
+/// Beside those of materials that [`PARAMETERS`] lists.
+const READ_EXTENSIONS: [&str; 13] = [
     "EXT_lights_image_based",
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",
     "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
-    "KHR_materials_anisotropy",
-    "KHR_materials_clearcoat",
-    "KHR_materials_diffuse_transmission",
-    "KHR_materials_dispersion",
     "KHR_materials_emissive_strength",
-    "KHR_materials_ior",
-    "KHR_materials_iridescence",
     "KHR_materials_pbrSpecularGlossiness",
-    "KHR_materials_sheen",
-    "KHR_materials_specular",
-    "KHR_materials_transmission",
-    "KHR_materials_unlit",
-    "KHR_materials_volume",
     "KHR_mesh_quantization",
     "KHR_meshopt_compression",
     VISIBILITY,
@@ -130,7 +121,7 @@ pub fn load(path: &Path, reading: Reading, progress: Progress) -> Result<Scene> 
     let material_values = json["materials"].as_array().cloned().unwrap_or_default();
     let mut root = malformed::root(json).map_err(refuse)?;
     // Before anything else: what a file needs an extension for may look missing without it.
-    let is_unread = |name: &&str| !READ_EXTENSIONS.contains(name) && !OPTIONAL_EXTENSIONS.contains(name);
+    let is_unread = |name: &&str| !is_read(name) && !OPTIONAL_EXTENSIONS.contains(name);
     let unread: Vec<&str> = root.extensions_required.iter().map(String::as_str).filter(is_unread).collect();
     if !unread.is_empty() {
         let remedies: BTreeSet<&str> = unread.iter().map(|name| remedy(name)).collect();
@@ -174,10 +165,14 @@ pub fn load(path: &Path, reading: Reading, progress: Progress) -> Result<Scene> 
     if let Some(light) = image_light {
         loader.read_image_light(&document, light)?;
     }
-    for extension in document.extensions_used().filter(|extension| !READ_EXTENSIONS.contains(extension)) {
+    for extension in document.extensions_used().filter(|extension| !is_read(extension)) {
         loader.leave_out(format!("the extension {extension}"), "");
     }
     loader.finish()
+}
+
+fn is_read(extension: &str) -> bool {
+    READ_EXTENSIONS.contains(&extension) || PARAMETERS.iter().any(|(name, _)| *name == extension)
 }
 
 /// How to write a file that does without an extension.

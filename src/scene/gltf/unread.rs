@@ -10,7 +10,7 @@ use serde::de::IntoDeserializer;
 use serde::de::value::Error as Fault;
 use serde_json::{Value, json};
 
-use super::{LeftOut, READ_EXTENSIONS, VISIBILITY, called, image_light, named};
+use super::{LeftOut, VISIBILITY, called, image_light, is_read, named};
 use crate::scene::layers::PARAMETERS;
 use crate::text::echo;
 
@@ -264,10 +264,6 @@ fn name_unread_extensions(object: &Value, owner: &str, left_out: &mut LeftOut) {
     for name in object["extensions"].as_object().into_iter().flat_map(|extensions| extensions.keys()).filter(|name| !is_read(name)) {
         left_out.add(format!("the extension {name}"), owner);
     }
-}
-
-fn is_read(extension: &str) -> bool {
-    READ_EXTENSIONS.contains(&extension)
 }
 
 /// The numbers of all textures that a material names.
