@@ -14,6 +14,7 @@ mod ktx2;
 mod lights;
 mod malformed;
 mod materials;
+mod members;
 pub mod meshes;
 pub mod source;
 mod tangents;
@@ -42,7 +43,6 @@ use crate::error::{Error, Result};
 use crate::text::{counted, in_metres, some_of};
 use accessor::Vertices;
 use animation::Pose;
-use compressed::Target;
 use meshes::{Part, ReadPrimitive};
 use textures::Wanted;
 use transforms::Transform;
@@ -113,7 +113,7 @@ pub fn load(path: &Path, reading: Reading, progress: Progress) -> Result<Scene> 
     let shown = unread::take_out(&mut json, reading.at.is_some(), &mut left_out);
     let image_light = image_light::of(&json);
     let buffer_count = json["buffers"].as_array().map_or(0, Vec::len);
-    let unpacked = compressed::unpack(path, &mut json, binary.as_deref(), Target { buffer: buffer_count, start: 0 })?;
+    let unpacked = compressed::unpack(path, &mut json, binary.as_deref(), (buffer_count, 0))?;
     if let (false, Some(buffers)) = (unpacked.is_empty(), json.get_mut("buffers").and_then(Value::as_array_mut)) {
         buffers.push(json!({"byteLength": unpacked.len()}));
     }

@@ -10,8 +10,9 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::accessor::{integer, kind_of, largest, stored};
-use super::compressed::{self, Target};
+use super::compressed;
 use super::malformed::{self, Chunk};
+use super::members::{index, items};
 use super::{one_line, read_file, uri};
 use crate::error::{Error, Result};
 
@@ -64,7 +65,7 @@ impl File {
         let mut json = malformed::json(&text).map_err(refuse)?;
         let is_unpacked = unpack(path, &mut json, &mut binary)?;
         let mut buffers = Vec::new();
-        for (index, buffer) in json["buffers"].as_array().into_iter().flatten().enumerate() {
+        for (index, buffer) in items(&json["buffers"]).enumerate() {
             buffers.push(match buffer["uri"].as_str() {
                 Some(uri) => Some(uri::read(path, uri).map_err(|reason| refuse(format!("has a buffer {index} that {reason}")))?),
                 None if index == 0 => binary.clone(),
@@ -80,7 +81,7 @@ impl File {
 
     /// Files that buffers and images name, each once.
     pub fn beside(&self) -> Vec<Beside> {
-        let of = |list: &str| self.json[list].as_array().into_iter().flatten().filter_map(|member| member["uri"].as_str());
+        let of = |list: &str| items(&self.json[list]).filter_map(|member| member["uri"].as_str());
         let mut uris: Vec<&str> = of("buffers").chain(of("images")).filter(|uri| !uri.contains(':') && !uri.is_empty()).collect();
         uris.sort_unstable();
         uris.dedup();
@@ -95,7 +96,6 @@ impl File {
     pub fn elements(&self, accessor: usize, what: &str) -> Result<Elements> {
         let json = &self.json["accessors"][accessor];
         let refuse = |reason: &str| self.refuse(what, format!("has the accessor {accessor}, which {reason}"));
-        let number = |value: &Value| value.as_u64().and_then(|number| usize::try_from(number).ok());
         let kind = kind_of(&json["componentType"]).ok_or_else(|| refuse("has no numbers that glTF knows"))?;
         let Ok(Checked::Valid(dimensions)) = Checked::<Dimensions>::deserialize(&json["type"]) else {
             return Err(refuse("has a type that glTF does not know"));
@@ -110,17 +110,17 @@ impl File {
         // Columns of matrices begin at multiples of four bytes.
         let column_bytes = components / columns * kind.size();
         let size = if columns > 1 { columns * column_bytes.next_multiple_of(4) } else { column_bytes };
-        let count = number(&json["count"]).ok_or_else(|| refuse("says no count"))?;
+        let count = index(&json["count"]).ok_or_else(|| refuse("says no count"))?;
         let mut bytes = match json.get("bufferView") {
-            Some(view) => self.slice(view, number(&json["byteOffset"]).unwrap_or(0), count, size).map_err(|reason| refuse(&reason))?,
+            Some(view) => self.slice(view, index(&json["byteOffset"]).unwrap_or(0), count, size).map_err(|reason| refuse(&reason))?,
             None => vec![0; count.checked_mul(size).filter(|bytes| *bytes <= 1 << 32).ok_or_else(|| refuse("is too large"))?],
         };
         if let Some(sparse) = json.get("sparse") {
-            let replaced = number(&sparse["count"]).ok_or_else(|| refuse("is sparse and says no count"))?;
+            let replaced = index(&sparse["count"]).ok_or_else(|| refuse("is sparse and says no count"))?;
             let index_kind = kind_of(&sparse["indices"]["componentType"]).ok_or_else(|| refuse("has sparse indices of no type"))?;
             let index_bytes = index_kind.size();
             let part = |name: &str, size: usize| {
-                let offset = number(&sparse[name]["byteOffset"]).unwrap_or(0);
+                let offset = index(&sparse[name]["byteOffset"]).unwrap_or(0);
                 self.slice(&sparse[name]["bufferView"], offset, replaced, size).map_err(|reason| refuse(&reason))
             };
             let (indices, values) = (part("indices", index_bytes)?, part("values", size)?);
@@ -134,14 +134,13 @@ impl File {
 
     /// `count` elements of `size` bytes from `offset` in a buffer view, one after another.
     fn slice(&self, view: &Value, offset: usize, count: usize, size: usize) -> std::result::Result<Vec<u8>, String> {
-        let number = |value: &Value| value.as_u64().and_then(|number| usize::try_from(number).ok());
-        let view = number(view).and_then(|view| self.json["bufferViews"].get(view)).ok_or("lies in a buffer view that is not there")?;
-        let bytes = number(&view["buffer"]).and_then(|buffer| self.buffers.get(buffer)).and_then(Option::as_ref);
+        let view = index(view).and_then(|view| self.json["bufferViews"].get(view)).ok_or("lies in a buffer view that is not there")?;
+        let bytes = index(&view["buffer"]).and_then(|buffer| self.buffers.get(buffer)).and_then(Option::as_ref);
         let bytes = bytes.ok_or("lies in a buffer that is not there")?;
-        let start = number(&view["byteOffset"]).unwrap_or(0);
-        let end = number(&view["byteLength"]).and_then(|length| start.checked_add(length));
+        let start = index(&view["byteOffset"]).unwrap_or(0);
+        let end = index(&view["byteLength"]).and_then(|length| start.checked_add(length));
         let bytes = end.and_then(|end| bytes.get(start..end)).ok_or("lies in a buffer view that runs past its buffer")?;
-        let stride = number(&view["byteStride"]).unwrap_or(size);
+        let stride = index(&view["byteStride"]).unwrap_or(size);
         let element = |k: usize| {
             let place = k.checked_mul(stride)?.checked_add(offset)?;
             bytes.get(place..place.checked_add(size)?)
@@ -171,7 +170,7 @@ fn unpack(path: &Path, json: &mut Value, binary: &mut Option<Vec<u8>>) -> Result
     let buffers = json["buffers"].as_array().map_or(0, Vec::len);
     let is_free = binary.is_some() && json["buffers"][0]["uri"].is_null();
     let start = binary.as_ref().map_or(0, |binary| binary.len().next_multiple_of(4));
-    let target = if is_free { Target { buffer: 0, start } } else { Target { buffer: buffers, start: 0 } };
+    let target = if is_free { (0, start) } else { (buffers, 0) };
     let unpacked = compressed::unpack(path, json, binary.as_deref(), target)?;
     if unpacked.is_empty() {
         return Ok(false);

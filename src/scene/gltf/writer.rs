@@ -29,10 +29,10 @@ impl Writer {
     /// Adds a member to a list, which need not be there, as glTF forbids empty ones.
     pub fn push(&mut self, list: &str, member: Value) -> usize {
         let list = &mut self.json[list];
-        if list.is_null() {
+        if !list.is_array() {
             *list = json!([]);
         }
-        let list = list.as_array_mut().expect("the file was read, so that its lists are lists");
+        let list = list.as_array_mut().expect("it is one now");
         list.push(member);
         list.len() - 1
     }
@@ -49,14 +49,25 @@ impl Writer {
         names.sort_by(|a, b| a.as_str().cmp(&b.as_str()));
     }
 
+    /// Fills the bytes up, so that numbers of any kind can follow.
+    pub fn fill(&mut self) {
+        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
+    }
+
+    /// Adds bytes, and gives where they begin in the buffer.
+    pub fn append(&mut self, bytes: &[u8]) -> usize {
+        self.fill();
+        let place = self.start + self.bytes.len();
+        self.bytes.extend_from_slice(bytes);
+        place
+    }
+
     /// A view of bytes, so many from one element to the next, for a target of the graphics card.
     pub fn view(&mut self, bytes: &[u8], stride: Option<usize>, target: Option<u32>) -> usize {
-        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
-        let mut view = json!({"buffer": self.buffer, "byteOffset": self.start + self.bytes.len(), "byteLength": bytes.len()});
+        let mut view = json!({"buffer": self.buffer, "byteOffset": self.append(bytes), "byteLength": bytes.len()});
         for (name, value) in [("byteStride", stride.map(|stride| json!(stride))), ("target", target.map(|target| json!(target)))] {
             value.into_iter().for_each(|value| view[name] = value);
         }
-        self.bytes.extend_from_slice(bytes);
         self.push("bufferViews", view)
     }
 
