@@ -138,6 +138,14 @@ pub fn textures_used(scene: &Scene) -> Vec<usize> {
     used.into_iter().collect()
 }
 
+/// No highlights on top of the baked light either. Alpha is as it was.
+fn black(material: &Material) -> Material {
+    let Material { coverage, two_sided, .. } = *material;
+    let base_colour_texture = material.base_colour_texture.filter(|_| coverage != Coverage::Whole);
+    let layers = Layers { metallic: 0.0, specular: 0.0, ..Layers::default() };
+    Material { base_colour_texture, coverage, two_sided, ..Material::layered(&material.name, Vec3::ZERO, layers) }
+}
+
 /// A document of the scene. `intensity` is by how much the texels of a mesh's linear lightmap are to be
 /// multiplied.
 pub fn document(scene: &Scene, layout: &Layout, geometry: &Geometry, names: &Names, kind: Kind, intensity: impl Fn(usize) -> f32) -> Value {
@@ -163,15 +171,7 @@ pub fn document(scene: &Scene, layout: &Layout, geometry: &Geometry, names: &Nam
             (None, _) => document.material(material, place),
             (Some(_), Kind::Radiance) => {
                 let texture = document.texture(names.radiance(index), of_charts());
-                // No highlights on top of the baked light either. Alpha is as it was.
-                let base_colour_texture = material.base_colour_texture.filter(|_| material.coverage != Coverage::Whole);
-                let black = Material {
-                    base_colour_texture,
-                    coverage: material.coverage,
-                    two_sided: material.two_sided,
-                    ..Material::layered(&material.name, Vec3::ZERO, Layers { metallic: 0.0, specular: 0.0, ..Layers::default() })
-                };
-                let mut value = document.material(&black, place);
+                let mut value = document.material(&black(material), place);
                 value["emissiveFactor"] = json!([1.0, 1.0, 1.0]);
                 value["emissiveTexture"] = json!({"index": texture, "texCoord": LIGHTMAP_SET});
                 value

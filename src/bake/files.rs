@@ -34,8 +34,6 @@ pub fn write(folder: &Folder, scene: &Scene, layout: &Layout, maps: &[Map], expo
     let geometry = Geometry::new(scene, layout);
     let intensities: HashMap<usize, f32> =
         maps.iter().flat_map(|map| layout.objects[map.object].meshes.iter().map(|mesh| (*mesh, ceiling(map) * exposure))).collect();
-    let textures =
-        document::textures_used(scene).into_iter().map(|index| (names.texture(index), colour::texture_png(&scene.textures[index])));
     let pictures = maps.iter().flat_map(|map| {
         let stem = names.stem(map.object);
         let object = &layout.objects[map.object];
@@ -56,8 +54,13 @@ pub fn write(folder: &Folder, scene: &Scene, layout: &Layout, maps: &[Map], expo
         let document = document::document(scene, layout, &geometry, &names, kind, |mesh| intensities[&mesh]);
         (name.to_owned(), serde_json::to_vec_pretty(&document).expect("a document is plain data"))
     });
-    let files = pictures.chain(textures).chain([(GEOMETRY.to_owned(), geometry.file.bytes.clone())]).chain(documents);
+    let files = pictures.chain(textures(scene, &names)).chain([(GEOMETRY.to_owned(), geometry.file.bytes.clone())]).chain(documents);
     write_all(files.map(|(name, content)| (folder.file(&name), content)))
+}
+
+/// Names and contents of the files of a scene's textures.
+fn textures<'a>(scene: &'a Scene, names: &'a Names) -> impl Iterator<Item = (String, Vec<u8>)> + 'a {
+    document::textures_used(scene).into_iter().map(|index| (names.texture(index), colour::texture_png(&scene.textures[index])))
 }
 
 /// Names of the files of a built-in scene's bake.
@@ -186,10 +189,7 @@ pub fn preview(scene: &Scene, layout: &Layout, maps: &[Map], exposure: f32) -> V
     let names = Names::new(scene, layout);
     let geometry = Geometry::new(scene, layout);
     let json = document::document(scene, layout, &geometry, &names, Kind::Radiance, |_| 1.0);
-    let mut pictures: HashMap<String, Vec<u8>> = document::textures_used(scene)
-        .into_iter()
-        .map(|index| (names.texture(index), colour::texture_png(&scene.textures[index])))
-        .collect();
+    let mut pictures: HashMap<String, Vec<u8>> = textures(scene, &names).collect();
     for map in maps {
         let object = &layout.objects[map.object];
         pictures.insert(names.radiance(object.meshes[0]), radiance_png(scene, layout, object, map, exposure));

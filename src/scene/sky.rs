@@ -137,24 +137,15 @@ impl Sky {
         let edge_cosine = |edge: u32| (PI * f64::from(edge) / f64::from(rows)).cos();
         let cells_of = |row: u32| {
             let near_rows = near(row, rows, height);
-            let total: f64 = near_rows.iter().map(|(_, share)| share).sum();
             // The mean of the rows, then of the texels whose tents reach into a cell; and the largest of them.
             let column = |i: i64| {
-                let of = |sums: (DVec3, f64), &(j, share): &(i64, f64)| {
+                mean_and_most(&near_rows, |j| {
                     let value = texel(i, j.clamp(0, i64::from(height) - 1) as usize);
-                    (sums.0 + share / total * value, sums.1.max(value.max_element()))
-                };
-                near_rows.iter().fold((DVec3::ZERO, 0.0), of)
+                    (value, value.max_element())
+                })
             };
-            let means: Vec<(DVec3, f64)> = (0..i64::from(width)).map(column).collect();
-            let cell = |near_columns: &Vec<(i64, f64)>| {
-                let total: f64 = near_columns.iter().map(|(_, share)| share).sum();
-                let add = |sums: (DVec3, f64), &(i, share): &(i64, f64)| {
-                    let (mean, most) = means[i.rem_euclid(i64::from(width)) as usize];
-                    (sums.0 + share / total * mean, sums.1.max(most))
-                };
-                near_columns.iter().fold((DVec3::ZERO, 0.0), add)
-            };
+            let columns: Vec<(DVec3, f64)> = (0..i64::from(width)).map(column).collect();
+            let cell = |near_columns: &Vec<(i64, f64)>| mean_and_most(near_columns, |i| columns[i.rem_euclid(i64::from(width)) as usize]);
             near_columns.iter().map(cell).collect::<Vec<(DVec3, f64)>>()
         };
         // By row, so that the cells of all at once need no memory.
@@ -245,6 +236,15 @@ fn near(of: u32, cells: u32, size: u32) -> Vec<(i64, f64)> {
     };
     let texels = from.floor() as i64 - 1..=to.ceil() as i64;
     texels.map(|texel| (texel, share(texel))).filter(|(_, share)| *share > 0.0).collect()
+}
+
+/// Of what some places have by their shares, and the largest of all.
+fn mean_and_most(near: &[(i64, f64)], of: impl Fn(i64) -> (DVec3, f64)) -> (DVec3, f64) {
+    let total: f64 = near.iter().map(|(_, share)| share).sum();
+    near.iter().fold((DVec3::ZERO, 0.0), |(sum, most), (place, share)| {
+        let (value, own) = of(*place);
+        (sum + share / total * value, most.max(own))
+    })
 }
 
 /// Of choices, at least one each, by weight; even where nothing weighs.

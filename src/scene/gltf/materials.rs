@@ -1,8 +1,10 @@
 //! Materials: each becomes a layered one, with every factor and texture that the scene simulates.
 
+use std::borrow::Borrow;
+
 use glam::{DVec2, Vec3};
 use gltf::Document;
-use gltf::json::extensions::material::{Material as Extensions, Volume};
+use gltf::json::extensions::material::{Material as Extensions, PbrSpecularGlossiness, Volume};
 use gltf::json::extensions::texture::TextureTransform;
 use gltf::json::material::{AlphaMode, NormalTexture};
 use gltf::json::texture::Info;
@@ -92,35 +94,13 @@ impl Reader<'_> {
         self.loader.require(emission.is_finite() && emission.min_element() >= 0.0, &self.object, reason)?;
         let mut layers = Layers::default();
         if let Some(glossy) = glossy {
-            let glossiness = self.factor("the glossiness", glossy.glossiness_factor.0, 1.0)?;
-            let texture = glossy.specular_glossiness_texture.as_ref();
-            layers.metallic = 0.0;
-            layers.ior = 0.0;
-            layers.specular_colour = self.colour("the specular colour", glossy.specular_factor.0, 1.0)?;
-            layers.specular_colour_texture = self.texture(texture, Meaning::Colours)?;
-            layers.metallic_roughness_texture = self.texture(texture, Meaning::Glossiness(glossiness.to_bits()))?;
-            layers.roughness = if texture.is_some() { 1.0 } else { 1.0 - glossiness };
+            self.glossiness(glossy, &mut layers)?;
         }
         self.parameters(value, &mut layers)?;
         if let Some(volume) = &extensions.volume {
-            let medium = self.medium(volume)?;
-            // No light goes into an opaque surface.
-            layers.medium = medium.filter(|_| layers.transmission > 0.0 || layers.diffuse_transmission > 0.0);
-            // The index 0 stands for one without end: there is no angle of refraction, and but for a specular factor or colour no light.
-            if layers.ior == 0.0 && layers.medium.take().is_some() {
-                self.loader.leave_out("volumes behind the ior 0 (nothing is refracted there; such a surface is a thin wall)", &self.object);
-            }
+            layers.medium = self.medium(volume)?;
         }
-        if layers.dispersion > 0.0 {
-            if layers.ior > MAX_DISPERSED_IOR {
-                self.loader.leave_out(format!("dispersion of indices of refraction above {MAX_DISPERSED_IOR}"), &self.object);
-                layers.dispersion = 0.0;
-            } else if layers.medium.is_none() || layers.transmission == 0.0 {
-                self.loader
-                    .leave_out("dispersion of what light does not enter (a thin wall, or a surface without transmission)", &self.object);
-                layers.dispersion = 0.0;
-            }
-        }
+        self.leave_out_of_inside(&mut layers);
         Ok(Material {
             emission,
             emission_texture: self.texture(json.emissive_texture.as_ref(), Meaning::Colours)?,
@@ -128,6 +108,38 @@ impl Reader<'_> {
             layers,
             ..read
         })
+    }
+
+    /// What KHR_materials_pbrSpecularGlossiness has in place of [`METALLIC_ROUGHNESS`].
+    fn glossiness(&mut self, glossy: &PbrSpecularGlossiness, layers: &mut Layers) -> Result<()> {
+        let glossiness = self.factor("the glossiness", glossy.glossiness_factor.0, 1.0)?;
+        let texture = glossy.specular_glossiness_texture.as_ref();
+        layers.metallic = 0.0;
+        layers.ior = 0.0;
+        layers.specular_colour = self.colour("the specular colour", glossy.specular_factor.0, 1.0)?;
+        layers.specular_colour_texture = self.texture(texture, Meaning::Colours)?;
+        layers.metallic_roughness_texture = self.texture(texture, Meaning::Glossiness(glossiness.to_bits()))?;
+        layers.roughness = if texture.is_some() { 1.0 } else { 1.0 - glossiness };
+        Ok(())
+    }
+
+    /// Takes away what counts only where light enters, if it does not.
+    fn leave_out_of_inside(&mut self, layers: &mut Layers) {
+        // No light goes into an opaque surface.
+        layers.medium = layers.medium.filter(|_| layers.transmission > 0.0 || layers.diffuse_transmission > 0.0);
+        // The index 0 stands for one without end: there is no angle of refraction, and but for a specular factor or colour no light.
+        if layers.ior == 0.0 && layers.medium.take().is_some() {
+            self.loader.leave_out("volumes behind the ior 0 (nothing is refracted there; such a surface is a thin wall)", &self.object);
+        }
+        let reason = match layers.dispersion > 0.0 {
+            true if layers.ior > MAX_DISPERSED_IOR => format!("dispersion of indices of refraction above {MAX_DISPERSED_IOR}"),
+            true if layers.medium.is_none() || layers.transmission == 0.0 => {
+                "dispersion of what light does not enter (a thin wall, or a surface without transmission)".into()
+            }
+            _ => return,
+        };
+        self.loader.leave_out(reason, &self.object);
+        layers.dispersion = 0.0;
     }
 
     /// Reads what [`PARAMETERS`] lists.
@@ -141,12 +153,12 @@ impl Reader<'_> {
                     Parameter::Number(what, range, of) => *of(layers) = self.number(what, range, self.parsed(group, value)?)?,
                     Parameter::Colour(what, most, of) => *of(layers) = self.colour(what, self.parsed(group, value)?, most)?,
                     Parameter::NumberTexture(_, of) => {
-                        *of(layers) = self.texture(self.parsed::<Option<_>>(group, value)?.as_ref(), Meaning::Numbers)?;
+                        *of(layers) = self.texture(self.parsed::<Option<Info>>(group, value)?, Meaning::Numbers)?
                     }
                     Parameter::ColourTexture(_, of) => {
-                        *of(layers) = self.texture(self.parsed::<Option<_>>(group, value)?.as_ref(), Meaning::Colours)?;
+                        *of(layers) = self.texture(self.parsed::<Option<Info>>(group, value)?, Meaning::Colours)?
                     }
-                    Parameter::NormalMap(_, of) => *of(layers) = self.normal_map(self.parsed::<Option<_>>(group, value)?.as_ref())?,
+                    Parameter::NormalMap(_, of) => *of(layers) = self.normal_map(self.parsed::<Option<NormalTexture>>(group, value)?)?,
                 }
             }
         }
@@ -198,14 +210,14 @@ impl Reader<'_> {
         Ok(Some(if is_clear { Medium::CLEAR } else { Medium { transmittance: colour, metres: distance } }))
     }
 
-    fn texture(&mut self, info: Option<&Info>, meaning: Meaning) -> Result<Option<TextureUse>> {
-        let Some(info) = info else { return Ok(None) };
+    fn texture(&mut self, info: Option<impl Borrow<Info>>, meaning: Meaning) -> Result<Option<TextureUse>> {
+        let Some(info) = info.as_ref().map(Borrow::borrow) else { return Ok(None) };
         let transform = info.extensions.as_ref().and_then(|extensions| extensions.texture_transform.as_ref());
         self.texture_use(info.index.value(), info.tex_coord, transform, meaning).map(Some)
     }
 
-    fn normal_map(&mut self, info: Option<&NormalTexture>) -> Result<Option<NormalMap>> {
-        let Some(info) = info else { return Ok(None) };
+    fn normal_map(&mut self, info: Option<impl Borrow<NormalTexture>>) -> Result<Option<NormalMap>> {
+        let Some(info) = info.as_ref().map(Borrow::borrow) else { return Ok(None) };
         let transform = info.extensions.as_ref().and_then(|extensions| extensions.others.get("KHR_texture_transform"));
         let transform: Option<TextureTransform> = transform.map(|value| self.parsed("KHR_texture_transform", value)).transpose()?;
         let texture = self.texture_use(info.index.value(), info.tex_coord, transform.as_ref(), Meaning::Numbers)?;
