@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::part::Part;
 use super::{SurfacePoint, gutters, texels};
 use crate::scene::Mesh;
+use crate::scene::connected::connected;
 
 /// What a texel holds of a chart: one of its points.
 #[derive(Debug, Clone, Copy)]
@@ -87,38 +88,21 @@ impl Place {
 fn charts(meshes: &[&Mesh], parts: &[Part]) -> Vec<Vec<u32>> {
     // Vertices of the same place, however often a file has it. Adding zero makes -0 the same as 0.
     let mut known: HashMap<[u64; 5], u32> = HashMap::new();
-    let mut edges: HashMap<[u32; 2], u32> = HashMap::new();
-    let mut parent: Vec<u32> = Vec::new();
-    fn root(parent: &mut [u32], of: u32) -> u32 {
-        let mut of = of as usize;
-        while parent[of] as usize != of {
-            parent[of] = parent[parent[of] as usize];
-            of = parent[of] as usize;
-        }
-        of as u32
-    }
-    for (mesh, part) in meshes.iter().zip(parts) {
-        for corners in &part.triangles {
-            let own = parent.len() as u32;
-            parent.push(own);
-            let vertices = corners.map(|vertex| {
-                let (DVec3 { x, y, z }, uv) = (mesh.positions[vertex as usize], part.uvs[vertex as usize]);
-                let count = known.len() as u32;
-                *known.entry([x, y, z, uv.x, uv.y].map(|number| (number + 0.0).to_bits())).or_insert(count)
-            });
-            for (from, to) in [(0, 1), (1, 2), (2, 0)] {
-                let edge = [vertices[from].min(vertices[to]), vertices[from].max(vertices[to])];
-                let other = *edges.entry(edge).or_insert(own);
-                let (one, two) = (root(&mut parent, own), root(&mut parent, other));
-                parent[one.max(two) as usize] = one.min(two);
-            }
-        }
-    }
-    let mut first = 0;
-    let of_part = |part: &Part| {
-        let charts = (first..first + part.triangles.len() as u32).map(|triangle| root(&mut parent, triangle)).collect();
-        first += part.triangles.len() as u32;
-        charts
+    let mut edges = |(mesh, part, corners): (&Mesh, &Part, &[u32; 3])| {
+        let [a, b, c] = corners.map(|vertex| {
+            let (DVec3 { x, y, z }, uv) = (mesh.positions[vertex as usize], part.uvs[vertex as usize]);
+            let count = known.len() as u32;
+            *known.entry([x, y, z, uv.x, uv.y].map(|number| (number + 0.0).to_bits())).or_insert(count)
+        });
+        [(a, b), (b, c), (c, a)].map(|(from, to)| [from.min(to), from.max(to)])
     };
+    let triangles = meshes.iter().zip(parts).flat_map(|(mesh, part)| part.triangles.iter().map(move |corners| (*mesh, part, corners)));
+    let groups = connected(triangles.map(&mut edges));
+    let mut charts = vec![0; groups.iter().map(Vec::len).sum()];
+    for (chart, group) in (0..).zip(groups) {
+        group.into_iter().for_each(|triangle| charts[triangle] = chart);
+    }
+    let mut rest = charts.into_iter();
+    let of_part = |part: &Part| rest.by_ref().take(part.triangles.len()).collect();
     parts.iter().map(of_part).collect()
 }

@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 use std::f32::consts::PI;
 
 use glam::Vec3;
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::document::{self, Geometry, Kind};
 use super::names::{self, ENDINGS, ERROR, GEOMETRY, IRRADIANCE, LIGHTMAP, LIGHTMAP_SCENE, Names, PAGE_ENDINGS, RADIANCE, RADIANCE_SCENE};
@@ -17,6 +17,7 @@ use crate::output::colour;
 use crate::output::destination::{Folder, write_all};
 use crate::output::exr_file;
 use crate::scene::gltf::source::{Beside, File, binary_file};
+use crate::scene::gltf::writer::Writer;
 use crate::scene::material::TextureUse;
 use crate::scene::{Material, Scene};
 
@@ -33,8 +34,6 @@ pub fn write(folder: &Folder, scene: &Scene, layout: &Layout, maps: &[Map], expo
     let geometry = Geometry::new(scene, layout);
     let intensities: HashMap<usize, f32> =
         maps.iter().flat_map(|map| layout.objects[map.object].meshes.iter().map(|mesh| (*mesh, ceiling(map) * exposure))).collect();
-    let textures =
-        document::textures_used(scene).into_iter().map(|index| (names.texture(index), colour::texture_png(&scene.textures[index])));
     let pictures = maps.iter().flat_map(|map| {
         let stem = names.stem(map.object);
         let object = &layout.objects[map.object];
@@ -55,8 +54,13 @@ pub fn write(folder: &Folder, scene: &Scene, layout: &Layout, maps: &[Map], expo
         let document = document::document(scene, layout, &geometry, &names, kind, |mesh| intensities[&mesh]);
         (name.to_owned(), serde_json::to_vec_pretty(&document).expect("a document is plain data"))
     });
-    let files = pictures.chain(textures).chain([(GEOMETRY.to_owned(), geometry.bytes.clone())]).chain(documents);
+    let files = pictures.chain(textures(scene, &names)).chain([(GEOMETRY.to_owned(), geometry.file.bytes.clone())]).chain(documents);
     write_all(files.map(|(name, content)| (folder.file(&name), content)))
+}
+
+/// Names and contents of the files of a scene's textures.
+fn textures<'a>(scene: &'a Scene, names: &'a Names) -> impl Iterator<Item = (String, Vec<u8>)> + 'a {
+    document::textures_used(scene).into_iter().map(|index| (names.texture(index), colour::texture_png(&scene.textures[index])))
 }
 
 /// Names of the files of a built-in scene's bake.
@@ -184,27 +188,20 @@ fn error_exr(size: (u32, u32), errors: &[Vec3], unseen: &[Vec3], source: ErrorSo
 pub fn preview(scene: &Scene, layout: &Layout, maps: &[Map], exposure: f32) -> Vec<u8> {
     let names = Names::new(scene, layout);
     let geometry = Geometry::new(scene, layout);
-    let mut json = document::document(scene, layout, &geometry, &names, Kind::Radiance, |_| 1.0);
-    let mut pictures: HashMap<String, Vec<u8>> = document::textures_used(scene)
-        .into_iter()
-        .map(|index| (names.texture(index), colour::texture_png(&scene.textures[index])))
-        .collect();
+    let json = document::document(scene, layout, &geometry, &names, Kind::Radiance, |_| 1.0);
+    let mut pictures: HashMap<String, Vec<u8>> = textures(scene, &names).collect();
     for map in maps {
         let object = &layout.objects[map.object];
         pictures.insert(names.radiance(object.meshes[0]), radiance_png(scene, layout, object, map, exposure));
     }
-    let mut bytes = geometry.bytes;
-    let mut views: Vec<Value> = json["bufferViews"].as_array().cloned().unwrap_or_default();
-    for image in json.get_mut("images").and_then(Value::as_array_mut).into_iter().flatten() {
-        let picture = image["uri"].as_str().and_then(|name| pictures.get(name)).expect("every picture is there");
-        bytes.resize(bytes.len().next_multiple_of(4), 0);
-        views.push(json!({"buffer": 0, "byteOffset": bytes.len(), "byteLength": picture.len()}));
-        bytes.extend(picture);
-        *image = json!({"bufferView": views.len() - 1, "mimeType": "image/png"});
+    let mut file = Writer { json, bytes: geometry.file.bytes, ..Writer::default() };
+    for image in 0..file.json["images"].as_array().map_or(0, Vec::len) {
+        let picture = file.json["images"][image]["uri"].as_str().and_then(|name| pictures.get(name)).expect("every picture is there");
+        let view = file.view(picture, None, None);
+        file.json["images"][image] = json!({"bufferView": view, "mimeType": "image/png"});
     }
-    json["bufferViews"] = views.into();
-    json["buffers"] = json!([{"byteLength": bytes.len()}]);
-    binary_file(&json, &bytes, &[])
+    file.json["buffers"] = json!([{"byteLength": file.bytes.len()}]);
+    binary_file(&file.json, &file.bytes, &[])
 }
 
 /// What leaves the front of an object's texels, times the exposure, as sRGB.

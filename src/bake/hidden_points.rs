@@ -83,8 +83,8 @@ impl Faces {
         Faces { faces, nodes }
     }
 
-    /// Calls back for faces whose boxes meet a box, until told to stop.
-    fn visit(&self, meets: impl Fn(DVec3, DVec3) -> bool, mut look: impl FnMut(&Face)) {
+    /// Calls back for faces in leaves whose boxes meet something.
+    fn visit<'a>(&'a self, meets: impl Fn(DVec3, DVec3) -> bool, mut look: impl FnMut(&'a Face)) {
         let mut open = if self.nodes.is_empty() { Vec::new() } else { vec![0] };
         while let Some(place) = open.pop() {
             let node = &self.nodes[place];
@@ -108,25 +108,14 @@ impl Faces {
             // A ray in a box's plane has no number there, which min and max leave out.
             a.min(b).max_element().max(0.0) <= a.max(b).min_element().min(found.get())
         };
-        let mut open = if self.nodes.is_empty() { Vec::new() } else { vec![0] };
-        while let Some(place) = open.pop() {
-            let node = &self.nodes[place];
-            if !meets(node.low, node.high) {
-                continue;
+        self.visit(meets, |face| {
+            if let Some(distance) = face.distance(origin, direction).filter(|distance| *distance < found.get())
+                && counts(face)
+            {
+                found.set(distance);
+                nearest = Some((face, distance));
             }
-            if node.count == 0 {
-                open.extend([place + 1, node.first]);
-                continue;
-            }
-            for face in &self.faces[node.first..node.first + node.count] {
-                if let Some(distance) = face.distance(origin, direction).filter(|distance| *distance < found.get())
-                    && counts(face)
-                {
-                    found.set(distance);
-                    nearest = Some((face, distance));
-                }
-            }
-        }
+        });
         nearest
     }
 

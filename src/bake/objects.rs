@@ -135,7 +135,7 @@ fn coordinates(file: &File, mesh: &Mesh, set: usize) -> Result<Option<Vec<DVec2>
 }
 
 fn area(meshes: &[&Mesh]) -> f64 {
-    meshes.iter().map(|mesh| (0..mesh.triangles.len()).map(|triangle| mesh.area(triangle)).sum::<f64>()).sum()
+    meshes.iter().map(|mesh| mesh.whole_area()).sum()
 }
 
 /// Whether two objects of the same triangles differ in size only, the second being the larger one.

@@ -10,27 +10,26 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use glam::DVec2;
+use gltf::accessor::DataType;
+use gltf::json::buffer::ARRAY_BUFFER;
+use gltf::json::mesh::TRIANGLES;
+use gltf::json::validation::Checked;
+use gltf::mesh::Mode;
+use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
 use super::pages::Pages;
 use super::{Layout, MeshLightmap};
 use crate::error::{Error, Result};
 use crate::scene::Scene;
+use crate::scene::gltf::meshes::triangles_of;
 use crate::scene::gltf::source::{Elements, File, binary_file};
+use crate::scene::gltf::writer::Writer;
 use crate::scene::mesh::Source;
 use crate::text::some_of;
 
 /// The member of a node's `extras` that says which lightmap it has.
 pub const KEY: &str = "photonmill_lightmap";
-
-const FLOAT: u32 = 5126;
-const UNSIGNED_SHORT: u32 = 5123;
-const UNSIGNED_INT: u32 = 5125;
-const ARRAY_BUFFER: u32 = 34962;
-const ELEMENT_ARRAY_BUFFER: u32 = 34963;
-const TRIANGLES: u64 = 4;
-const TRIANGLE_STRIP: u64 = 5;
-const TRIANGLE_FAN: u64 = 6;
 
 /// Primitives that use less of their vertices than that, as many may share one list, get a list of their own.
 const LEAST_USED: f64 = 0.5;
@@ -45,7 +44,10 @@ pub struct Extended {
 
 /// Adds coordinates and what nodes say of their lightmaps. `pictures` and `errors` are files' names, one a page.
 pub fn extended(file: &File, scene: &Scene, layout: &Layout, pages: &Pages, pictures: &[String], errors: &[String]) -> Result<Extended> {
-    let mut added = Added { file, json: file.json.clone(), bytes: Vec::new(), buffer: new_buffer(file), warnings: BTreeSet::new() };
+    let buffer = new_buffer(file);
+    let own_part = file.binary.as_ref().filter(|_| file.is_binary && buffer == 0);
+    let start = own_part.map_or(0, |binary| binary.len().next_multiple_of(4));
+    let mut added = Added { file, to: Writer { json: file.json.clone(), bytes: Vec::new(), buffer, start }, warnings: BTreeSet::new() };
     // The mesh and the set that objects with new coordinates have.
     let mut made: HashMap<usize, (usize, usize)> = HashMap::new();
     let mut changed = BTreeSet::new();
@@ -53,7 +55,7 @@ pub fn extended(file: &File, scene: &Scene, layout: &Layout, pages: &Pages, pict
     for (index, object) in layout.objects.iter().enumerate().filter(|(index, object)| object.set.is_none() && object.charts_of == *index) {
         let mesh = source(index).mesh;
         let set = next_set(&file.json, mesh, object.meshes.iter().map(|mesh| &scene.meshes[*mesh].source));
-        let place = if changed.insert(mesh) { mesh } else { added.push("meshes", file.json["meshes"][mesh].clone()) };
+        let place = if changed.insert(mesh) { mesh } else { added.to.push("meshes", file.json["meshes"][mesh].clone()) };
         for own in &object.meshes {
             let lightmap = layout.part(*own);
             let source = scene.meshes[*own].source.as_ref().expect("the scene is from the file");
@@ -67,8 +69,8 @@ pub fn extended(file: &File, scene: &Scene, layout: &Layout, pages: &Pages, pict
         let node = source(index).node;
         let set = object.set.unwrap_or_else(|| {
             let (mesh, set) = made[&object.charts_of];
-            if added.json["nodes"][node]["mesh"] != mesh {
-                added.json["nodes"][node]["mesh"] = json!(mesh);
+            if added.to.json["nodes"][node]["mesh"] != mesh {
+                added.to.json["nodes"][node]["mesh"] = json!(mesh);
             }
             set
         });
@@ -87,7 +89,7 @@ pub fn extended(file: &File, scene: &Scene, layout: &Layout, pages: &Pages, pict
         added.warnings.insert(format!("the lightmap coordinates of {names} are no second UV set (TEXCOORD_1), the only one that many engines take for lightmaps; remove the second set from the file and bake again to get one"));
     }
     for (node, mut lightmaps) in of_nodes {
-        let json = &mut added.json["nodes"][node];
+        let json = &mut added.to.json["nodes"][node];
         if json.get("extras").is_none() {
             json["extras"] = json!({});
         }
@@ -142,10 +144,7 @@ fn next_set<'a>(json: &Value, mesh: usize, sources: impl Iterator<Item = &'a Opt
 /// What is being added to a file.
 struct Added<'a> {
     file: &'a File,
-    json: Value,
-    bytes: Vec<u8>,
-    /// The buffer that the bytes go to.
-    buffer: usize,
+    to: Writer,
     warnings: BTreeSet<String>,
 }
 
@@ -154,41 +153,8 @@ impl Added<'_> {
         Error::Scene { path: self.file.path.clone(), object: what.to_owned(), reason: reason.to_owned() }
     }
 
-    /// Adds a member to a list of the document.
-    fn push(&mut self, list: &str, value: Value) -> usize {
-        let list = &mut self.json[list];
-        if list.is_null() {
-            *list = json!([]);
-        }
-        let list = list.as_array_mut().expect("the file was read, so that its lists are lists");
-        list.push(value);
-        list.len() - 1
-    }
-
-    /// Bytes that stand before those that are added.
-    fn start(&self) -> usize {
-        if self.buffer == 0 && self.file.is_binary {
-            self.file.binary.as_ref().map_or(0, |binary| binary.len().next_multiple_of(4))
-        } else {
-            0
-        }
-    }
-
-    fn view(&mut self, bytes: &[u8], stride: Option<usize>, target: u32) -> usize {
-        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
-        let mut view =
-            json!({"buffer": self.buffer, "byteOffset": self.start() + self.bytes.len(), "byteLength": bytes.len(), "target": target});
-        if let Some(stride) = stride {
-            view["byteStride"] = json!(stride);
-        }
-        self.bytes.extend_from_slice(bytes);
-        self.push("bufferViews", view)
-    }
-
     fn coordinates(&mut self, uvs: &[DVec2]) -> usize {
-        let bytes: Vec<u8> = uvs.iter().flat_map(|uv| uv.as_vec2().to_array()).flat_map(f32::to_le_bytes).collect();
-        let view = self.view(&bytes, None, ARRAY_BUFFER);
-        self.push("accessors", json!({"bufferView": view, "componentType": FLOAT, "count": uvs.len(), "type": "VEC2"}))
+        self.to.vectors(uvs.iter().map(|uv| uv.as_vec2().to_array()))
     }
 
     /// An accessor of the same numbers for other vertices.
@@ -199,16 +165,11 @@ impl Added<'_> {
         }
         let bytes = vertices.iter().flat_map(|vertex| &all.bytes[*vertex as usize * all.size..][..all.size]).copied().collect();
         let gathered = Elements { bytes, count: vertices.len(), ..all };
+        // Elements begin at multiples of four bytes.
         let stride = gathered.size.next_multiple_of(4);
-        let is_filled = stride != gathered.size;
         let filled = |element: &[u8]| [element, &[0; 4][..stride - gathered.size]].concat();
-        let view = match is_filled {
-            true => {
-                let bytes: Vec<u8> = gathered.bytes.chunks_exact(gathered.size).flat_map(filled).collect();
-                self.view(&bytes, Some(stride), ARRAY_BUFFER)
-            }
-            false => self.view(&gathered.bytes, None, ARRAY_BUFFER),
-        };
+        let bytes: Vec<u8> = gathered.bytes.chunks_exact(gathered.size).flat_map(filled).collect();
+        let view = self.to.view(&bytes, (stride != gathered.size).then_some(stride), Some(ARRAY_BUFFER));
         let mut json = self.file.json["accessors"][accessor].clone();
         let object = json.as_object_mut().expect("it was read");
         object.remove("sparse");
@@ -220,13 +181,13 @@ impl Added<'_> {
         if object.contains_key("min") && object.contains_key("max") && !is_matrix {
             let range = |pick: fn(f64, f64) -> f64| -> Vec<Value> {
                 let of = |component| (0..gathered.count).map(|element| gathered.number(element, component)).reduce(pick).unwrap_or(0.0);
-                (0..gathered.components).map(|component| number(of(component), gathered.component_type)).collect()
+                (0..gathered.components).map(|component| number(of(component), gathered.kind)).collect()
             };
             let (min, max) = (range(f64::min), range(f64::max));
             object.insert("min".into(), json!(min));
             object.insert("max".into(), json!(max));
         }
-        Ok(self.push("accessors", json))
+        Ok(self.to.push("accessors", json))
     }
 
     /// Gives a primitive of the mesh at `place` its coordinates. `triangles` are those of the scene's mesh.
@@ -239,7 +200,7 @@ impl Added<'_> {
         set: usize,
     ) -> Result<()> {
         let what = format!("mesh '{}', primitive {}", lightmap.mesh.name, source.primitive);
-        let mut primitive = self.json["meshes"][place]["primitives"][source.primitive].clone();
+        let mut primitive = self.to.json["meshes"][place]["primitives"][source.primitive].clone();
         let position = primitive["attributes"]["POSITION"].as_u64().ok_or_else(|| self.refuse(&what, "has no positions"))? as usize;
         let count = self.file.json["accessors"][position]["count"].as_u64().unwrap_or_default() as usize;
         for name in primitive["extensions"].as_object().into_iter().flat_map(Map::keys) {
@@ -271,13 +232,8 @@ impl Added<'_> {
                 targets.iter_mut().try_for_each(|target| gather(self, target))?;
             }
             let is_short = vertices.len() < usize::from(u16::MAX);
-            let bytes = |index: &u32| if is_short { (*index as u16).to_le_bytes().to_vec() } else { index.to_le_bytes().to_vec() };
-            let bytes: Vec<u8> = split.triangles.as_flattened().iter().flat_map(bytes).collect();
-            let view = self.view(&bytes, None, ELEMENT_ARRAY_BUFFER);
-            let component = if is_short { UNSIGNED_SHORT } else { UNSIGNED_INT };
-            let indices = json!({"bufferView": view, "componentType": component, "count": 3 * split.triangles.len(), "type": "SCALAR"});
-            primitive["indices"] = json!(self.push("accessors", indices));
-            if primitive["mode"].as_u64().is_some_and(|mode| mode != TRIANGLES) {
+            primitive["indices"] = json!(self.to.triangles(&split.triangles, is_short));
+            if primitive["mode"].as_u64().is_some_and(|mode| mode != u64::from(TRIANGLES)) {
                 primitive["mode"] = json!(TRIANGLES);
             }
         }
@@ -293,7 +249,7 @@ impl Added<'_> {
             }
         }
         primitive["attributes"][format!("TEXCOORD_{set}")] = json!(coordinates);
-        self.json["meshes"][place]["primitives"][source.primitive] = primitive;
+        self.to.json["meshes"][place]["primitives"][source.primitive] = primitive;
         Ok(())
     }
 
@@ -306,32 +262,24 @@ impl Added<'_> {
             }
             None => (0..count as u32).collect(),
         };
-        Ok(match primitive["mode"].as_u64().unwrap_or(TRIANGLES) {
-            TRIANGLE_STRIP => {
-                let turned = |(k, of): (usize, &[u32])| if k % 2 == 0 { [of[0], of[1], of[2]] } else { [of[1], of[0], of[2]] };
-                indices.windows(3).enumerate().map(turned).collect()
-            }
-            TRIANGLE_FAN => indices.get(1..).unwrap_or_default().windows(2).map(|pair| [indices[0], pair[0], pair[1]]).collect(),
-            _ => indices.as_chunks().0.to_vec(),
-        })
+        let mode = Checked::deserialize(&primitive["mode"]).unwrap_or(Checked::Valid(Mode::Triangles));
+        Ok(triangles_of(if let Checked::Valid(mode) = mode { mode } else { Mode::Triangles }, &indices))
     }
 
     fn finish(mut self) -> Extended {
-        if !self.bytes.is_empty() {
-            let length = self.start() + self.bytes.len();
-            if self.json["buffers"].get(self.buffer).is_none() {
-                self.push("buffers", json!({}));
+        if !self.to.bytes.is_empty() {
+            if self.to.json["buffers"].get(self.to.buffer).is_none() {
+                self.to.push("buffers", json!({}));
             }
-            let buffer = self.buffer;
-            self.json["buffers"][buffer]["byteLength"] = json!(length);
+            self.to.json["buffers"][self.to.buffer]["byteLength"] = json!(self.to.start + self.to.bytes.len());
         }
-        Extended { json: self.json, bytes: self.bytes, warnings: self.warnings.into_iter().collect() }
+        Extended { json: self.to.json, bytes: self.to.bytes, warnings: self.warnings.into_iter().collect() }
     }
 }
 
 /// A number as JSON, whole where the accessor's are.
-fn number(value: f64, component_type: u64) -> Value {
-    if component_type == u64::from(FLOAT) { json!(value) } else { json!(value as i64) }
+fn number(value: f64, kind: DataType) -> Value {
+    if kind == DataType::F32 { json!(value) } else { json!(value as i64) }
 }
 
 /// Coordinates for the vertices of a primitive.

@@ -8,7 +8,7 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
-use crate::scene::{Mesh, Scene};
+use crate::scene::{Mesh, Scene, connected as connection};
 use crate::verify::judge::Judge;
 
 /// Points of a connected part that are asked about, and paths from each side of them.
@@ -136,34 +136,9 @@ fn points(mesh: &Mesh, triangles: &[usize]) -> Vec<(DVec3, DVec3)> {
 
 /// The triangles of each connected part: of one place in space are corners that may be different vertices.
 fn connected(mesh: &Mesh) -> Vec<Vec<usize>> {
-    fn root(parent: &mut [usize], of: usize) -> usize {
-        let mut of = of;
-        while parent[of] != of {
-            parent[of] = parent[parent[of]];
-            of = parent[of];
-        }
-        of
-    }
-    let mut parent: Vec<usize> = (0..mesh.triangles.len()).collect();
-    let mut first: HashMap<[u64; 3], usize> = HashMap::new();
-    for triangle in 0..mesh.triangles.len() {
-        for corner in mesh.corners(triangle) {
-            // Adding zero makes -0 the same as 0.
-            let other = *first.entry(corner.to_array().map(|number| (number + 0.0).to_bits())).or_insert(triangle);
-            let (one, two) = (root(&mut parent, triangle), root(&mut parent, other));
-            parent[one.max(two)] = one.min(two);
-        }
-    }
-    let mut parts: HashMap<usize, Vec<usize>> = HashMap::new();
-    for triangle in 0..mesh.triangles.len() {
-        parts.entry(root(&mut parent, triangle)).or_default().push(triangle);
-    }
-    if parts.len() > MOST_PARTS {
-        return vec![(0..mesh.triangles.len()).collect()];
-    }
-    let mut parts: Vec<Vec<usize>> = parts.into_values().collect();
-    parts.sort();
-    parts
+    let triangles = 0..mesh.triangles.len();
+    let parts = connection::connected(triangles.clone().map(|triangle| mesh.corners(triangle).map(connection::bits)));
+    if parts.len() > MOST_PARTS { vec![triangles.collect()] } else { parts }
 }
 
 /// Of each triangle 1 where it is of a closed part that faces outwards, -1 where of one that faces inwards, else 0. One that has a

@@ -149,7 +149,7 @@ fn charts(meshes: &[&Mesh], texels_per_metre: f64, max_side: u32) -> Result<Unwr
     let positions: Vec<Vec<[f32; 3]>> = meshes.iter().map(positions).collect();
     let indices: Vec<&[u32]> = meshes.iter().map(|mesh| mesh.triangles.as_flattened()).collect();
     let inputs: Vec<MeshInput> = positions.iter().zip(indices).map(|(positions, indices)| MeshInput::new(positions, indices)).collect();
-    let area: f64 = meshes.iter().map(|mesh| (0..mesh.triangles.len()).map(|triangle| mesh.area(triangle)).sum::<f64>()).sum();
+    let area: f64 = meshes.iter().map(|mesh| mesh.whole_area()).sum();
     let triangle_count: usize = meshes.iter().map(|mesh| mesh.triangles.len()).sum();
 
     // Above 0 as a 32-bit float, however small the mesh.

@@ -5,7 +5,9 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use glam::{DVec3, Vec3};
 
+use super::connected::bits;
 use super::contact::{self, Contact, Kind};
+use super::frame::{Frame, has_area};
 use super::overlap::{self, Sheet};
 use super::planes::IN_PLANE;
 use super::{Mesh, Scene};
@@ -45,20 +47,16 @@ impl Offsets {
 
     /// Those that a scene needs.
     pub fn of(scene: &Scene, kinds: &[Kind]) -> Offsets {
-        let (min, max) = scene.bounds();
-        let (centre, extent) = (0.5 * (min + max), (max - min).max_element());
-        if kinds.iter().all(|kind| *kind == Kind::Opaque) || !extent.is_normal() {
+        if kinds.iter().all(|kind| *kind == Kind::Opaque) {
             return Offsets::default();
         }
-        // As scenes are normalised.
-        let unit = 2f64.powi(extent.log2().ceil() as i32);
+        let Ok(frame) = Frame::of(scene) else { return Offsets::default() };
+        let unit = frame.unit;
         let numbers = |mesh: usize| (0..scene.meshes[mesh].triangles.len() as u32).map(move |triangle| (mesh as u32, triangle));
-        let is_wide = |corners: &[Vec3; 3]| (corners[1] - corners[0]).cross(corners[2] - corners[0]).length_squared() >= f32::MIN_POSITIVE;
-        let local = |position: DVec3| ((position - centre) / unit).as_vec3();
         let triangles = (0..scene.meshes.len()).flat_map(numbers);
         let (sources, corners): (Vec<(u32, u32)>, Vec<[Vec3; 3]>) = triangles
-            .map(|(mesh, triangle)| ((mesh, triangle), scene.meshes[mesh as usize].corners(triangle as usize).map(local)))
-            .filter(|(_, corners)| is_wide(corners))
+            .map(|(mesh, triangle)| ((mesh, triangle), scene.meshes[mesh as usize].corners(triangle as usize).map(|at| frame.local(at))))
+            .filter(|(_, corners)| has_area(corners))
             .unzip();
         let kind_of = |triangle: u32| kinds[sources[triangle as usize].0 as usize];
         let is_candidate = |triangle: u32| kind_of(triangle) != Kind::Opaque;
@@ -108,11 +106,6 @@ pub fn apply(scene: &mut Scene) {
     for ((mesh, vertex), way) in Offsets::of(scene, &contact::kinds(scene)).0 {
         scene.meshes[mesh as usize].positions[vertex as usize] += way;
     }
-}
-
-/// The sum turns -0 into 0.
-fn bits(position: DVec3) -> [u64; 3] {
-    (position + DVec3::ZERO).to_array().map(f64::to_bits)
 }
 
 /// Whether two triangles have the same corners and face the same way.

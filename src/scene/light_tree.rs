@@ -8,7 +8,7 @@ use std::ops::Range;
 use glam::Vec3;
 
 use super::geometry::Geometry;
-use super::targets::connected;
+use super::targets::groups_of;
 use crate::constants::*;
 use crate::records::{Emitter, LightNode};
 
@@ -46,7 +46,7 @@ pub fn is_one_lamp(geometry: &Geometry) -> bool {
     let triangles = || numbers.iter().map(|number| &geometry.triangles[*number as usize]);
     let plane = geometry.triangles[emitters[0].triangle as usize].plane;
     triangles().all(|triangle| triangle.plane == plane)
-        && connected(&triangles().map(|triangle| [triangle.a, triangle.b, triangle.c]).collect::<Vec<_>>()).len() == 1
+        && groups_of(&triangles().map(|triangle| [triangle.a, triangle.b, triangle.c]).collect::<Vec<_>>()).len() == 1
 }
 
 /// Where a light is, and its share of the power.

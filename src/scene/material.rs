@@ -1,8 +1,10 @@
 //! What surfaces are made of.
 
-use glam::{DVec2, Vec3};
+use glam::Vec3;
 
-use crate::constants::{DELTA_ALPHA_INVERSE, MAP_ALPHA_PER_MILLE};
+pub use super::layers::{Layers, Medium, NormalMap, TextureUse, UvTransform};
+use crate::constants::{DELTA_ALPHA_INVERSE, LAYER_NORMAL, MAP_ALPHA_PER_MILLE};
+use crate::settings::scene::Effect;
 
 /// How a surface scatters light. Its base colour is the share it scatters, per channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,51 +30,6 @@ pub enum Surface {
     Layered,
 }
 
-/// A texture, the set of coordinates that it is looked up with, and where these lead.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TextureUse {
-    pub texture: usize,
-    pub uv_set: usize,
-    pub transform: UvTransform,
-}
-
-/// What becomes of texture coordinates before a texture is looked up: they are scaled, then turned, then moved
-/// (KHR_texture_transform).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct UvTransform {
-    pub scale: DVec2,
-    /// Radians, from u = 1 towards v = -1.
-    pub rotation: f64,
-    pub offset: DVec2,
-}
-
-impl UvTransform {
-    pub const NONE: UvTransform = UvTransform { scale: DVec2::ONE, rotation: 0.0, offset: DVec2::ZERO };
-
-    pub fn apply(&self, uv: DVec2) -> DVec2 {
-        if *self == UvTransform::NONE {
-            return uv;
-        }
-        let (sine, cosine) = self.rotation.sin_cos();
-        let DVec2 { x: u, y: v } = self.scale * uv;
-        self.offset + DVec2::new(cosine * u + sine * v, cosine * v - sine * u)
-    }
-}
-
-impl TextureUse {
-    /// As coordinates have it.
-    pub fn of(texture: usize, uv_set: usize) -> TextureUse {
-        TextureUse { texture, uv_set, transform: UvTransform::NONE }
-    }
-}
-
-/// Normals in the frame of tangent, bitangent and normal, as codes from -1 to 1; `scale` multiplies the first two.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct NormalMap {
-    pub texture: TextureUse,
-    pub scale: f32,
-}
-
 /// How much of a surface is there: the share of light that it stops.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Coverage {
@@ -86,146 +43,6 @@ pub enum Coverage {
     Blend {
         alpha: f32,
     },
-}
-
-/// What a transmissive surface encloses.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Medium {
-    /// Share of the light that is left after so many metres, per channel; 1: all of it.
-    pub transmittance: Vec3,
-    pub metres: f32,
-}
-
-impl Medium {
-    pub const CLEAR: Medium = Medium { transmittance: Vec3::ONE, metres: 1.0 };
-}
-
-/// glTF's metallic-roughness model and what its extensions add. Factors multiply textures; the guide's page
-/// [materials](crate::guide::materials) has the formulas.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Layers {
-    pub metallic: f32,
-    pub roughness: f32,
-    /// Roughness in green, metalness in blue.
-    pub metallic_roughness_texture: Option<TextureUse>,
-    /// How much rougher the base is along one direction than across it, 0 to 1; the texture has it in blue.
-    pub anisotropy: f32,
-    /// Radians that turn the direction counter-clockwise from the tangent; the texture has a direction in red and green, from -1 to 1.
-    pub anisotropy_rotation: f32,
-    pub anisotropy_texture: Option<TextureUse>,
-    /// Of the dielectric; 0: it reflects as if the index were infinite.
-    pub ior: f32,
-    /// Scales what the dielectric reflects; the texture has it in alpha.
-    pub specular: f32,
-    pub specular_texture: Option<TextureUse>,
-    /// Tints what the dielectric reflects along the normal.
-    pub specular_colour: Vec3,
-    pub specular_colour_texture: Option<TextureUse>,
-    /// Share of what enters the dielectric that it lets through; the texture has it in red.
-    pub transmission: f32,
-    pub transmission_texture: Option<TextureUse>,
-    /// Share of the diffuse lobe that scatters to the other side; the texture has it in alpha.
-    pub diffuse_transmission: f32,
-    pub diffuse_transmission_texture: Option<TextureUse>,
-    pub diffuse_transmission_colour: Vec3,
-    pub diffuse_transmission_colour_texture: Option<TextureUse>,
-    /// `None`: a thin wall.
-    pub medium: Option<Medium>,
-    /// 20 over the Abbe number of what it encloses; 0: all colours have the same index.
-    pub dispersion: f32,
-    /// Share of the surface under a thin film; the texture has it in red.
-    pub iridescence: f32,
-    pub iridescence_texture: Option<TextureUse>,
-    pub film_ior: f32,
-    /// Nanometres, where the texture is 0 and where it is 1, or missing; it has them in green.
-    pub film_thickness: [f32; 2],
-    pub film_thickness_texture: Option<TextureUse>,
-    /// Share of the surface under a clear coat; the texture has it in red.
-    pub coat: f32,
-    pub coat_texture: Option<TextureUse>,
-    pub coat_roughness: f32,
-    /// In green.
-    pub coat_roughness_texture: Option<TextureUse>,
-    /// The coat's own; without one it has the normals of the mesh.
-    pub coat_normal_map: Option<NormalMap>,
-    pub sheen_colour: Vec3,
-    pub sheen_colour_texture: Option<TextureUse>,
-    pub sheen_roughness: f32,
-    /// In alpha.
-    pub sheen_roughness_texture: Option<TextureUse>,
-    /// The base colour is shown to the eye as radiance, W/m2/sr; no lobe is left.
-    pub is_unlit: bool,
-}
-
-impl Layers {
-    /// Half of what lies between its indices of refraction for red and for blue (KHR_materials_dispersion).
-    pub fn ior_spread(&self) -> f32 {
-        // Of more than the range of indices nothing is left to see.
-        (0.5 * (self.ior - 1.0).max(0.0) * (self.dispersion / 20.0)).min(100.0)
-    }
-
-    /// The factors alone.
-    pub fn without_textures(&self) -> Layers {
-        Layers {
-            metallic_roughness_texture: None,
-            anisotropy_texture: None,
-            specular_texture: None,
-            specular_colour_texture: None,
-            transmission_texture: None,
-            diffuse_transmission_texture: None,
-            diffuse_transmission_colour_texture: None,
-            iridescence_texture: None,
-            film_thickness_texture: None,
-            coat_texture: None,
-            coat_roughness_texture: None,
-            coat_normal_map: None,
-            sheen_colour_texture: None,
-            sheen_roughness_texture: None,
-            ..*self
-        }
-    }
-}
-
-impl Default for Layers {
-    /// What a glTF material is that says nothing.
-    fn default() -> Layers {
-        Layers {
-            metallic: 1.0,
-            roughness: 1.0,
-            metallic_roughness_texture: None,
-            anisotropy: 0.0,
-            anisotropy_rotation: 0.0,
-            anisotropy_texture: None,
-            ior: 1.5,
-            specular: 1.0,
-            specular_texture: None,
-            specular_colour: Vec3::ONE,
-            specular_colour_texture: None,
-            transmission: 0.0,
-            transmission_texture: None,
-            diffuse_transmission: 0.0,
-            diffuse_transmission_texture: None,
-            diffuse_transmission_colour: Vec3::ONE,
-            diffuse_transmission_colour_texture: None,
-            medium: None,
-            dispersion: 0.0,
-            iridescence: 0.0,
-            iridescence_texture: None,
-            film_ior: 1.3,
-            film_thickness: [100.0, 400.0],
-            film_thickness_texture: None,
-            coat: 0.0,
-            coat_texture: None,
-            coat_roughness: 0.0,
-            coat_roughness_texture: None,
-            coat_normal_map: None,
-            sheen_colour: Vec3::ZERO,
-            sheen_colour_texture: None,
-            sheen_roughness: 0.0,
-            sheen_roughness_texture: None,
-            is_unlit: false,
-        }
-    }
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -397,28 +214,41 @@ impl Material {
         self.surface == Surface::Layered && self.coverage == Coverage::Blend { alpha: 0.0 }
     }
 
+    /// Takes away what needs an effect.
+    pub fn leave_out(&mut self, effect: Effect) {
+        let layers = &mut self.layers;
+        match effect {
+            Effect::MeshLights => self.emission = Vec3::ZERO,
+            Effect::Glossy if matches!(self.surface, Surface::Glossy { .. }) => self.surface = Surface::Lambert,
+            Effect::Layers if self.surface == Surface::Layered => self.surface = Surface::Lambert,
+            Effect::Transmission => layers.transmission = 0.0,
+            Effect::Media => layers.medium = layers.medium.map(|_| Medium::CLEAR),
+            Effect::DiffuseTransmission => layers.diffuse_transmission = 0.0,
+            Effect::Anisotropy => layers.anisotropy = 0.0,
+            Effect::Iridescence => layers.iridescence = 0.0,
+            Effect::Dispersion => layers.dispersion = 0.0,
+            Effect::ClearCoat => layers.coat = 0.0,
+            Effect::Sheen => layers.sheen_colour = Vec3::ZERO,
+            Effect::NormalMaps => (self.normal_map, layers.coat_normal_map) = (None, None),
+            Effect::Alpha => self.coverage = Coverage::Whole,
+            Effect::TwoSided => self.two_sided = false,
+            Effect::Textures => {
+                (self.base_colour_texture, self.emission_texture, self.normal_map) = (None, None, None);
+                *layers = layers.without_textures();
+            }
+            _ => {}
+        }
+    }
+
     /// Every use of a texture.
     pub fn textures(&self) -> impl Iterator<Item = TextureUse> + use<> {
-        let layers = &self.layers;
-        let maps = [self.normal_map, layers.coat_normal_map].map(|map| map.map(|map| map.texture));
-        let textures = [
-            self.base_colour_texture,
-            self.emission_texture,
-            layers.metallic_roughness_texture,
-            layers.anisotropy_texture,
-            layers.specular_texture,
-            layers.specular_colour_texture,
-            layers.transmission_texture,
-            layers.diffuse_transmission_texture,
-            layers.diffuse_transmission_colour_texture,
-            layers.iridescence_texture,
-            layers.film_thickness_texture,
-            layers.coat_texture,
-            layers.coat_roughness_texture,
-            layers.sheen_colour_texture,
-            layers.sheen_roughness_texture,
-        ];
-        textures.into_iter().chain(maps).flatten()
+        let plain = [self.base_colour_texture, self.emission_texture];
+        plain.into_iter().flatten().chain(self.layer_textures().map(|(_, used)| used))
+    }
+
+    /// Those beside the textures of base colour and emission, with the numbers that kernels know them by.
+    pub fn layer_textures(&self) -> impl Iterator<Item = (u32, TextureUse)> + use<> {
+        self.layers.textures().chain(self.normal_map.map(|map| (LAYER_NORMAL, map.texture)))
     }
 
     /// Which set of texture coordinates its tangents follow, and how they are transformed; `None`: it needs no tangents.
@@ -430,8 +260,7 @@ impl Material {
 
     /// Whether it uses textures beside those of base colour and emission.
     pub fn has_layer_textures(&self) -> bool {
-        let plain = usize::from(self.base_colour_texture.is_some()) + usize::from(self.emission_texture.is_some());
-        self.surface == Surface::Layered && self.textures().count() > plain
+        self.surface == Surface::Layered && self.layer_textures().next().is_some()
     }
 
     pub fn is_emissive(&self) -> bool {

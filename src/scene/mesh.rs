@@ -74,6 +74,11 @@ impl Mesh {
         0.5 * Mesh::doubled_area(self.corners(triangle)).length()
     }
 
+    /// Of all triangles.
+    pub fn whole_area(&self) -> f64 {
+        (0..self.triangles.len()).map(|triangle| self.area(triangle)).sum()
+    }
+
     /// Unit normal of a triangle's front.
     pub fn normal(&self, triangle: usize) -> DVec3 {
         Mesh::doubled_area(self.corners(triangle)).normalize()

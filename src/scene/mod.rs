@@ -5,14 +5,18 @@ pub mod albedo;
 pub mod built_in;
 pub mod bvh;
 pub mod camera;
+mod choices;
 pub mod closed_forms;
+pub mod connected;
 pub mod contact;
 pub mod contact_offsets;
 pub mod daylight;
 pub mod file;
 pub mod film;
+pub mod frame;
 pub mod geometry;
 pub mod gltf;
+pub mod layers;
 pub mod light;
 pub mod light_tree;
 pub mod linear_picture;
@@ -38,7 +42,7 @@ use std::borrow::Cow;
 use std::collections::HashMap;
 use std::path::Path;
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
 pub use camera::{Camera, Lens, Projection};
@@ -49,7 +53,6 @@ pub use texture::Texture;
 
 use crate::error::{Error, Result};
 use crate::settings::scene::Effect;
-use material::{Coverage, Medium};
 
 /// Called with what is being done while a scene is opened, and the share of it that is done.
 pub type Progress<'a> = &'a mut dyn FnMut(&'static str, f64);
@@ -136,55 +139,7 @@ impl Scene {
             });
         }
         for material in &mut scene.materials {
-            if lacks(Effect::MeshLights) {
-                material.emission = Vec3::ZERO;
-            }
-            if lacks(Effect::Glossy) && matches!(material.surface, Surface::Glossy { .. }) {
-                material.surface = Surface::Lambert;
-            }
-            if lacks(Effect::Layers) && material.surface == Surface::Layered {
-                material.surface = Surface::Lambert;
-            }
-            if lacks(Effect::Transmission) {
-                material.layers.transmission = 0.0;
-            }
-            if lacks(Effect::Media) {
-                material.layers.medium = material.layers.medium.map(|_| Medium::CLEAR);
-            }
-            if lacks(Effect::DiffuseTransmission) {
-                material.layers.diffuse_transmission = 0.0;
-            }
-            if lacks(Effect::Anisotropy) {
-                material.layers.anisotropy = 0.0;
-            }
-            if lacks(Effect::Iridescence) {
-                material.layers.iridescence = 0.0;
-            }
-            if lacks(Effect::Dispersion) {
-                material.layers.dispersion = 0.0;
-            }
-            if lacks(Effect::ClearCoat) {
-                material.layers.coat = 0.0;
-            }
-            if lacks(Effect::Sheen) {
-                material.layers.sheen_colour = Vec3::ZERO;
-            }
-            if lacks(Effect::NormalMaps) {
-                material.normal_map = None;
-                material.layers.coat_normal_map = None;
-            }
-            if lacks(Effect::Alpha) {
-                material.coverage = Coverage::Whole;
-            }
-            if lacks(Effect::TwoSided) {
-                material.two_sided = false;
-            }
-            if lacks(Effect::Textures) {
-                material.base_colour_texture = None;
-                material.emission_texture = None;
-                material.normal_map = None;
-                material.layers = material.layers.without_textures();
-            }
+            effects.iter().for_each(|effect| material.leave_out(*effect));
         }
         Cow::Owned(scene)
     }

@@ -8,6 +8,7 @@ use std::path::Path;
 use glam::{DQuat, DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::choices::{CHOICES, deal};
 use super::linear_picture::{self, LinearPicture};
 use super::texture::{Filter, Texels, Texture, Wrap};
 use crate::text::counted;
@@ -16,8 +17,6 @@ use crate::text::counted;
 /// cell is noise, and no bias.
 const COLUMNS: RangeInclusive<u32> = 512..=2048;
 const ROWS: RangeInclusive<u32> = 256..=1024;
-/// Values that a random choice of a row, or of a cell in it, can take.
-const CHOICES: f64 = (1 << 24) as f64;
 /// Of the brightest cell, what others have at least that belong to the brightest part.
 const BRIGHT: f64 = 0.25;
 /// Most of the light samples that leave the cosine's directions for the table's, however small the sun.
@@ -138,24 +137,15 @@ impl Sky {
         let edge_cosine = |edge: u32| (PI * f64::from(edge) / f64::from(rows)).cos();
         let cells_of = |row: u32| {
             let near_rows = near(row, rows, height);
-            let total: f64 = near_rows.iter().map(|(_, share)| share).sum();
             // The mean of the rows, then of the texels whose tents reach into a cell; and the largest of them.
             let column = |i: i64| {
-                let of = |sums: (DVec3, f64), &(j, share): &(i64, f64)| {
+                mean_and_most(&near_rows, |j| {
                     let value = texel(i, j.clamp(0, i64::from(height) - 1) as usize);
-                    (sums.0 + share / total * value, sums.1.max(value.max_element()))
-                };
-                near_rows.iter().fold((DVec3::ZERO, 0.0), of)
+                    (value, value.max_element())
+                })
             };
-            let means: Vec<(DVec3, f64)> = (0..i64::from(width)).map(column).collect();
-            let cell = |near_columns: &Vec<(i64, f64)>| {
-                let total: f64 = near_columns.iter().map(|(_, share)| share).sum();
-                let add = |sums: (DVec3, f64), &(i, share): &(i64, f64)| {
-                    let (mean, most) = means[i.rem_euclid(i64::from(width)) as usize];
-                    (sums.0 + share / total * mean, sums.1.max(most))
-                };
-                near_columns.iter().fold((DVec3::ZERO, 0.0), add)
-            };
+            let columns: Vec<(DVec3, f64)> = (0..i64::from(width)).map(column).collect();
+            let cell = |near_columns: &Vec<(i64, f64)>| mean_and_most(near_columns, |i| columns[i.rem_euclid(i64::from(width)) as usize]);
             near_columns.iter().map(cell).collect::<Vec<(DVec3, f64)>>()
         };
         // By row, so that the cells of all at once need no memory.
@@ -248,19 +238,21 @@ fn near(of: u32, cells: u32, size: u32) -> Vec<(i64, f64)> {
     texels.map(|texel| (texel, share(texel))).filter(|(_, share)| *share > 0.0).collect()
 }
 
-/// Whole choices out of 2^24 over 2^24, at least one each, by weight; even where nothing weighs.
+/// Of what some places have by their shares, and the largest of all.
+fn mean_and_most(near: &[(i64, f64)], of: impl Fn(i64) -> (DVec3, f64)) -> (DVec3, f64) {
+    let total: f64 = near.iter().map(|(_, share)| share).sum();
+    near.iter().fold((DVec3::ZERO, 0.0), |(sum, most), (place, share)| {
+        let (value, own) = of(*place);
+        (sum + share / total * value, most.max(own))
+    })
+}
+
+/// Of choices, at least one each, by weight; even where nothing weighs.
 fn shares(weights: &[f64]) -> Vec<f64> {
     let sum: f64 = weights.iter().sum();
-    let free = CHOICES - weights.len() as f64;
-    let (mut before, mut dealt) = (0.0, 0.0);
-    let of_weight = |(number, weight): (usize, &f64)| {
-        before += if sum > 0.0 { weight / sum } else { 1.0 / weights.len() as f64 };
-        let until = if number + 1 == weights.len() { free } else { (before * free).round().clamp(dealt, free) };
-        let own = until - dealt;
-        dealt = until;
-        (own + 1.0) / CHOICES
-    };
-    weights.iter().enumerate().map(of_weight).collect()
+    let share = |weight: &f64| if sum > 0.0 { weight / sum } else { 1.0 / weights.len() as f64 };
+    let dealt = deal(&weights.iter().map(share).collect::<Vec<_>>());
+    dealt.into_iter().map(|choices| f64::from(choices) / f64::from(CHOICES)).collect()
 }
 
 fn cumulative(shares: &[f64]) -> Vec<u32> {
@@ -408,7 +400,7 @@ mod tests {
     #[test]
     fn shares_are_whole_choices_that_leave_none_out() {
         let found = shares(&[0.0, 1.0, 1e-30, 3.0]);
-        assert!(found.iter().all(|share| *share >= 1.0 / CHOICES));
+        assert!(found.iter().all(|share| *share >= 1.0 / f64::from(CHOICES)));
         assert!((found.iter().sum::<f64>() - 1.0).abs() < 1e-12 && (found[3] - 0.75).abs() < 1e-6);
     }
 }

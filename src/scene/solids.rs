@@ -1,10 +1,12 @@
 //! Solids that light enters, as closed shells of triangles: which way they face, how many lie in one another, and which of these counts.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 
-use super::Scene;
+use super::connected::{bits, connected};
+use super::layers::Medium;
+use super::{Material, Scene};
 
 /// Triangles that are connected by their corners' places, of one material.
 struct Shell {
@@ -87,45 +89,15 @@ fn shells(scene: &Scene, corners_of: impl Fn(u32, u32) -> [DVec3; 3]) -> BTreeMa
 }
 
 fn shells_of(scene: &Scene, meshes: &[u32], corners_of: impl Fn(u32, u32) -> [DVec3; 3]) -> Vec<Shell> {
-    // Places that are connected have one root.
-    let mut places: HashMap<[u64; 3], usize> = HashMap::new();
-    let mut roots: Vec<usize> = Vec::new();
-    fn root_of(roots: &mut [usize], mut place: usize) -> usize {
-        while roots[place] != place {
-            roots[place] = roots[roots[place]];
-            place = roots[place];
-        }
-        place
-    }
-    let mut all: Vec<((u32, u32), [DVec3; 3], usize)> = Vec::new();
-    for mesh in meshes {
-        for triangle in 0..scene.meshes[*mesh as usize].triangles.len() as u32 {
-            let corners = corners_of(*mesh, triangle);
-            let own = corners.map(|corner| {
-                // The sum turns -0 into 0.
-                let next = roots.len();
-                let place = *places.entry((corner + DVec3::ZERO).to_array().map(f64::to_bits)).or_insert(next);
-                if place == next {
-                    roots.push(next);
-                }
-                root_of(&mut roots, place)
-            });
-            own.iter().for_each(|place| {
-                let (a, b) = (root_of(&mut roots, own[0]), root_of(&mut roots, *place));
-                roots[b] = a;
-            });
-            all.push(((*mesh, triangle), corners, own[0]));
-        }
-    }
-    let mut by_root: BTreeMap<usize, Shell> = BTreeMap::new();
-    for (source, corners, place) in all {
-        let empty = || Shell { triangles: Vec::new(), corners: Vec::new(), min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
-        let shell = by_root.entry(root_of(&mut roots, place)).or_insert_with(empty);
-        shell.triangles.push(source);
-        shell.corners.push(corners);
-        corners.iter().for_each(|corner| (shell.min, shell.max) = (shell.min.min(*corner), shell.max.max(*corner)));
-    }
-    by_root.into_values().collect()
+    let triangles = meshes.iter().flat_map(|mesh| (0..scene.meshes[*mesh as usize].triangles.len() as u32).map(move |of| (*mesh, of)));
+    let all: Vec<((u32, u32), [DVec3; 3])> = triangles.map(|(mesh, triangle)| ((mesh, triangle), corners_of(mesh, triangle))).collect();
+    let shell = |group: Vec<usize>| {
+        let (triangles, corners): (Vec<(u32, u32)>, Vec<[DVec3; 3]>) = group.into_iter().map(|place| all[place]).unzip();
+        let min = corners.iter().flatten().fold(DVec3::INFINITY, |min, corner| min.min(*corner));
+        let max = corners.iter().flatten().fold(DVec3::NEG_INFINITY, |max, corner| max.max(*corner));
+        Shell { triangles, corners, min, max }
+    };
+    connected(all.iter().map(|(_, corners)| corners.map(bits))).into_iter().map(shell).collect()
 }
 
 /// Turns closed solids whose faces look inwards, and returns the names of their meshes. A shell that looks inwards within another of its
@@ -211,12 +183,14 @@ pub enum Order {
     Unclear(u32),
 }
 
+/// What makes solids' media different: index of refraction, its spread over colours, and what is absorbed.
+pub fn medium(material: &Material) -> Option<(f32, f32, Medium)> {
+    material.enclosed_medium().map(|medium| (material.layers.ior, material.layers.ior_spread(), medium))
+}
+
 /// As far as places just inside of their shells tell.
 pub fn order(scene: &Scene) -> Order {
-    let medium = |material: usize| {
-        let of = &scene.materials[material];
-        of.enclosed_medium().map(|medium| (of.layers.ior, of.layers.ior_spread(), medium))
-    };
+    let medium = |material: usize| medium(&scene.materials[material]);
     let mut media = scene.meshes.iter().filter_map(|mesh| medium(mesh.material));
     let Some(first) = media.next() else { return Order::Entry };
     if media.all(|other| other == first) {

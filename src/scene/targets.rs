@@ -1,11 +1,11 @@
 //! Where caustics begin: a few spheres that hold every surface which makes them. Photons of a caustic map are aimed at
 //! these (projection maps, Jensen 1996, section 3); see `glsl/world/scene/aim.glsl`.
 
-use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
 
 use glam::{DVec3, Vec3};
 
+use super::connected::{bits, connected};
 use super::geometry::Geometry;
 use crate::constants::*;
 use crate::records::{CausticTarget, Emitter};
@@ -32,36 +32,15 @@ struct Sphere {
 pub fn caustic_targets(geometry: &Geometry, is_wanted: &[bool]) -> Vec<CausticTarget> {
     let wanted = geometry.triangles.iter().filter(|triangle| triangle.plane < HIDDEN && is_wanted[triangle.material as usize]);
     let mut groups = Vec::new();
-    gathered(connected(&wanted.map(|triangle| [triangle.a, triangle.b, triangle.c]).collect::<Vec<_>>()), MAX_GROUPS_MERGED, &mut groups);
+    gathered(groups_of(&wanted.map(|triangle| [triangle.a, triangle.b, triangle.c]).collect::<Vec<_>>()), MAX_GROUPS_MERGED, &mut groups);
     merged(groups).iter().map(|points| target(points)).collect()
 }
 
 /// Corners of the triangles, those that share corners together.
-pub(super) fn connected(triangles: &[[Vec3; 3]]) -> Vec<Vec<DVec3>> {
-    fn root(parents: &mut [usize], mut place: usize) -> usize {
-        while parents[place] != place {
-            parents[place] = parents[parents[place]];
-            place = parents[place];
-        }
-        place
-    }
-    let mut parents: Vec<usize> = (0..triangles.len()).collect();
-    let mut first_with = HashMap::new();
-    for (triangle, corners) in triangles.iter().enumerate() {
-        for corner in corners {
-            // The sum turns -0 into 0.
-            let bits = (*corner + Vec3::ZERO).to_array().map(f32::to_bits);
-            let other = *first_with.entry(bits).or_insert(triangle);
-            let (a, b) = (root(&mut parents, triangle), root(&mut parents, other));
-            parents[a.max(b)] = a.min(b);
-        }
-    }
-    let mut groups: Vec<Vec<DVec3>> = vec![Vec::new(); triangles.len()];
-    for (triangle, corners) in triangles.iter().enumerate() {
-        groups[root(&mut parents, triangle)].extend(corners.map(Vec3::as_dvec3));
-    }
-    groups.retain(|group| !group.is_empty());
-    groups
+pub(super) fn groups_of(triangles: &[[Vec3; 3]]) -> Vec<Vec<DVec3>> {
+    let corners = |triangle: &usize| triangles[*triangle].map(Vec3::as_dvec3);
+    let groups = connected(triangles.iter().map(|corners| corners.map(|corner| bits(corner.as_dvec3()))));
+    groups.iter().map(|group| group.iter().flat_map(corners).collect()).collect()
 }
 
 /// At most so many groups, a power of two: the two halves along the longest axis, and so on.

@@ -10,6 +10,7 @@ use crate::common::program::entries;
 use photonmill::bake::{self, Layout, MAX_SIDE, Map, MeshLightmap, PHASE_COUNT, TexelEstimate};
 use photonmill::engine::scene::View;
 use photonmill::output::destination::Folder;
+use photonmill::scene::layers::{PARAMETERS, Parameter};
 use photonmill::scene::material::{Coverage, Layers, Medium, NormalMap};
 use photonmill::scene::texture::Filter;
 
@@ -477,28 +478,16 @@ fn as_gltf(material: &Material) -> Material {
 }
 
 /// The uses of textures that a material has, taken out of it.
-fn take_textures(material: &mut Material) -> [Option<TextureUse>; 17] {
-    let layers = &mut material.layers;
+fn take_textures(material: &mut Material) -> Vec<Option<TextureUse>> {
     let one = |map: &mut Option<NormalMap>| map.as_mut().map(|map| std::mem::replace(&mut map.texture, TextureUse::of(0, 0)));
-    [
-        one(&mut material.normal_map),
-        one(&mut layers.coat_normal_map),
-        material.base_colour_texture.take(),
-        material.emission_texture.take(),
-        layers.metallic_roughness_texture.take(),
-        layers.specular_texture.take(),
-        layers.specular_colour_texture.take(),
-        layers.transmission_texture.take(),
-        layers.coat_texture.take(),
-        layers.coat_roughness_texture.take(),
-        layers.sheen_colour_texture.take(),
-        layers.diffuse_transmission_texture.take(),
-        layers.iridescence_texture.take(),
-        layers.anisotropy_texture.take(),
-        layers.film_thickness_texture.take(),
-        layers.diffuse_transmission_colour_texture.take(),
-        layers.sheen_roughness_texture.take(),
-    ]
+    let layers = &mut material.layers;
+    let of_layers = PARAMETERS.iter().flat_map(|(_, members)| *members).filter_map(|(_, parameter)| match parameter {
+        Parameter::NumberTexture(_, of) | Parameter::ColourTexture(_, of) => Some(of(layers).take()),
+        Parameter::NormalMap(_, of) => Some(one(of(layers))),
+        Parameter::Number(..) | Parameter::Colour(..) => None,
+    });
+    let plain = [one(&mut material.normal_map), material.base_colour_texture.take(), material.emission_texture.take()];
+    plain.into_iter().chain(of_layers).collect()
 }
 
 fn assert_same_materials(written: &Scene, scene: &Scene) {

@@ -12,13 +12,12 @@ use crate::constants::*;
 use crate::error::Result;
 use crate::records::{Emitter, LayeredMaterial, SurfaceMaterial, TextureInfo, Triangle};
 use crate::scene::Scene;
+use crate::scene::choices::{CHOICES, deal};
 use crate::scene::light::LightKind;
 use crate::scene::sky::Sky;
 use crate::settings::EmissionLaw;
 
 const MAX_EMITTERS: usize = 1 << 22;
-/// Values that a random choice of emitter can take.
-const CHOICES: u32 = 1 << 24;
 
 impl Geometry {
     pub(super) fn add_emitters(&mut self, scene: &Scene) -> Result<()> {
@@ -64,7 +63,7 @@ impl Geometry {
             return Err(refuse(scene, "the scene", reason));
         }
         self.power = found.iter().map(|found| found.weight).sum();
-        let choices = choices(&found.iter().map(|found| found.weight / self.power).collect::<Vec<_>>());
+        let choices = deal(&found.iter().map(|found| found.weight / self.power).collect::<Vec<_>>());
         let mut before = 0;
         for (found, choices) in found.iter_mut().zip(&choices) {
             found.emitter.probability = *choices as f32 / CHOICES as f32;
@@ -84,7 +83,7 @@ impl Geometry {
     pub fn emitters_by(&self, shares: &[f64]) -> (Vec<Emitter>, f64) {
         let mut emitters = self.emitters.clone();
         let mut before = 0;
-        for (emitter, choices) in emitters.iter_mut().zip(choices(shares)) {
+        for (emitter, choices) in emitters.iter_mut().zip(deal(shares)) {
             before += choices;
             let probability = choices as f32 / CHOICES as f32;
             emitter.flux *= emitter.probability / probability;
@@ -286,30 +285,6 @@ struct Found {
     brightest: f64,
 }
 
-/// Deals the choices of a random number to emitters by their share, at least one to each, so that the
-/// probability that a kernel divides by is the one with which it chose.
-fn choices(shares: &[f64]) -> Vec<u32> {
-    if shares.is_empty() {
-        return Vec::new();
-    }
-    let free = f64::from(CHOICES - shares.len() as u32);
-    let mut dealt = 0u32;
-    let mut sum = 0.0;
-    let mut choices: Vec<u32> = shares
-        .iter()
-        .map(|share| {
-            sum += share;
-            let until = (sum * free).round().min(free) as u32;
-            let own = until.saturating_sub(dealt);
-            dealt += own;
-            own + 1
-        })
-        .collect();
-    // What rounding of the shares' sum left over.
-    *choices.last_mut().expect("there is a share") += free as u32 - dealt;
-    choices
-}
-
 /// How an emitter's record holds a piece of a triangle.
 fn piece_record(piece: Piece) -> Vec3 {
     piece.corner.extend(piece.width).as_vec3()
@@ -329,19 +304,6 @@ mod tests {
     use super::*;
     use crate::scene::texture::Wrap;
     use crate::scene::{Material, Mesh, Texture, built_in, work};
-
-    #[test]
-    fn choices_follow_the_shares_and_leave_none_out() {
-        let mut shares = vec![1e-12; 1000];
-        shares.push(0.25);
-        shares.push(0.75 - 1e-9);
-        let dealt = choices(&shares);
-        assert_eq!(dealt.iter().map(|choices| u64::from(*choices)).sum::<u64>(), u64::from(CHOICES));
-        assert!(dealt.iter().all(|choices| *choices >= 1));
-        assert!((f64::from(dealt[1000]) / f64::from(CHOICES) - 0.25).abs() < 1e-4);
-        assert!(choices(&[]).is_empty());
-        assert_eq!(choices(&[1.0]), [CHOICES]);
-    }
 
     fn texture(width: u32, height: u32, texels: Vec<Vec3>) -> Texture {
         Texture { name: "t".into(), width, height, texels: texels.into(), wrap: [Wrap::Repeat; 2], filter: Default::default() }

@@ -2,42 +2,36 @@
 
 use glam::{DMat2, DVec2, DVec3, DVec4, Vec2, Vec3};
 
+use super::media::Media;
+use super::pack_normal;
+use super::parts::Part;
 use super::turns::{self, Turns};
-use super::{at_corners, pack_normal};
 use crate::constants::*;
 use crate::records::{LayeredMaterial, TextureInfo, TriangleLayers};
-use crate::scene::material::{Coverage, LobeKinds, Medium, NormalMap, TextureUse};
+use crate::scene::material::{Coverage, LobeKinds, NormalMap, TextureUse};
 use crate::scene::texture::Wrap;
-use crate::scene::{Material, Mesh, Scene, Texture};
+use crate::scene::{Material, Scene, Texture};
 
-/// Most media: a path keeps their numbers in eight bits each.
-const MAX_MEDIA: usize = 255;
-
-/// A record for each material; an error says how many media there are, if these are too many. They are numbered in an order of materials.
-pub(super) fn records(scene: &Scene, unit: f64, order: Option<&[usize]>) -> Result<Vec<LayeredMaterial>, usize> {
+/// A record for each material. What they look up is added behind the textures of the scene.
+pub(super) fn records(scene: &Scene, media: &Media, unit: f64, textures: &mut Vec<TextureInfo>) -> Vec<LayeredMaterial> {
     let mut records: Vec<LayeredMaterial> = scene.materials.iter().zip(scene.lobe_kinds()).map(record).collect();
-    // Solids of equal media share a number.
-    let mut media: Vec<(f32, f32, Medium)> = Vec::new();
-    let order = order.map_or_else(|| (0..scene.materials.len()).collect(), <[usize]>::to_vec);
-    for place in order {
-        let (material, record) = (&scene.materials[place], &mut records[place]);
-        if let Some(medium) = material.enclosed_medium() {
-            let own = (material.layers.ior, material.layers.ior_spread(), medium);
-            let known = media.iter().position(|of| *of == own).unwrap_or_else(|| {
-                media.push(own);
-                media.len() - 1
-            });
-            record.medium = known as u32 + 1;
+    for ((material, record), medium) in scene.materials.iter().zip(&mut records).zip(&media.numbers) {
+        record.medium = *medium;
+        record.first_lookup = textures.len() as u32;
+        for (layer, used) in material.layer_textures() {
+            textures.push(lookup(textures[used.texture], layer, used, scene.textures[used.texture].wrap));
         }
+        record.end_lookup = textures.len() as u32;
     }
     // Black after some way is black after any: the limit keeps products finite.
     let absorption = |transmittance: f32, metres: f32| (-f64::from(transmittance).ln() / f64::from(metres) * unit).clamp(0.0, 1e30) as f32;
-    for ((ior, spread, medium), record) in media.iter().zip(&mut records) {
+    // Looked up by the medium's number.
+    for ((ior, spread, medium), record) in media.all.iter().zip(&mut records) {
         record.medium_ior = ior.max(1e-3);
         record.medium_spread = *spread;
         record.medium_absorption = Vec3::from(medium.transmittance.to_array().map(|share| absorption(share, medium.metres)));
     }
-    if media.len() <= MAX_MEDIA { Ok(records) } else { Err(media.len()) }
+    records
 }
 
 fn record((material, kinds): (&Material, LobeKinds)) -> LayeredMaterial {
@@ -88,39 +82,6 @@ fn record((material, kinds): (&Material, LobeKinds)) -> LayeredMaterial {
     }
 }
 
-/// Adds what each material looks up behind the textures of the scene.
-pub(super) fn add_lookups(scene: &Scene, records: &mut [LayeredMaterial], textures: &mut Vec<TextureInfo>) {
-    for (material, record) in scene.materials.iter().zip(records) {
-        let of = &material.layers;
-        let map = |map: Option<NormalMap>| map.map(|map| map.texture);
-        let lookups = [
-            (LAYER_METALLIC_ROUGHNESS, of.metallic_roughness_texture),
-            (LAYER_ANISOTROPY, of.anisotropy_texture),
-            (LAYER_SPECULAR, of.specular_texture),
-            (LAYER_SPECULAR_COLOUR, of.specular_colour_texture),
-            (LAYER_TRANSMISSION, of.transmission_texture),
-            (LAYER_DIFFUSE_TRANSMISSION, of.diffuse_transmission_texture),
-            (LAYER_DIFFUSE_TRANSMISSION_COLOUR, of.diffuse_transmission_colour_texture),
-            (LAYER_IRIDESCENCE, of.iridescence_texture),
-            (LAYER_IRIDESCENCE_THICKNESS, of.film_thickness_texture),
-            (LAYER_COAT, of.coat_texture),
-            (LAYER_COAT_ROUGHNESS, of.coat_roughness_texture),
-            (LAYER_COAT_NORMAL, map(of.coat_normal_map)),
-            (LAYER_SHEEN_COLOUR, of.sheen_colour_texture),
-            (LAYER_SHEEN_ROUGHNESS, of.sheen_roughness_texture),
-            (LAYER_NORMAL, map(material.normal_map)),
-        ];
-        record.first_lookup = textures.len() as u32;
-        for (layer, used) in lookups {
-            if let Some(used) = used {
-                let lookup = lookup(textures[used.texture], layer, used, scene.textures[used.texture].wrap);
-                textures.push(lookup);
-            }
-        }
-        record.end_lookup = textures.len() as u32;
-    }
-}
-
 fn lookup(texture: TextureInfo, layer: u32, used: TextureUse, wrap: [Wrap; 2]) -> TextureInfo {
     let offset = used.transform.apply(DVec2::ZERO);
     let turn = DMat2::from_cols(used.transform.apply(DVec2::X) - offset, used.transform.apply(DVec2::Y) - offset).transpose();
@@ -142,23 +103,24 @@ pub(super) fn is_needed(scene: &Scene) -> bool {
 /// How the textures of a material's layers, those of each set of coordinates, look up what lies far from 0; `None` where they do so in
 /// several ways.
 pub(super) fn turns(material: &Material, textures: &[Texture]) -> [Option<Turns>; 2] {
-    let layers = Material { base_colour_texture: None, emission_texture: None, ..material.clone() };
     [0, 1].map(|set| {
-        let mut all = layers.textures().filter(|used| used.uv_set == set).map(|used| (used.transform, textures[used.texture].wrap));
+        let of_set = material.layer_textures().map(|(_, used)| used).filter(|used| used.uv_set == set);
+        let mut all = of_set.map(|used| (used.transform, textures[used.texture].wrap));
         let first = all.next()?;
         all.all(|other| other == first).then(|| Turns::new(first.0, first.1)).flatten()
     })
 }
 
-pub(super) fn of_triangle(mesh: &Mesh, triangle: usize, part: Option<&[DVec3; 3]>, turns: &[Option<Turns>; 2]) -> TriangleLayers {
+pub(super) fn of_part(part: Part, turns: &[Option<Turns>; 2]) -> TriangleLayers {
+    let Part { mesh, triangle, .. } = part;
     let corners = |set: usize| {
-        let uvs = mesh.triangles[triangle].map(|vertex| mesh.uvs[set].get(vertex as usize).copied().unwrap_or_default());
+        let uvs = part.own_uvs(set);
         let uvs = turns[set].as_ref().map_or(uvs, |turns| turns.near(uvs));
-        at_corners(uvs, part).map(DVec2::as_vec2)
+        part.at_corners(uvs).map(DVec2::as_vec2)
     };
     let tangents = |tangents: &[[DVec4; 3]]| {
         let corners = tangents.get(triangle).copied().unwrap_or([DVec4::new(1.0, 0.0, 0.0, 1.0); 3]);
-        let packed = at_corners(corners.map(DVec4::truncate), part).map(|tangent| pack_normal(tangent.normalize_or(DVec3::X).as_vec3()));
+        let packed = part.at_corners(corners.map(DVec4::truncate)).map(|tangent| pack_normal(tangent.normalize_or(DVec3::X).as_vec3()));
         (packed, u32::from(corners[0].w < 0.0))
     };
     let ([first_a, first_b, first_c], [second_a, second_b, second_c]) = (corners(0), corners(1));

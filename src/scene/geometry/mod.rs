@@ -8,28 +8,27 @@
 mod emitters;
 mod lamp_pieces;
 mod layered;
+mod media;
+mod parts;
 mod turns;
+mod warnings;
 
-use std::cell::LazyCell;
-use std::collections::BTreeSet;
-use std::ops::{Add, Mul};
-
-use glam::{DVec2, DVec3, Vec2, Vec2Swizzles as _, Vec3, Vec4};
+use glam::{DVec3, Vec2, Vec2Swizzles as _, Vec3, Vec4};
 use rayon::prelude::*;
 
+use self::media::Media;
+use self::parts::{Leaves, Part, Parts};
 use super::bvh::Bvh;
 use super::contact_offsets::Offsets;
-use super::material::TextureUse;
-use super::planes::{Planes, for_equals, hash_of};
+use super::frame::Frame;
 use super::texture::{Filter, LINEAR_OF_SRGB, Texels, Wrap};
-use super::{Light, LightKind, Material, Mesh, Progress, Scene, Surface, Texture, contact, overlap, solids};
+use super::{Material, Progress, Scene, Surface, Texture, contact};
 use crate::constants::*;
 use crate::error::{Error, Result};
 use crate::records::{
     BvhNode, Emitter, LayeredMaterial, SurfaceMaterial, TextureInfo, Triangle, TriangleColours, TriangleLayers, TriangleNormals,
     TriangleUvs,
 };
-use crate::text::{counted, in_metres, some_of};
 
 #[derive(Debug, Clone)]
 pub struct Geometry {
@@ -107,171 +106,69 @@ impl Geometry {
 
     /// The same, with reports of how far it has come.
     pub fn new_with(scene: &Scene, progress: Progress) -> Result<Geometry> {
+        let refuse = |reason: String| refuse(scene, "the scene", reason);
         let count = scene.triangle_count();
         if count == 0 {
-            return Err(refuse(scene, "the scene", "holds no triangle".into()));
+            return Err(refuse("holds no triangle".into()));
         }
         if count > MAX_TRIANGLES {
-            return Err(refuse(scene, "the scene", format!("holds {count} triangles, at most {MAX_TRIANGLES} can be numbered")));
+            return Err(refuse(format!("holds {count} triangles, at most {MAX_TRIANGLES} can be numbered")));
         }
-        let (min, max) = scene.bounds();
-        let extent = (max - min).max_element();
-        if !(extent.is_normal() && extent < 1e30) {
-            return Err(refuse(scene, "the scene", format!("is {extent} metres wide; allowed is anything above 0 and below 1e30")));
-        }
-        let centre = 0.5 * (min + max);
-        let unit = 2f64.powi(extent.log2().ceil() as i32);
-        // As a power of two it has an exact inverse.
-        let per_unit = 1.0 / unit;
-        let local = |position: DVec3| ((position - centre) * per_unit).as_vec3();
-
-        let mut sources: Vec<(u32, u32)> = Vec::with_capacity(count);
-        for (mesh, of) in (0..).zip(&scene.meshes) {
-            sources.extend((0..of.triangles.len() as u32).map(|triangle| (mesh, triangle)));
-        }
+        let frame = Frame::of(scene).map_err(refuse)?;
         progress("preparing triangles", 0.0);
         let kinds = contact::kinds(scene);
         let offsets = Offsets::of(scene, &kinds);
-        let mut corners: Vec<[Vec3; 3]> =
-            sources.par_iter().map(|&(mesh, triangle)| offsets.corners(scene, mesh, triangle).map(local)).collect();
-        // What f32 makes a line of cannot be hit, and its normal would be no number; on a device that takes numbers
-        // without a leading 1 for nothing, neither would that of a square below the least normal one.
-        let is_solid = |[a, b, c]: &[Vec3; 3]| (*b - *a).cross(*c - *a).length_squared() >= f32::MIN_POSITIVE;
-        // Of triangles that are the same, facing alike, only one can be met; the others would shine, and count as surface,
-        // where none is seen.
-        let ranks = LazyCell::new(|| overlap::ranks(scene, &kinds));
-        let mut overlaps = BTreeSet::new();
-        let mut crowded = 0;
-        let mut is_kept: Vec<bool> = corners.par_iter().map(is_solid).collect();
-        let words = |place: u32| in_fixed_order(&corners[place as usize]);
-        for_equals(
-            corners.len(),
-            |place| hash_of_corners(&corners[place as usize]),
-            words,
-            |alike| {
-                let solid: Vec<usize> = alike.iter().map(|place| *place as usize).filter(|place| is_kept[*place]).collect();
-                let Some((first, others)) = solid.split_first() else { return };
-                let mut seen = *first;
-                for &place in others {
-                    let (mesh, other) = (sources[place].0, sources[seen].0);
-                    let wins = ranks[mesh as usize] < ranks[other as usize];
-                    overlaps.insert(if wins { (other, mesh) } else { (mesh, other) });
-                    let hidden = if wins { std::mem::replace(&mut seen, place) } else { place };
-                    is_kept[hidden] = false;
-                }
-            },
-        );
-        let mut kept = is_kept.iter().copied().cycle();
-        sources.retain(|_| kept.next().expect("one for each"));
-        corners.retain(|_| kept.next().expect("one for each"));
-        let left_out = count - corners.len();
-        if corners.is_empty() {
-            return Err(refuse(scene, "the scene", "holds no triangle with an area".into()));
+        let parts = Parts::of(scene, &kinds, &offsets, frame, progress);
+        if parts.corners.is_empty() {
+            return Err(refuse("holds no triangle with an area".into()));
         }
-        progress("looking for overlaps", 0.0);
-        let mut planes = Planes::of(&corners);
-        // Parts of triangles, behind the whole ones: weights of the corners.
-        let whole_count = corners.len();
-        let mut weights: Vec<[DVec3; 3]> = Vec::new();
-        for covered in overlap::find(scene, &kinds, || &ranks, &sources, &corners, |done| progress("looking for overlaps", done)) {
-            let (source, [a, b, c], plane) =
-                (sources[covered.triangle], corners[covered.triangle].map(Vec3::as_dvec3), planes.of_triangles[covered.triangle]);
-            crowded += usize::from(covered.crowded);
-            overlaps.extend(covered.by.iter().map(|other| (source.0, sources[*other].0)));
-            for piece in covered.pieces {
-                let at = piece.map(|of| (a * of.x + b * of.y + c * of.z).as_vec3());
-                if is_solid(&at) {
-                    sources.push(source);
-                    corners.push(at);
-                    planes.of_triangles.push(plane);
-                    weights.push(piece);
-                }
-            }
-            planes.of_triangles[covered.triangle] |= HIDDEN;
-        }
-        let is_seen = |(_, (mesh, _)): &(&u32, &(u32, u32))| !scene.materials[scene.meshes[*mesh as usize].material].is_not_there();
-        let of_surfaces = planes.of_triangles.iter().zip(&sources).filter(is_seen).map(|(plane, _)| plane & !HIDDEN);
-        let first_sensor_plane = of_surfaces.max().map_or(0, |last| last + 1);
         progress("building the hierarchy", 0.0);
-        let Bvh { nodes, order } = Bvh::build(&corners);
+        let Bvh { nodes, order } = Bvh::build(&parts.corners);
         progress("preparing triangles", 0.5);
-        let sources: Vec<(u32, u32)> = order.par_iter().map(|&place| sources[place as usize]).collect();
-        let triangle_of = |(&place, &(mesh, _)): (&u32, &(u32, u32))| {
-            let [a, b, c] = corners[place as usize];
-            Triangle { a, b, c, material: scene.meshes[mesh as usize].material as u32, plane: planes.of_triangles[place as usize] }
-        };
-        let triangles: Vec<Triangle> = order.par_iter().zip(&sources).map(triangle_of).collect();
-        let part_of = |place: u32| (place as usize).checked_sub(whole_count).map(|part| &weights[part]);
-        let normals_of = |(&place, &(mesh, triangle)): (&u32, &(u32, u32))| {
-            corner_normals(&scene.meshes[mesh as usize], triangle as usize, part_of(place))
-        };
-        let normals = order.par_iter().zip(&sources).map(normals_of).collect();
-        let uvs_of = |(&place, &(mesh, triangle)): (&u32, &(u32, u32))| {
-            let mesh = &scene.meshes[mesh as usize];
-            corner_uvs(mesh, &scene.materials[mesh.material], &scene.textures, triangle as usize, part_of(place))
-        };
-        let uvs = order.par_iter().zip(&sources).map(uvs_of).collect();
-        let colours_of = |(&place, &(mesh, triangle)): (&u32, &(u32, u32))| {
-            corner_colours(&scene.meshes[mesh as usize], triangle as usize, part_of(place))
-        };
-        let colours = match scene.meshes.iter().all(|mesh| mesh.colours.is_empty() && mesh.alphas.is_empty()) {
-            true => vec![TriangleColours { a: Vec3::ONE, b: Vec3::ONE, c: Vec3::ONE, alphas: Vec3::ONE }],
-            false => order.par_iter().zip(&sources).map(colours_of).collect(),
-        };
-        let (by_size, hidden_solid) = match solids::order(scene) {
-            solids::Order::Entry => (None, None),
-            solids::Order::Size(order) => (Some(order), None),
-            solids::Order::Unclear(mesh) => (None, Some(mesh)),
-        };
-        let mut layered_materials = layered::records(scene, unit, by_size.as_deref())
-            .map_err(|count| refuse(scene, "the scene", format!("has solids of {count} different media; at most 255 can be told apart")))?;
-        let layer_turns: Vec<_> = scene.materials.iter().map(|material| layered::turns(material, &scene.textures)).collect();
-        let medium_bits = medium_bits(scene, &layered_materials, &offsets)?;
-        let layers_of = |(&place, &(mesh, triangle)): (&u32, &(u32, u32))| {
-            let mesh = &scene.meshes[mesh as usize];
-            layered::of_triangle(mesh, triangle as usize, part_of(place), &layer_turns[mesh.material])
-        };
-        let triangle_layers = match layered::is_needed(scene) {
-            false => vec![TriangleLayers::default()],
-            true => order.par_iter().zip(&sources).map(layers_of).collect(),
-        };
+        let leaves = Leaves { scene, parts: &parts, order: &order };
+        let triangles = leaves.each(|part| part.record());
+        let has_colours = scene.meshes.iter().any(|mesh| !mesh.colours.is_empty() || !mesh.alphas.is_empty());
+        let turns: Vec<_> = scene.materials.iter().map(|material| layered::turns(material, &scene.textures)).collect();
+        let media = Media::of(scene, &offsets)?;
         progress("packing textures", 0.0);
         let (mut textures, texels) = pack_textures(scene);
-        layered::add_lookups(scene, &mut layered_materials, &mut textures);
+        let layered_materials = layered::records(scene, &media, frame.unit, &mut textures);
         if texels.len() > MAX_TEXELS {
-            let reason = format!("has textures of {} texels in all; at most {MAX_TEXELS} can be kept", texels.len());
-            return Err(refuse(scene, "the scene", reason));
+            return Err(refuse(format!("has textures of {} texels in all; at most {MAX_TEXELS} can be kept", texels.len())));
         }
-
+        let (min, max) = frame.bounds;
         let mut geometry = Geometry {
-            centre,
-            unit,
-            bounds: (local(min), local(max)),
-            radius: (0.5 * (max - min).length() / unit) * 1.001,
+            centre: frame.centre,
+            unit: frame.unit,
+            bounds: (frame.local(min), frame.local(max)),
+            radius: (0.5 * (max - min).length() / frame.unit) * 1.001,
             area: triangles.iter().filter(|triangle| triangle.plane < HIDDEN).map(area).sum(),
             nodes,
             triangles,
-            planes: planes.planes,
-            first_sensor_plane,
-            sources,
-            normals,
-            uvs,
-            colours,
+            first_sensor_plane: parts.first_sensor_plane(scene),
+            sources: leaves.each(|part| part.source),
+            normals: leaves.each(|part| part.normals()),
+            uvs: leaves.each(|part| part.uvs(scene)),
+            colours: if has_colours { leaves.each(|part| part.colours()) } else { vec![Part::WHITE] },
             materials: scene.materials.iter().map(material_record).collect(),
             layered_materials,
-            triangle_layers,
+            triangle_layers: match layered::is_needed(scene) {
+                false => vec![TriangleLayers::default()],
+                true => leaves.each(|part| layered::of_part(part, &turns[part.mesh.material])),
+            },
             textures,
             texels,
+            left_out: parts.left_out,
+            overlaps: parts.overlaps.into_iter().collect(),
+            crowded: parts.crowded,
+            planes: parts.planes.planes,
+            medium_bits: media.bits,
+            has_media_by_size: media.are_by_size,
+            hidden_solid: media.hidden_solid,
             emitters: Vec::new(),
             sky_most: 0.0,
             flux_unit: 1.0,
             power: 0.0,
-            left_out,
-            overlaps: overlaps.into_iter().collect(),
-            crowded,
-            medium_bits,
-            has_media_by_size: by_size.is_some(),
-            hidden_solid,
             coarse_pieces: 0,
         };
         progress("collecting lights", 0.0);
@@ -299,182 +196,11 @@ impl Geometry {
     pub fn to_local(&self, position: DVec3) -> Vec3 {
         ((position - self.centre) / self.unit).as_vec3()
     }
-
-    /// How far single precision moves a place, metres.
-    pub fn place_error(&self, position: DVec3) -> f64 {
-        (self.to_world(self.to_local(position)) - position).abs().max_element()
-    }
-
-    /// That some places, of points or of a camera, are moved so far that it shows.
-    pub fn place_warning(&self, what: &str, positions: impl IntoIterator<Item = DVec3>) -> Option<String> {
-        let most = positions.into_iter().map(|position| self.place_error(position)).fold(0.0, f64::max);
-        (most > PLACE_ERROR).then(|| {
-            format!("{what}: off by up to {} in single precision, so far from the middle of the scene; go nearer to it", in_metres(most))
-        })
-    }
-
-    /// Meshes whose vertices single precision moves so far that it shows, and how far at most; nothing of scenes that are not kilometres
-    /// wide.
-    fn rounded_meshes(&self, scene: &Scene) -> (Vec<u32>, f64) {
-        // Half the step of the largest numbers.
-        if self.unit * 0.5 * f64::from(f32::EPSILON) * 0.25 <= PLACE_ERROR {
-            return (Vec::new(), 0.0);
-        }
-        let of_mesh = |mesh: &Mesh| mesh.positions.iter().map(|position| self.place_error(*position)).fold(0.0, f64::max);
-        let errors: Vec<f64> = scene.meshes.par_iter().map(of_mesh).collect();
-        let rounded = (0..).zip(&errors).filter(|(_, error)| **error > PLACE_ERROR).map(|(mesh, _)| mesh).collect();
-        (rounded, errors.into_iter().fold(0.0, f64::max))
-    }
-
-    /// A line for triangles that are left out, for each pair of meshes that overlap in one plane, and for what is too many to be treated as it should.
-    pub fn warnings(&self, scene: &Scene) -> Vec<String> {
-        const MOST: usize = 5;
-        let names = LazyCell::new(|| scene.mesh_names());
-        let name = |mesh: u32| &names[mesh as usize];
-        let line = |&(hidden, seen): &(u32, u32)| {
-            if hidden == seen {
-                return format!("mesh {:?} overlaps itself in one plane; what overlaps counts once", name(hidden));
-            }
-            format!("meshes {:?} and {:?} overlap in one plane; only {:?} counts there", name(hidden), name(seen), name(seen))
-        };
-        let mut lines: Vec<String> = Vec::new();
-        if self.left_out > 0 {
-            let count = counted(self.left_out, "triangle");
-            lines.push(format!("{count} without area in single precision, or on others, left out"));
-        }
-        if let Some(mesh) = self.hidden_solid {
-            lines.push(format!(
-                "solids lie partly in one another, and light may be lost there: what is around mesh {} shares its material with smaller solids; \
-                 give these a material of their own whose index of refraction differs by 0.001",
-                name(mesh)
-            ));
-        }
-        let (rounded, most) = self.rounded_meshes(scene);
-        if !rounded.is_empty() {
-            lines.push(format!(
-                "the scene is {:.0} m wide, and single precision moves places in it by up to {} (mesh {}); leave out \
-                 what stands far from the rest, or render parts on their own",
-                2.0 * self.radius * self.unit / 1.001,
-                in_metres(most),
-                some_of(rounded.iter().map(|mesh| name(*mesh)))
-            ));
-        }
-        let place_of = |light: &Light| match light.kind {
-            LightKind::Point { position, .. } | LightKind::Spot { position, .. } | LightKind::Disc { centre: position, .. } => {
-                Some(position)
-            }
-            LightKind::Directional { .. } | LightKind::Environment { .. } | LightKind::Sky(_) => None,
-        };
-        lines.extend(scene.lights.iter().filter_map(|light| self.place_warning(&light.name, place_of(light))));
-        if let Some(warning) = turns::warning(scene) {
-            lines.push(warning);
-        }
-        lines.extend(self.overlaps.iter().take(MOST).map(line));
-        if self.crowded > 0 {
-            lines.push(format!(
-                "{} among more than 64 others that overlap each other in one plane; light there may count more than once",
-                counted(self.crowded, "triangle")
-            ));
-        }
-        if self.coarse_pieces > 0 {
-            lines.push(format!(
-                "{} of textured lamps have spots much brighter than their mean, more than can be told apart; their light is noisy, and may be missed in few rounds",
-                counted(self.coarse_pieces, "part")
-            ));
-        }
-        if self.overlaps.len() > MOST {
-            lines.push(format!("{} more pairs of meshes overlap in one plane; one of each counts there", self.overlaps.len() - MOST));
-        }
-        // Names may be the same where they are not from a file.
-        let mut said = BTreeSet::new();
-        lines.retain(|line| said.insert(line.clone()));
-        lines
-    }
-}
-
-/// How many bits each medium gets: so many that all solids that lie in one another have room in a word.
-fn medium_bits(scene: &Scene, materials: &[LayeredMaterial], offsets: &Offsets) -> Result<u32> {
-    const USUAL: u32 = 8;
-    let few = 32 / USUAL;
-    let Some((depth, mesh)) = solids::most_nested(scene, few as usize, |mesh, triangle| offsets.corners(scene, mesh, triangle)) else {
-        return Ok(USUAL);
-    };
-    let media = materials.iter().map(|material| material.medium).max().unwrap_or(0);
-    let bits = 32 - media.leading_zeros();
-    let most = 32 / bits.max(1);
-    if depth > most as usize {
-        let name = &scene.meshes[mesh as usize].name;
-        let reason = format!(
-            "is one of {depth} solids that lie in one another; of {media} different media in the scene, at most {most} may: give some of them \
-             equal indices of refraction and attenuation, or take some out"
-        );
-        return Err(refuse(scene, &format!("mesh '{name}'"), reason));
-    }
-    Ok(bits)
-}
-
-/// The bits of a triangle's corners, the same from whichever corner it is read.
-fn in_fixed_order(corners: &[Vec3; 3]) -> [u32; 9] {
-    // The sum turns -0 into 0.
-    let bits = corners.map(|corner| (corner + Vec3::ZERO).to_array().map(f32::to_bits));
-    let first = (0..3).min_by_key(|corner| bits[*corner]).expect("a triangle has corners");
-    let word = |k: usize| bits[(first + k / 3) % 3][k % 3];
-    std::array::from_fn(word)
-}
-
-/// Of a triangle's corners, the same from whichever corner it is read.
-fn hash_of_corners(corners: &[Vec3; 3]) -> u64 {
-    corners.iter().map(|corner| hash_of(&(corner + Vec3::ZERO).to_array().map(f32::to_bits))).fold(0, u64::wrapping_add)
 }
 
 fn area(triangle: &Triangle) -> f64 {
     let (a, b, c) = (triangle.a.as_dvec3(), triangle.b.as_dvec3(), triangle.c.as_dvec3());
     0.5 * (b - a).cross(c - a).length()
-}
-
-/// Values of a triangle's corners, or of those of a part of it.
-fn at_corners<T: Copy + Add<Output = T> + Mul<f64, Output = T>>(values: [T; 3], part: Option<&[DVec3; 3]>) -> [T; 3] {
-    let [a, b, c] = values;
-    part.map_or(values, |weights| weights.map(|of| a * of.x + b * of.y + c * of.z))
-}
-
-fn corner_normals(mesh: &Mesh, triangle: usize, part: Option<&[DVec3; 3]>) -> TriangleNormals {
-    let flat = TriangleNormals { a: NONE, b: NONE, c: NONE };
-    if mesh.normals.is_empty() {
-        return flat;
-    }
-    let normals = mesh.triangles[triangle].map(|vertex| mesh.normals[vertex as usize]);
-    // Normals that are all the triangle's own are no smooth shading.
-    let own = mesh.normal(triangle);
-    if normals.iter().any(|normal| normal.length_squared() < 0.25) || normals.iter().all(|normal| normal.dot(own) > 1.0 - 1e-9) {
-        return flat;
-    }
-    let [a, b, c] = at_corners(normals, part).map(|normal| pack_normal(normal.as_vec3()));
-    TriangleNormals { a, b, c }
-}
-
-fn corner_colours(mesh: &Mesh, triangle: usize, part: Option<&[DVec3; 3]>) -> TriangleColours {
-    let colour = |vertex: u32| mesh.colours.get(vertex as usize).copied().unwrap_or(DVec3::ONE);
-    let [a, b, c] = at_corners(mesh.triangles[triangle].map(colour), part).map(DVec3::as_vec3);
-    let alpha = |vertex: u32| mesh.alphas.get(vertex as usize).copied().unwrap_or(1.0);
-    let alphas = DVec3::from(at_corners(mesh.triangles[triangle].map(alpha), part)).as_vec3();
-    TriangleColours { a, b, c, alphas }
-}
-
-fn corner_uvs(mesh: &Mesh, material: &Material, textures: &[Texture], triangle: usize, part: Option<&[DVec3; 3]>) -> TriangleUvs {
-    let of = |used: Option<TextureUse>| -> [Vec2; 3] {
-        match used {
-            Some(TextureUse { uv_set, transform, texture }) => {
-                let own = |vertex: u32| mesh.uvs[uv_set].get(vertex as usize).copied().unwrap_or_default();
-                let uvs = mesh.triangles[triangle].map(|vertex| transform.apply(own(vertex)));
-                at_corners(turns::near(uvs, textures[texture].wrap), part).map(DVec2::as_vec2)
-            }
-            _ => [Vec2::ZERO; 3],
-        }
-    };
-    let [base_a, base_b, base_c] = of(material.base_colour_texture);
-    let [emission_a, emission_b, emission_c] = of(material.emission_texture);
-    TriangleUvs { base_a, base_b, base_c, emission_a, emission_b, emission_c }
 }
 
 fn material_record(material: &Material) -> SurfaceMaterial {

@@ -4,8 +4,12 @@ use std::collections::HashMap;
 use std::sync::OnceLock;
 
 use gltf::accessor::{DataType, Dimensions};
+use gltf::json::accessor::GenericComponentType;
+use gltf::json::validation::Checked;
 use gltf::{Accessor, buffer};
 use rayon::prelude::*;
+use serde::Deserialize;
+use serde_json::Value;
 
 use super::Loader;
 use crate::error::Result;
@@ -43,7 +47,7 @@ pub(super) fn read<const N: usize, T: Send>(
     what: &str,
     make: impl Fn([f32; N]) -> T + Sync,
 ) -> Result<Vec<T>> {
-    let size = number_bytes(accessor.data_type());
+    let size = accessor.data_type().size();
     let elements = elements(loader, accessor, components(N), what)?;
     let (kind, normalized) = (accessor.data_type(), accessor.normalized());
     // Beside the result: a vector of results would be made in pieces and copied.
@@ -98,41 +102,58 @@ fn components(count: usize) -> Dimensions {
     }
 }
 
-fn number_bytes(kind: DataType) -> usize {
-    match kind {
-        DataType::I8 | DataType::U8 => 1,
-        DataType::I16 | DataType::U16 => 2,
-        DataType::U32 | DataType::F32 => 4,
+/// The kind of numbers that a `componentType` says; `None` of those that glTF does not have.
+pub(super) fn kind_of(component_type: &Value) -> Option<DataType> {
+    match Checked::deserialize(component_type) {
+        Ok(Checked::Valid(GenericComponentType(kind))) => Some(kind),
+        _ => None,
     }
 }
 
 /// The little-endian unsigned integer in one to four bytes.
 #[inline]
-fn integer(bytes: &[u8]) -> u32 {
+pub(super) fn integer(bytes: &[u8]) -> u32 {
     match *bytes {
         [a, b, c, d] => u32::from_le_bytes([a, b, c, d]),
         _ => bytes.iter().rev().fold(0, |value, byte| value << 8 | u32::from(*byte)),
     }
 }
 
+/// A number as it is stored.
+#[inline]
+pub(super) fn stored(bytes: &[u8], kind: DataType) -> f64 {
+    let bits = integer(bytes);
+    match kind {
+        DataType::F32 => f64::from(f32::from_bits(bits)),
+        DataType::I8 => f64::from(bits as u8 as i8),
+        DataType::I16 => f64::from(bits as u16 as i16),
+        DataType::U8 | DataType::U16 | DataType::U32 => f64::from(bits),
+    }
+}
+
+/// What whole numbers are divided by where they stand for shares.
+pub(super) fn largest(kind: DataType) -> f64 {
+    match kind {
+        DataType::F32 => 1.0,
+        DataType::I8 => 127.0,
+        DataType::U8 => 255.0,
+        DataType::I16 => 32_767.0,
+        DataType::U16 => 65_535.0,
+        DataType::U32 => f64::from(u32::MAX),
+    }
+}
+
 #[inline]
 fn number(bytes: &[u8], kind: DataType, normalized: bool) -> f32 {
-    let bits = integer(bytes);
-    let (value, largest) = match kind {
-        DataType::F32 => return f32::from_bits(bits),
-        DataType::U32 => (bits as f32, u32::MAX as f32),
-        DataType::U8 | DataType::U16 => (bits as f32, if bytes.len() == 1 { 255.0 } else { 65_535.0 }),
-        DataType::I8 => (f32::from(bits as u8 as i8), 127.0),
-        DataType::I16 => (f32::from(bits as u16 as i16), 32_767.0),
-    };
-    if normalized { (value / largest).max(-1.0) } else { value }
+    let value = stored(bytes, kind) as f32;
+    if normalized && kind != DataType::F32 { (value / largest(kind) as f32).max(-1.0) } else { value }
 }
 
 /// The bytes of every element, sparse replacements made.
 fn elements<'a>(loader: &'a Loader, accessor: &Accessor, dimensions: Dimensions, what: &str) -> Result<Elements<'a>> {
     let found = accessor.dimensions();
     loader.require(found == dimensions, what, || format!("is of type {found:?} where {dimensions:?} is wanted"))?;
-    let size = number_bytes(accessor.data_type()) * dimensions.multiplicity();
+    let size = accessor.data_type().size() * dimensions.multiplicity();
     let count = accessor.count();
     let mut elements = match accessor.view() {
         Some(view) => slice(loader, &view, accessor.offset(), count, size, what)?,

@@ -15,6 +15,8 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::malformed::REMEDY;
+use super::members::{entries, index, items};
+use super::writer::Writer;
 use super::{draco, named, one_line, uri};
 use crate::error::{Error, Result};
 
@@ -57,13 +59,6 @@ enum Filter {
     Color,
 }
 
-/// The buffer that takes what is unpacked, and how many bytes it has already.
-#[derive(Clone, Copy)]
-pub(super) struct Target {
-    pub(super) buffer: usize,
-    pub(super) start: usize,
-}
-
 /// Bytes that hold a mesh: their buffer, where they begin and where they end.
 type Stream = (usize, usize, usize);
 
@@ -80,17 +75,18 @@ struct Primitive {
 struct Packed<'a> {
     path: &'a Path,
     binary: Option<&'a [u8]>,
-    target: Target,
-    unpacked: Vec<u8>,
+    to: Writer,
 }
 
-/// Unpacks all that is compressed, leads the JSON there, and gives the bytes that belong into the target; none if nothing is. `binary` is
-/// the binary part of a `.glb` file.
-pub(super) fn unpack(path: &Path, json: &mut Value, binary: Option<&[u8]>, target: Target) -> Result<Vec<u8>> {
-    let mut packed = Packed { path, binary, target, unpacked: Vec::new() };
-    packed.unpack_views(json)?;
-    packed.unpack_primitives(json)?;
-    Ok(packed.unpacked)
+/// Unpacks all that is compressed, leads the JSON there, and gives the bytes that belong into the target, a buffer and how many bytes it has
+/// already; none if nothing is. `binary` is the binary part of a `.glb` file.
+pub(super) fn unpack(path: &Path, json: &mut Value, binary: Option<&[u8]>, (buffer, start): (usize, usize)) -> Result<Vec<u8>> {
+    let mut packed = Packed { path, binary, to: Writer { json: json.take(), bytes: Vec::new(), buffer, start } };
+    packed.unpack_views()?;
+    packed.unpack_primitives()?;
+    packed.to.fill();
+    *json = packed.to.json;
+    Ok(packed.to.bytes)
 }
 
 /// Takes what compression a file no longer needs off its lists.
@@ -105,33 +101,21 @@ pub(super) fn forget(json: &mut Value) {
     }
 }
 
-fn members<'a>(root: &'a Value, list: &str) -> impl Iterator<Item = (usize, &'a Value)> {
-    root[list].as_array().into_iter().flatten().enumerate()
-}
-
-fn entries(object: &Value) -> impl Iterator<Item = (&String, &Value)> {
-    object.as_object().into_iter().flatten()
-}
-
-fn place(value: &Value) -> Option<usize> {
-    value.as_u64().and_then(|number| usize::try_from(number).ok())
-}
-
 impl<'a> Packed<'a> {
     fn refuse(&self, object: &str, reason: impl AsRef<str>) -> Error {
         Error::Scene { path: self.path.to_owned(), object: object.to_owned(), reason: one_line(reason.as_ref()) }
     }
 
     /// The buffers of these numbers, each read once.
-    fn buffers(&self, json: &Value, numbers: impl Iterator<Item = usize>) -> Result<HashMap<usize, Cow<'a, [u8]>>> {
+    fn buffers(&self, numbers: impl Iterator<Item = usize>) -> Result<HashMap<usize, Cow<'a, [u8]>>> {
         let mut read = HashMap::new();
-        let count = members(json, "buffers").count();
+        let count = items(&self.to.json["buffers"]).count();
         for number in numbers {
             if read.contains_key(&number) {
                 continue;
             }
             let what = format!("buffer {number}");
-            let bytes = match (json["buffers"][number]["uri"].as_str(), self.binary) {
+            let bytes = match (self.to.json["buffers"][number]["uri"].as_str(), self.binary) {
                 _ if number >= count => return Err(self.refuse(&what, format!("is named by what is compressed; there are {count}"))),
                 (Some(uri), _) => Cow::Owned(uri::read(self.path, uri).map_err(|reason| self.refuse(&what, reason))?),
                 (None, Some(binary)) if number == 0 => Cow::Borrowed(binary),
@@ -142,34 +126,28 @@ impl<'a> Packed<'a> {
         Ok(read)
     }
 
-    /// Keeps unpacked bytes, and gives where they begin.
-    fn keep(&mut self, bytes: &[u8], what: &str) -> Result<usize> {
-        let start = self.unpacked.len();
-        if (start + bytes.len()) as u64 > MAX_BYTES {
-            return Err(self.refuse(what, too_large()));
-        }
-        self.unpacked.extend(bytes);
-        self.unpacked.resize(self.unpacked.len().next_multiple_of(4), 0);
-        Ok(self.target.start + start)
+    /// Refuses bytes of which there would be too many with those that are unpacked.
+    fn require_few(&self, bytes: &[u8], what: &str) -> Result<()> {
+        if (self.to.bytes.len() + bytes.len()) as u64 > MAX_BYTES { Err(self.refuse(what, too_large())) } else { Ok(()) }
     }
 
-    fn unpack_views(&mut self, json: &mut Value) -> Result<()> {
+    fn unpack_views(&mut self) -> Result<()> {
         let packed = |list: &str| -> Vec<(usize, Value)> {
             let of = |(place, object): (usize, &Value)| {
                 MESHOPT.iter().find_map(|name| object["extensions"].get(name)).map(|found| (place, found.clone()))
             };
-            members(json, list).filter_map(of).collect()
+            items(&self.to.json[list]).enumerate().filter_map(of).collect()
         };
         let views = packed("bufferViews");
         // Buffers that stand for what is unpacked.
         let holds = |place: &usize| views.iter().any(|(_, view)| view["buffer"].as_u64() == Some(*place as u64));
-        let has_file = |place: &usize| json["buffers"][place]["uri"].is_string();
+        let has_file = |place: &usize| self.to.json["buffers"][place]["uri"].is_string();
         let stand_ins: Vec<usize> =
             packed("buffers").into_iter().map(|(place, _)| place).filter(|place| !has_file(place) && !holds(place)).collect();
         let parse = |(number, view): &(usize, Value)| {
             let what = format!("compressed buffer view {number}");
             let view = View::deserialize(view).map_err(|error| self.refuse(&what, format!("is not valid: {error}; {REMEDY}")))?;
-            let count = members(json, "buffers").count();
+            let count = items(&self.to.json["buffers"]).count();
             if view.buffer >= count {
                 return Err(self.refuse(&what, format!("lies in buffer {} of {count}", view.buffer)));
             }
@@ -184,30 +162,31 @@ impl<'a> Packed<'a> {
                 return Err(self.refuse(what, reason));
             }
         }
-        let buffers = self.buffers(json, parsed.iter().map(|(_, _, view)| view.buffer))?;
+        let buffers = self.buffers(parsed.iter().map(|(_, _, view)| view.buffer))?;
         for batch in parsed.chunks(rayon::current_num_threads()) {
             let decoded: Vec<_> = batch.par_iter().map(|(_, _, view)| decoded_view(&buffers[&view.buffer], view)).collect();
             for ((number, what, _), decoded) in batch.iter().zip(decoded) {
                 let bytes = decoded.map_err(|reason| self.refuse(what, reason))?;
-                let start = self.keep(&bytes, what)?;
-                let view = &mut json["bufferViews"][number];
-                view["buffer"] = json!(self.target.buffer);
+                self.require_few(&bytes, what)?;
+                let start = self.to.append(&bytes);
+                let view = &mut self.to.json["bufferViews"][number];
+                view["buffer"] = json!(self.to.buffer);
                 view["byteOffset"] = json!(start);
                 view["byteLength"] = json!(bytes.len());
                 drop_extensions(view, &MESHOPT);
             }
         }
         for buffer in stand_ins {
-            json["buffers"][buffer] = json!({"byteLength": 0, "uri": "data:application/octet-stream;base64,"});
+            self.to.json["buffers"][buffer] = json!({"byteLength": 0, "uri": "data:application/octet-stream;base64,"});
         }
         Ok(())
     }
 
-    fn unpack_primitives(&mut self, json: &mut Value) -> Result<()> {
-        let found = self.packed_primitives(json)?;
-        let decoded = self.decoded_streams(json, &found)?;
+    fn unpack_primitives(&mut self) -> Result<()> {
+        let found = self.packed_primitives()?;
+        let decoded = self.decoded_streams(&found)?;
         // They stay as they are.
-        let mut taken = plain_accessors(json);
+        let mut taken = plain_accessors(&self.to.json);
         let mut indices_of: HashMap<Stream, usize> = HashMap::new();
         let mut accessor_of: HashMap<(Stream, u64), usize> = HashMap::new();
         for Primitive { mesh, number, what, stream } in &found {
@@ -216,16 +195,16 @@ impl<'a> Packed<'a> {
                 Some(known) => *known,
                 None => {
                     let accessor = json!({"componentType": 5125, "count": indices.len(), "type": "SCALAR"});
-                    let old = place(&json["meshes"][mesh]["primitives"][number]["indices"]).filter(|old| taken.insert(*old));
-                    let added = self.set_accessor(json, old, accessor, None, (bytemuck::cast_slice(indices), what))?;
+                    let old = index(&self.to.json["meshes"][mesh]["primitives"][number]["indices"]).filter(|old| taken.insert(*old));
+                    let added = self.set_accessor(old, accessor, None, (bytemuck::cast_slice(indices), what))?;
                     *indices_of.entry(*stream).or_insert(added)
                 }
             };
-            let primitive = json["meshes"][mesh]["primitives"][number].clone();
+            let primitive = self.to.json["meshes"][mesh]["primitives"][number].clone();
             let names = primitive["extensions"][DRACO]["attributes"].as_object().cloned().unwrap_or_default();
             for (name, id) in names {
-                let Some(old) = place(&primitive["attributes"][&name]) else { continue };
-                let like = json["accessors"].get(old).cloned();
+                let Some(old) = index(&primitive["attributes"][&name]) else { continue };
+                let like = self.to.json["accessors"].get(old).cloned();
                 let found = id.as_u64().and_then(|id| Some((id, attributes.get(&id)?)));
                 let (Some(like), Some((id, attribute))) = (like, found) else {
                     return Err(self.refuse(what, format!("has a compressed {name} of the number {id}, which is not there; {REMEDY}")));
@@ -243,20 +222,20 @@ impl<'a> Packed<'a> {
                     None => {
                         let mut accessor = like;
                         accessor["count"] = json!(points);
-                        accessor["componentType"] = json!(attribute.component_type);
+                        accessor["componentType"] = json!(attribute.kind.as_gl_enum());
                         for member in ["byteOffset", "sparse"] {
                             accessor.as_object_mut().expect("it has a type").remove(member);
                         }
                         // Compression moves vertices.
                         [accessor["min"], accessor["max"]] = attribute.bounds().map(|bound| json!(bound));
                         let old = Some(old).filter(|old| taken.insert(*old));
-                        let added = self.set_accessor(json, old, accessor, Some(attribute.stride), (&attribute.bytes, what))?;
+                        let added = self.set_accessor(old, accessor, Some(attribute.stride), (&attribute.bytes, what))?;
                         *accessor_of.entry((*stream, id)).or_insert(added)
                     }
                 };
-                json["meshes"][mesh]["primitives"][number]["attributes"][&name] = json!(added);
+                self.to.json["meshes"][mesh]["primitives"][number]["attributes"][&name] = json!(added);
             }
-            let primitive = &mut json["meshes"][mesh]["primitives"][number];
+            let primitive = &mut self.to.json["meshes"][mesh]["primitives"][number];
             primitive["indices"] = json!(indices);
             // Strips are unpacked to triangles.
             primitive["mode"] = json!(4);
@@ -266,20 +245,20 @@ impl<'a> Packed<'a> {
     }
 
     /// All primitives that are compressed.
-    fn packed_primitives(&self, json: &Value) -> Result<Vec<Primitive>> {
+    fn packed_primitives(&self) -> Result<Vec<Primitive>> {
         let mut found: Vec<Primitive> = Vec::new();
-        for (mesh, of) in members(json, "meshes") {
-            for (number, primitive) in members(of, "primitives") {
+        for (mesh, of) in items(&self.to.json["meshes"]).enumerate() {
+            for (number, primitive) in items(&of["primitives"]).enumerate() {
                 let Some(extension) = primitive["extensions"].get(DRACO) else { continue };
                 let what = format!("mesh '{}', primitive {number}", named("mesh", of["name"].as_str(), mesh));
-                let view = place(&extension["bufferView"]).and_then(|view| json["bufferViews"].get(view));
+                let view = index(&extension["bufferView"]).and_then(|view| self.to.json["bufferViews"].get(view));
                 let Some(view) = view else {
                     let view = &extension["bufferView"];
                     return Err(self.refuse(&what, format!("is compressed in the buffer view {view}, which is not there; {REMEDY}")));
                 };
-                let start = place(&view["byteOffset"]).unwrap_or(0);
-                let end = place(&view["byteLength"]).and_then(|length| start.checked_add(length));
-                let stream = place(&view["buffer"]).zip(end).map(|(buffer, end)| (buffer, start, end));
+                let start = index(&view["byteOffset"]).unwrap_or(0);
+                let end = index(&view["byteLength"]).and_then(|length| start.checked_add(length));
+                let stream = index(&view["buffer"]).zip(end).map(|(buffer, end)| (buffer, start, end));
                 let stream =
                     stream.ok_or_else(|| self.refuse(&what, format!("is compressed in a buffer view that says no place; {REMEDY}")))?;
                 found.push(Primitive { mesh, number, what, stream });
@@ -289,8 +268,8 @@ impl<'a> Packed<'a> {
     }
 
     /// Decodes each stream once, however many primitives it is for.
-    fn decoded_streams(&self, json: &Value, found: &[Primitive]) -> Result<HashMap<Stream, draco::Decoded>> {
-        let buffers = self.buffers(json, found.iter().map(|primitive| primitive.stream.0))?;
+    fn decoded_streams(&self, found: &[Primitive]) -> Result<HashMap<Stream, draco::Decoded>> {
+        let buffers = self.buffers(found.iter().map(|primitive| primitive.stream.0))?;
         let mut streams: BTreeMap<Stream, (&[u8], &str)> = BTreeMap::new();
         for Primitive { stream, what, .. } in found {
             let (buffer, start, end) = *stream;
@@ -299,7 +278,7 @@ impl<'a> Packed<'a> {
             streams.entry(*stream).or_insert((bytes, what));
         }
         let streams: Vec<_> = streams.into_iter().collect();
-        let mut left = MAX_BYTES - self.unpacked.len() as u64;
+        let mut left = MAX_BYTES - self.to.bytes.len() as u64;
         let mut decoded = HashMap::new();
         for batch in streams.chunks(rayon::current_num_threads()) {
             let share = left / batch.len() as u64;
@@ -319,28 +298,20 @@ impl<'a> Packed<'a> {
     /// old one, or is one more.
     fn set_accessor(
         &mut self,
-        json: &mut Value,
         old: Option<usize>,
         mut accessor: Value,
         stride: Option<usize>,
         (bytes, what): (&[u8], &str),
     ) -> Result<usize> {
-        let start = self.keep(bytes, what)?;
-        let mut view = json!({"buffer": self.target.buffer, "byteOffset": start, "byteLength": bytes.len()});
-        if let Some(stride) = stride {
-            view["byteStride"] = json!(stride);
-        }
-        let lists = ["bufferViews", "accessors"].map(|list| members(json, list).count());
-        accessor["bufferView"] = json!(lists[0]);
-        let number = old.filter(|old| *old < lists[1]).unwrap_or(lists[1]);
-        let mut put = |list: &str, place: usize, member: Value| match json.get_mut(list).and_then(Value::as_array_mut) {
-            Some(members) if place < members.len() => members[place] = member,
-            Some(members) => members.push(member),
-            None => json[list] = json!([member]),
-        };
-        put("bufferViews", lists[0], view);
-        put("accessors", number, accessor);
-        Ok(number)
+        self.require_few(bytes, what)?;
+        accessor["bufferView"] = json!(self.to.view(bytes, stride, None));
+        Ok(match old.filter(|old| self.to.json["accessors"].get(*old).is_some()) {
+            Some(old) => {
+                self.to.json["accessors"][old] = accessor;
+                old
+            }
+            None => self.to.push("accessors", accessor),
+        })
     }
 }
 
@@ -351,19 +322,19 @@ fn too_large() -> String {
 /// Numbers of accessors that something uses which Draco has not compressed.
 fn plain_accessors(json: &Value) -> HashSet<usize> {
     let mut found = HashSet::new();
-    for (_, primitive) in members(json, "meshes").flat_map(|(_, mesh)| members(mesh, "primitives")) {
+    for primitive in items(&json["meshes"]).flat_map(|mesh| items(&mesh["primitives"])) {
         let compressed = primitive["extensions"].get(DRACO);
-        found.extend(place(&primitive["indices"]).filter(|_| compressed.is_none()));
+        found.extend(index(&primitive["indices"]).filter(|_| compressed.is_none()));
         let is_plain = |name: &String| compressed.is_none_or(|compressed| compressed["attributes"].get(name).is_none());
-        found.extend(entries(&primitive["attributes"]).filter(|(name, _)| is_plain(name)).filter_map(|(_, accessor)| place(accessor)));
-        found.extend(members(primitive, "targets").flat_map(|(_, target)| entries(target)).filter_map(|(_, accessor)| place(accessor)));
+        found.extend(entries(&primitive["attributes"]).filter(|(name, _)| is_plain(name)).filter_map(|(_, accessor)| index(accessor)));
+        found.extend(items(&primitive["targets"]).flat_map(|target| entries(target)).filter_map(|(_, accessor)| index(accessor)));
     }
-    for (_, sampler) in members(json, "animations").flat_map(|(_, animation)| members(animation, "samplers")) {
-        found.extend(["input", "output"].iter().filter_map(|member| place(&sampler[member])));
+    for sampler in items(&json["animations"]).flat_map(|animation| items(&animation["samplers"])) {
+        found.extend(["input", "output"].iter().filter_map(|member| index(&sampler[member])));
     }
-    found.extend(members(json, "skins").filter_map(|(_, skin)| place(&skin["inverseBindMatrices"])));
-    let of_instances = members(json, "nodes").flat_map(|(_, node)| entries(&node["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]));
-    found.extend(of_instances.filter_map(|(_, accessor)| place(accessor)));
+    found.extend(items(&json["skins"]).filter_map(|skin| index(&skin["inverseBindMatrices"])));
+    let of_instances = items(&json["nodes"]).flat_map(|node| entries(&node["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]));
+    found.extend(of_instances.filter_map(|(_, accessor)| index(accessor)));
     found
 }
 

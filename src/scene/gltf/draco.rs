@@ -4,6 +4,9 @@ use std::collections::HashMap;
 
 use draco_core::decode_limits::DecodeLimits;
 use draco_core::{DataType, DecoderBuffer, FaceIndex, Mesh, MeshDecoder, PointIndex};
+use gltf::accessor::DataType as Kind;
+
+use super::accessor::stored;
 
 /// Of one mesh: more would not be read anyhow, and a decoder needs memory beside what it decodes.
 const MAX_COUNT: u64 = 100_000_000;
@@ -22,8 +25,7 @@ pub(super) struct Attribute {
     /// Bytes from one point's to the next.
     pub(super) stride: usize,
     pub(super) components: u8,
-    /// By glTF's numbers.
-    pub(super) component_type: u32,
+    pub(super) kind: Kind,
 }
 
 impl Decoded {
@@ -36,23 +38,10 @@ impl Decoded {
 impl Attribute {
     /// The smallest and the largest number of each component, as accessors say them.
     pub(super) fn bounds(&self) -> [Vec<f64>; 2] {
-        let width = match self.component_type {
-            5120 | 5121 => 1,
-            5122 | 5123 => 2,
-            _ => 4,
-        };
-        let number = |bytes: &[u8]| {
-            let bits = bytes.iter().rev().fold(0, |value, byte| value << 8 | u32::from(*byte));
-            match self.component_type {
-                5120 => f64::from(bits as u8 as i8),
-                5122 => f64::from(bits as u16 as i16),
-                5126 => f64::from(f32::from_bits(bits)),
-                _ => f64::from(bits),
-            }
-        };
+        let width = self.kind.size();
         let of = |choose: fn(f64, f64) -> f64| -> Vec<f64> {
             let component = |k: usize| {
-                let all = self.bytes.chunks_exact(self.stride.max(1)).map(|point| number(&point[k * width..(k + 1) * width]));
+                let all = self.bytes.chunks_exact(self.stride.max(1)).map(|point| stored(&point[k * width..(k + 1) * width], self.kind));
                 all.filter(|number| number.is_finite()).reduce(choose).unwrap_or(0.0)
             };
             (0..usize::from(self.components)).map(component).collect()
@@ -77,16 +66,16 @@ pub(super) fn decoded(bytes: &[u8], most_bytes: u64) -> Result<Decoded, String> 
     let mut attributes = HashMap::new();
     for number in 0..mesh.num_attributes() {
         let attribute = mesh.attribute(number);
-        let (component_type, width) = match attribute.data_type() {
-            DataType::Int8 => (5120, 1),
-            DataType::Uint8 | DataType::Bool => (5121, 1),
-            DataType::Int16 => (5122, 2),
-            DataType::Uint16 => (5123, 2),
-            DataType::Uint32 => (5125, 4),
-            DataType::Float32 => (5126, 4),
+        let kind = match attribute.data_type() {
+            DataType::Int8 => Kind::I8,
+            DataType::Uint8 | DataType::Bool => Kind::U8,
+            DataType::Int16 => Kind::I16,
+            DataType::Uint16 => Kind::U16,
+            DataType::Uint32 => Kind::U32,
+            DataType::Float32 => Kind::F32,
             other => return Err(format!("has a Draco stream with numbers that glTF does not have ({other:?})")),
         };
-        let size = width * usize::from(attribute.num_components());
+        let size = kind.size() * usize::from(attribute.num_components());
         let stride = size.next_multiple_of(4);
         left = left.checked_sub((points * stride) as u64).ok_or("has a Draco stream of more bytes than may be unpacked")?;
         let (values, step) = (attribute.buffer().data(), attribute.byte_stride().max(0) as usize);
@@ -96,8 +85,7 @@ pub(super) fn decoded(bytes: &[u8], most_bytes: u64) -> Result<Decoded, String> 
             let value = values.get(from..from + size).ok_or("has a Draco stream that names values that it has not")?;
             own[..size].copy_from_slice(value);
         }
-        attributes
-            .insert(u64::from(attribute.unique_id()), Attribute { bytes, stride, components: attribute.num_components(), component_type });
+        attributes.insert(u64::from(attribute.unique_id()), Attribute { bytes, stride, components: attribute.num_components(), kind });
     }
     Ok(Decoded { indices, points, attributes })
 }

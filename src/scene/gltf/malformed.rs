@@ -38,6 +38,9 @@ pub(super) struct Parts<'a> {
     pub(super) binary: Option<Vec<u8>>,
 }
 
+/// Kind and content.
+pub type Chunk = ([u8; 4], Vec<u8>);
+
 pub(super) fn parts(content: &[u8]) -> Result<Parts<'_>, String> {
     if content.is_empty() {
         return Err("is empty; export it again".to_owned());
@@ -58,6 +61,21 @@ pub(super) fn parts(content: &[u8]) -> Result<Parts<'_>, String> {
     binary_length(content)?;
     let glb = gltf::Glb::from_slice(content).map_err(|error| format!("is not valid glTF: {error}; export it again"))?;
     Ok(Parts { json: glb.json, binary: glb.bin.map(Cow::into_owned) })
+}
+
+/// Chunks of a `.glb` file after its parts, which are of extensions.
+pub(super) fn other_chunks(content: &[u8], parts: &Parts) -> Result<Vec<Chunk>, String> {
+    // Behind the file's head, and that of each chunk.
+    let read: usize = [Some(parts.json.len()), parts.binary.as_ref().map(Vec::len)].into_iter().flatten().map(|length| 8 + length).sum();
+    let mut rest = content.get(12 + read..).unwrap_or_default();
+    let mut chunks = Vec::new();
+    while let Some((&[a, b, c, d, ref kind @ ..], after)) = rest.split_first_chunk::<8>() {
+        let length = u32::from_le_bytes([a, b, c, d]) as usize;
+        let (chunk, after) = after.split_at_checked(length).ok_or("has a chunk that runs past its end")?;
+        chunks.push((*kind, chunk.to_vec()));
+        rest = after;
+    }
+    Ok(chunks)
 }
 
 /// Without the mark that some editors write in front of a text.

@@ -350,7 +350,8 @@ fn normal_matrix(to_world: &DMat4) -> DMat3 {
     DMat3::from_cols(y_axis.cross(z_axis), z_axis.cross(x_axis), x_axis.cross(y_axis)) * to_world.determinant().signum()
 }
 
-fn triangles_of(mode: Mode, indices: &[u32]) -> Vec<[u32; 3]> {
+/// Of the triangles that vertices make in their order.
+pub fn triangles_of(mode: Mode, indices: &[u32]) -> Vec<[u32; 3]> {
     match mode {
         Mode::TriangleStrip => {
             let turned = |(k, window): (usize, &[u32])| {

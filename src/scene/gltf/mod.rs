@@ -14,13 +14,15 @@ mod ktx2;
 mod lights;
 mod malformed;
 mod materials;
-mod meshes;
+mod members;
+pub mod meshes;
 pub mod source;
 mod tangents;
 mod textures;
 mod transforms;
 mod unread;
 mod uri;
+pub mod writer;
 
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -34,39 +36,29 @@ use serde_json::{Value, json};
 
 use super::file::read as read_file;
 use super::geometry::PLACE_ERROR;
+use super::layers::PARAMETERS;
 use super::light::LUMENS_PER_WATT;
 use super::{Material, Mesh, Progress, Reading, Scene, solids};
 use crate::error::{Error, Result};
 use crate::text::{counted, in_metres, some_of};
 use accessor::Vertices;
 use animation::Pose;
-use compressed::Target;
 use meshes::{Part, ReadPrimitive};
 use textures::Wanted;
 use transforms::Transform;
 
 /// Hides nodes and all below them.
 const VISIBILITY: &str = "KHR_node_visibility";
-const READ_EXTENSIONS: [&str; 24] = [
+/// Beside those of materials that [`PARAMETERS`] lists.
+const READ_EXTENSIONS: [&str; 13] = [
     "EXT_lights_image_based",
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",
     "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
-    "KHR_materials_anisotropy",
-    "KHR_materials_clearcoat",
-    "KHR_materials_diffuse_transmission",
-    "KHR_materials_dispersion",
     "KHR_materials_emissive_strength",
-    "KHR_materials_ior",
-    "KHR_materials_iridescence",
     "KHR_materials_pbrSpecularGlossiness",
-    "KHR_materials_sheen",
-    "KHR_materials_specular",
-    "KHR_materials_transmission",
-    "KHR_materials_unlit",
-    "KHR_materials_volume",
     "KHR_mesh_quantization",
     "KHR_meshopt_compression",
     VISIBILITY,
@@ -121,14 +113,15 @@ pub fn load(path: &Path, reading: Reading, progress: Progress) -> Result<Scene> 
     let shown = unread::take_out(&mut json, reading.at.is_some(), &mut left_out);
     let image_light = image_light::of(&json);
     let buffer_count = json["buffers"].as_array().map_or(0, Vec::len);
-    let unpacked = compressed::unpack(path, &mut json, binary.as_deref(), Target { buffer: buffer_count, start: 0 })?;
+    let unpacked = compressed::unpack(path, &mut json, binary.as_deref(), (buffer_count, 0))?;
     if let (false, Some(buffers)) = (unpacked.is_empty(), json.get_mut("buffers").and_then(Value::as_array_mut)) {
         buffers.push(json!({"byteLength": unpacked.len()}));
     }
     let transforms = transforms::of_nodes(&json);
+    let material_values = json["materials"].as_array().cloned().unwrap_or_default();
     let mut root = malformed::root(json).map_err(refuse)?;
     // Before anything else: what a file needs an extension for may look missing without it.
-    let is_unread = |name: &&str| !READ_EXTENSIONS.contains(name) && !OPTIONAL_EXTENSIONS.contains(name);
+    let is_unread = |name: &&str| !is_read(name) && !OPTIONAL_EXTENSIONS.contains(name);
     let unread: Vec<&str> = root.extensions_required.iter().map(String::as_str).filter(is_unread).collect();
     if !unread.is_empty() {
         let remedies: BTreeSet<&str> = unread.iter().map(|name| remedy(name)).collect();
@@ -155,6 +148,7 @@ pub fn load(path: &Path, reading: Reading, progress: Progress) -> Result<Scene> 
         triangle_count: 0,
         wanted_textures: Vec::new(),
         texture_places: HashMap::new(),
+        material_values,
         materials: HashMap::new(),
         material_places: HashMap::new(),
         is_quantized: document.extensions_used().any(|extension| extension == "KHR_mesh_quantization"),
@@ -171,10 +165,14 @@ pub fn load(path: &Path, reading: Reading, progress: Progress) -> Result<Scene> 
     if let Some(light) = image_light {
         loader.read_image_light(&document, light)?;
     }
-    for extension in document.extensions_used().filter(|extension| !READ_EXTENSIONS.contains(extension)) {
+    for extension in document.extensions_used().filter(|extension| !is_read(extension)) {
         loader.leave_out(format!("the extension {extension}"), "");
     }
     loader.finish()
+}
+
+fn is_read(extension: &str) -> bool {
+    READ_EXTENSIONS.contains(&extension) || PARAMETERS.iter().any(|(name, _)| *name == extension)
 }
 
 /// How to write a file that does without an extension.
@@ -249,6 +247,8 @@ pub(super) struct Loader {
     /// The scene's textures, in order.
     wanted_textures: Vec<Wanted>,
     texture_places: HashMap<Wanted, usize>,
+    /// All materials as the file has them.
+    material_values: Vec<Value>,
     /// Materials that meshes use, by their number in the file; `None`: that of primitives that name none.
     materials: HashMap<Option<usize>, Material>,
     /// Their places in the scene, by what they are without: normal map, that of the coat, anisotropy.

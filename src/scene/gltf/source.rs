@@ -4,18 +4,21 @@ use std::path::{Path, PathBuf};
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
+use gltf::accessor::{DataType, Dimensions};
+use gltf::json::validation::Checked;
+use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::compressed::{self, Target};
-use super::{malformed, one_line, read_file, uri};
+use super::accessor::{integer, kind_of, largest, stored};
+use super::compressed;
+use super::malformed::{self, Chunk};
+use super::members::{index, items};
+use super::{one_line, read_file, uri};
 use crate::error::{Error, Result};
 
 /// The chunk of a `.glb` file that is its first buffer.
 const BINARY_CHUNK: [u8; 4] = *b"BIN\0";
 const JSON_CHUNK: [u8; 4] = *b"JSON";
-
-/// Kind and content.
-pub type Chunk = ([u8; 4], Vec<u8>);
 
 /// A file as it was written.
 pub struct File {
@@ -41,7 +44,7 @@ pub struct Elements {
     /// Numbers in one element.
     pub components: usize,
     pub count: usize,
-    pub component_type: u64,
+    pub kind: DataType,
 }
 
 /// A file that another names.
@@ -56,14 +59,13 @@ impl File {
         let refuse = |reason: String| Error::Scene { path: path.to_owned(), object: "the file".into(), reason: one_line(&reason) };
         let content = read_file(path).map_err(refuse)?;
         let is_binary = content.starts_with(b"glTF");
-        let mut chunks = if is_binary { chunks(&content).map_err(refuse)? } else { vec![(JSON_CHUNK, content)] }.into_iter();
-        let text = chunks.next().filter(|(kind, _)| *kind == JSON_CHUNK).ok_or_else(|| refuse("has no JSON".into()))?.1;
+        let parts = malformed::parts(&content).map_err(refuse)?;
+        let other_chunks = if is_binary { malformed::other_chunks(&content, &parts).map_err(refuse)? } else { Vec::new() };
+        let malformed::Parts { json: text, mut binary } = parts;
         let mut json = malformed::json(&text).map_err(refuse)?;
-        let mut other_chunks: Vec<_> = chunks.collect();
-        let mut binary = other_chunks.iter().position(|(kind, _)| *kind == BINARY_CHUNK).map(|place| other_chunks.remove(place).1);
         let is_unpacked = unpack(path, &mut json, &mut binary)?;
         let mut buffers = Vec::new();
-        for (index, buffer) in json["buffers"].as_array().into_iter().flatten().enumerate() {
+        for (index, buffer) in items(&json["buffers"]).enumerate() {
             buffers.push(match buffer["uri"].as_str() {
                 Some(uri) => Some(uri::read(path, uri).map_err(|reason| refuse(format!("has a buffer {index} that {reason}")))?),
                 None if index == 0 => binary.clone(),
@@ -79,7 +81,7 @@ impl File {
 
     /// Files that buffers and images name, each once.
     pub fn beside(&self) -> Vec<Beside> {
-        let of = |list: &str| self.json[list].as_array().into_iter().flatten().filter_map(|member| member["uri"].as_str());
+        let of = |list: &str| items(&self.json[list]).filter_map(|member| member["uri"].as_str());
         let mut uris: Vec<&str> = of("buffers").chain(of("images")).filter(|uri| !uri.contains(':') && !uri.is_empty()).collect();
         uris.sort_unstable();
         uris.dedup();
@@ -94,54 +96,51 @@ impl File {
     pub fn elements(&self, accessor: usize, what: &str) -> Result<Elements> {
         let json = &self.json["accessors"][accessor];
         let refuse = |reason: &str| self.refuse(what, format!("has the accessor {accessor}, which {reason}"));
-        let number = |value: &Value| value.as_u64().and_then(|number| usize::try_from(number).ok());
-        let component_type = json["componentType"].as_u64().unwrap_or_default();
-        let number_bytes = number_bytes(component_type).ok_or_else(|| refuse("has no numbers that glTF knows"))?;
-        let (columns, rows) = match json["type"].as_str() {
-            Some("SCALAR") => (1, 1),
-            Some("VEC2") => (1, 2),
-            Some("VEC3") => (1, 3),
-            Some("VEC4") => (1, 4),
-            Some("MAT2") => (2, 2),
-            Some("MAT3") => (3, 3),
-            Some("MAT4") => (4, 4),
-            _ => return Err(refuse("has a type that glTF does not know")),
+        let kind = kind_of(&json["componentType"]).ok_or_else(|| refuse("has no numbers that glTF knows"))?;
+        let Ok(Checked::Valid(dimensions)) = Checked::<Dimensions>::deserialize(&json["type"]) else {
+            return Err(refuse("has a type that glTF does not know"));
+        };
+        let components = dimensions.multiplicity();
+        let columns = match dimensions {
+            Dimensions::Mat2 => 2,
+            Dimensions::Mat3 => 3,
+            Dimensions::Mat4 => 4,
+            _ => 1,
         };
         // Columns of matrices begin at multiples of four bytes.
-        let column_bytes = if columns > 1 { (rows * number_bytes).next_multiple_of(4) } else { rows * number_bytes };
-        let size = columns * column_bytes;
-        let count = number(&json["count"]).ok_or_else(|| refuse("says no count"))?;
+        let column_bytes = components / columns * kind.size();
+        let size = if columns > 1 { columns * column_bytes.next_multiple_of(4) } else { column_bytes };
+        let count = index(&json["count"]).ok_or_else(|| refuse("says no count"))?;
         let mut bytes = match json.get("bufferView") {
-            Some(view) => self.slice(view, number(&json["byteOffset"]).unwrap_or(0), count, size).map_err(|reason| refuse(&reason))?,
+            Some(view) => self.slice(view, index(&json["byteOffset"]).unwrap_or(0), count, size).map_err(|reason| refuse(&reason))?,
             None => vec![0; count.checked_mul(size).filter(|bytes| *bytes <= 1 << 32).ok_or_else(|| refuse("is too large"))?],
         };
         if let Some(sparse) = json.get("sparse") {
-            let replaced = number(&sparse["count"]).ok_or_else(|| refuse("is sparse and says no count"))?;
-            let index_bytes =
-                number_bytes_of(&sparse["indices"]["componentType"]).ok_or_else(|| refuse("has sparse indices of no type"))?;
+            let replaced = index(&sparse["count"]).ok_or_else(|| refuse("is sparse and says no count"))?;
+            let index_kind = kind_of(&sparse["indices"]["componentType"]).ok_or_else(|| refuse("has sparse indices of no type"))?;
+            let index_bytes = index_kind.size();
             let part = |name: &str, size: usize| {
-                let offset = number(&sparse[name]["byteOffset"]).unwrap_or(0);
+                let offset = index(&sparse[name]["byteOffset"]).unwrap_or(0);
                 self.slice(&sparse[name]["bufferView"], offset, replaced, size).map_err(|reason| refuse(&reason))
             };
             let (indices, values) = (part("indices", index_bytes)?, part("values", size)?);
             for (index, value) in indices.chunks_exact(index_bytes).zip(values.chunks_exact(size)) {
-                let place = size * unsigned(index) as usize;
+                let place = size * integer(index) as usize;
                 bytes.get_mut(place..place + size).ok_or_else(|| refuse("replaces an element that is not there"))?.copy_from_slice(value);
             }
         }
-        Ok(Elements { bytes, size, components: columns * rows, count, component_type })
+        Ok(Elements { bytes, size, components, count, kind })
     }
 
     /// `count` elements of `size` bytes from `offset` in a buffer view, one after another.
     fn slice(&self, view: &Value, offset: usize, count: usize, size: usize) -> std::result::Result<Vec<u8>, String> {
-        let number = |value: &Value| value.as_u64().and_then(|number| usize::try_from(number).ok());
-        let view = number(view).and_then(|view| self.json["bufferViews"].get(view)).ok_or("lies in a buffer view that is not there")?;
-        let bytes = number(&view["buffer"]).and_then(|buffer| self.buffers.get(buffer)).and_then(Option::as_ref);
+        let view = index(view).and_then(|view| self.json["bufferViews"].get(view)).ok_or("lies in a buffer view that is not there")?;
+        let bytes = index(&view["buffer"]).and_then(|buffer| self.buffers.get(buffer)).and_then(Option::as_ref);
         let bytes = bytes.ok_or("lies in a buffer that is not there")?;
-        let start = number(&view["byteOffset"]).unwrap_or(0);
-        let end = number(&view["byteLength"]).and_then(|length| start.checked_add(length));
+        let start = index(&view["byteOffset"]).unwrap_or(0);
+        let end = index(&view["byteLength"]).and_then(|length| start.checked_add(length));
         let bytes = end.and_then(|end| bytes.get(start..end)).ok_or("lies in a buffer view that runs past its buffer")?;
-        let stride = number(&view["byteStride"]).unwrap_or(size);
+        let stride = index(&view["byteStride"]).unwrap_or(size);
         let element = |k: usize| {
             let place = k.checked_mul(stride)?.checked_add(offset)?;
             bytes.get(place..place.checked_add(size)?)
@@ -157,42 +156,13 @@ impl Elements {
     /// A number of an element as it is stored; matrices have gaps and are not asked for.
     pub fn number(&self, element: usize, component: usize) -> f64 {
         let width = self.size / self.components;
-        let bytes = &self.bytes[element * self.size + component * width..][..width];
-        match self.component_type {
-            5120 => f64::from(bytes[0] as i8),
-            5122 => f64::from(unsigned(bytes) as u16 as i16),
-            5126 => f64::from(f32::from_bits(unsigned(bytes))),
-            _ => f64::from(unsigned(bytes)),
-        }
+        stored(&self.bytes[element * self.size + component * width..][..width], self.kind)
     }
 
     /// What whole numbers are divided by where they stand for shares.
     pub fn largest(&self) -> f64 {
-        match self.component_type {
-            5120 => 127.0,
-            5121 => 255.0,
-            5122 => 32_767.0,
-            5123 => 65_535.0,
-            _ => 1.0,
-        }
+        largest(self.kind)
     }
-}
-
-fn number_bytes(component_type: u64) -> Option<usize> {
-    match component_type {
-        5120 | 5121 => Some(1),
-        5122 | 5123 => Some(2),
-        5125 | 5126 => Some(4),
-        _ => None,
-    }
-}
-
-fn number_bytes_of(component_type: &Value) -> Option<usize> {
-    component_type.as_u64().and_then(number_bytes)
-}
-
-fn unsigned(bytes: &[u8]) -> u32 {
-    bytes.iter().rev().fold(0, |value, byte| value << 8 | u32::from(*byte))
 }
 
 /// Unpacks what is compressed, behind what a free binary part has, else into one more buffer; whether something was.
@@ -200,7 +170,7 @@ fn unpack(path: &Path, json: &mut Value, binary: &mut Option<Vec<u8>>) -> Result
     let buffers = json["buffers"].as_array().map_or(0, Vec::len);
     let is_free = binary.is_some() && json["buffers"][0]["uri"].is_null();
     let start = binary.as_ref().map_or(0, |binary| binary.len().next_multiple_of(4));
-    let target = if is_free { Target { buffer: 0, start } } else { Target { buffer: buffers, start: 0 } };
+    let target = if is_free { (0, start) } else { (buffers, 0) };
     let unpacked = compressed::unpack(path, json, binary.as_deref(), target)?;
     if unpacked.is_empty() {
         return Ok(false);
@@ -219,21 +189,6 @@ fn unpack(path: &Path, json: &mut Value, binary: &mut Option<Vec<u8>>) -> Result
         }
     }
     Ok(true)
-}
-
-/// The chunks of a `.glb` file.
-fn chunks(content: &[u8]) -> std::result::Result<Vec<Chunk>, String> {
-    // Its head.
-    malformed::parts(content)?;
-    let mut rest = content.get(12..).unwrap_or_default();
-    let mut chunks = Vec::new();
-    while let Some((head, after)) = rest.split_at_checked(8) {
-        let length = unsigned(&head[..4]) as usize;
-        let (chunk, after) = after.split_at_checked(length).ok_or("has a chunk that runs past its end")?;
-        chunks.push(([head[4], head[5], head[6], head[7]], chunk.to_vec()));
-        rest = after;
-    }
-    Ok(chunks)
 }
 
 /// A `.glb` file of these parts; each is filled up to a multiple of four bytes.

@@ -10,24 +10,13 @@ use serde::de::IntoDeserializer;
 use serde::de::value::Error as Fault;
 use serde_json::{Value, json};
 
-use super::{LeftOut, READ_EXTENSIONS, VISIBILITY, called, image_light, named};
+use super::members::{entries, index, items, items_mut};
+use super::{LeftOut, VISIBILITY, called, image_light, is_read, named};
+use crate::scene::layers::PARAMETERS;
 use crate::text::echo;
 
 const LIGHTS: &str = "/extensions/KHR_lights_punctual";
 const SPEC_GLOSS: &str = "KHR_materials_pbrSpecularGlossiness";
-/// Each of these says that it must not stand beside [`SPEC_GLOSS`].
-const NOT_BESIDE_SPEC_GLOSS: [&str; 10] = [
-    "KHR_materials_anisotropy",
-    "KHR_materials_clearcoat",
-    "KHR_materials_diffuse_transmission",
-    "KHR_materials_dispersion",
-    "KHR_materials_ior",
-    "KHR_materials_iridescence",
-    "KHR_materials_sheen",
-    "KHR_materials_specular",
-    "KHR_materials_transmission",
-    "KHR_materials_volume",
-];
 
 /// Lists keep their length, as their members are named by numbers. Gives the numbers of the scene's nodes that are not hidden.
 pub(super) fn take_out(root: &mut Value, is_posed: bool, left_out: &mut LeftOut) -> BTreeSet<usize> {
@@ -51,14 +40,14 @@ pub(super) fn take_out(root: &mut Value, is_posed: bool, left_out: &mut LeftOut)
     for node in &nodes {
         let (node, json) = (*node, &root["nodes"][*node]);
         name_unread_extensions(json, &called("node", json["name"].as_str(), node), left_out);
-        let Some(mesh) = number(&json["mesh"]) else { continue };
+        let Some(mesh) = index(&json["mesh"]) else { continue };
         meshes.insert(mesh);
         let name = json["name"].as_str().or(root["meshes"][mesh]["name"].as_str());
         let owner = format!("mesh '{}'", named("mesh", name, mesh));
         for primitive in items(&root["meshes"][mesh]["primitives"]) {
-            materials.extend(number(&primitive["material"]));
+            materials.extend(index(&primitive["material"]));
             name_unread_extensions(primitive, &owner, left_out);
-            let mut shifted = items(&primitive["targets"]).flat_map(|target| target.as_object().into_iter().flatten());
+            let mut shifted = items(&primitive["targets"]).flat_map(entries);
             if shifted.any(|(name, _)| name.starts_with("TEXCOORD_") || name.starts_with("COLOR_")) {
                 left_out.add("texture coordinates and colours of morph targets", &owner);
             }
@@ -76,7 +65,7 @@ pub(super) fn take_out(root: &mut Value, is_posed: bool, left_out: &mut LeftOut)
         }
     }
     let of_textures =
-        |member: &str| -> BTreeSet<usize> { textures.iter().filter_map(|texture| number(&root["textures"][*texture][member])).collect() };
+        |member: &str| -> BTreeSet<usize> { textures.iter().filter_map(|texture| index(&root["textures"][*texture][member])).collect() };
     let (mut images, samplers) = (of_textures("source"), of_textures("sampler"));
     images.extend(image_light::images(root));
     for (list, used, blank) in
@@ -124,7 +113,7 @@ fn add_scene(root: &mut Value) {
     if items(&root["nodes"]).next().is_none() {
         return;
     }
-    let below: BTreeSet<usize> = items(&root["nodes"]).flat_map(|node| items(&node["children"])).filter_map(number).collect();
+    let below: BTreeSet<usize> = items(&root["nodes"]).flat_map(|node| items(&node["children"])).filter_map(index).collect();
     let roots: Vec<usize> = (0..items(&root["nodes"]).count()).filter(|node| !below.contains(node)).collect();
     root["scenes"] = json!([{"nodes": roots}]);
 }
@@ -153,19 +142,19 @@ fn take_animations(root: &mut Value, is_posed: bool, nodes: &BTreeSet<usize>, le
         }
         // Meshes that are not in the scene are taken out.
         let is_elsewhere = |node: usize| root["nodes"].get(node).is_some() && !nodes.contains(&node);
-        channels.retain(|channel| channel["target"]["path"] != "weights" || !number(&channel["target"]["node"]).is_some_and(is_elsewhere));
+        channels.retain(|channel| channel["target"]["path"] != "weights" || !index(&channel["target"]["node"]).is_some_and(is_elsewhere));
     }
     root["animations"] = animations.into();
 }
 
 /// Without those that are hidden, and all below these.
 fn nodes_of_scene(root: &Value) -> BTreeSet<usize> {
-    let scene = number(&root["scene"]).unwrap_or(0);
+    let scene = index(&root["scene"]).unwrap_or(0);
     let mut found = BTreeSet::new();
-    let mut next: Vec<usize> = items(&root["scenes"][scene]["nodes"]).filter_map(number).collect();
+    let mut next: Vec<usize> = items(&root["scenes"][scene]["nodes"]).filter_map(index).collect();
     while let Some(node) = next.pop() {
         if root["nodes"][node]["extensions"][VISIBILITY]["visible"] != false && found.insert(node) {
-            next.extend(items(&root["nodes"][node]["children"]).filter_map(number));
+            next.extend(items(&root["nodes"][node]["children"]).filter_map(index));
         }
     }
     found
@@ -173,19 +162,19 @@ fn nodes_of_scene(root: &Value) -> BTreeSet<usize> {
 
 /// Numbers of all that the scene reads.
 fn accessors(root: &Value, nodes: &BTreeSet<usize>) -> BTreeSet<usize> {
-    let members = |object: &Value| -> Vec<usize> { object.as_object().into_iter().flatten().filter_map(|(_, of)| number(of)).collect() };
+    let members = |object: &Value| -> Vec<usize> { entries(object).filter_map(|(_, of)| index(of)).collect() };
     let mut found = BTreeSet::new();
     for primitive in items(&root["meshes"]).flat_map(|mesh| items(&mesh["primitives"])) {
         found.extend(members(&primitive["attributes"]));
-        found.extend(number(&primitive["indices"]));
+        found.extend(index(&primitive["indices"]));
         found.extend(items(&primitive["targets"]).flat_map(members));
     }
     for node in nodes.iter().map(|node| &root["nodes"][*node]) {
         found.extend(members(&node["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]));
-        found.extend(number(&node["skin"]).and_then(|skin| number(&root["skins"][skin]["inverseBindMatrices"])));
+        found.extend(index(&node["skin"]).and_then(|skin| index(&root["skins"][skin]["inverseBindMatrices"])));
     }
     for sampler in items(&root["animations"]).flat_map(|animation| items(&animation["samplers"])) {
-        found.extend(["input", "output"].iter().filter_map(|member| number(&sampler[member])));
+        found.extend(["input", "output"].iter().filter_map(|member| index(&sampler[member])));
     }
     found
 }
@@ -194,11 +183,11 @@ fn accessors(root: &Value, nodes: &BTreeSet<usize>) -> BTreeSet<usize> {
 fn views(root: &Value) -> BTreeSet<usize> {
     let of_accessor = |accessor: &Value| {
         let sparse = &accessor["sparse"];
-        [number(&accessor["bufferView"]), number(&sparse["indices"]["bufferView"]), number(&sparse["values"]["bufferView"])]
+        [index(&accessor["bufferView"]), index(&sparse["indices"]["bufferView"]), index(&sparse["values"]["bufferView"])]
     };
-    let of_primitive = |primitive: &Value| number(&primitive["extensions"]["KHR_draco_mesh_compression"]["bufferView"]);
+    let of_primitive = |primitive: &Value| index(&primitive["extensions"]["KHR_draco_mesh_compression"]["bufferView"]);
     let mut found: BTreeSet<usize> = items(&root["accessors"]).flat_map(of_accessor).flatten().collect();
-    found.extend(items(&root["images"]).filter_map(|image| number(&image["bufferView"])));
+    found.extend(items(&root["images"]).filter_map(|image| index(&image["bufferView"])));
     found.extend(items(&root["meshes"]).flat_map(|mesh| items(&mesh["primitives"])).filter_map(of_primitive));
     found
 }
@@ -221,7 +210,7 @@ fn take_out_of_mesh(mesh: &mut Value, owner: &str, left_out: &mut LeftOut) {
 /// of pictures, which their bytes say, the cone of a spot light. Takes out what views say to graphics cards.
 fn allow_missing_members(root: &mut Value) {
     let primitives = || items(&root["meshes"]).flat_map(|mesh| items(&mesh["primitives"]));
-    let positions: BTreeSet<usize> = primitives().filter_map(|primitive| number(&primitive["attributes"]["POSITION"])).collect();
+    let positions: BTreeSet<usize> = primitives().filter_map(|primitive| index(&primitive["attributes"]["POSITION"])).collect();
     for (_, accessor) in items_mut(root, "accessors").filter(|(place, _)| positions.contains(place)) {
         if let Some(accessor) = accessor.as_object_mut() {
             accessor.extend([("min".to_owned(), json!([0, 0, 0])), ("max".to_owned(), json!([0, 0, 0]))]);
@@ -261,8 +250,9 @@ fn take_out_of_material(material: &mut Value, owner: &str, left_out: &mut LeftOu
     let Some(extensions) = material.get_mut("extensions").and_then(Value::as_object_mut) else { return };
     extensions.retain(|name, _| is_read(name));
     if extensions.contains_key(SPEC_GLOSS) && !extensions.contains_key("KHR_materials_unlit") {
-        for name in NOT_BESIDE_SPEC_GLOSS {
-            if extensions.remove(name).is_some() {
+        // Each says that it must not stand beside the other.
+        for name in PARAMETERS.iter().map(|(group, _)| group) {
+            if extensions.remove(*name).is_some() {
                 left_out.add(format!("the extension {name} beside {SPEC_GLOSS}, where glTF forbids it"), owner);
             }
         }
@@ -272,36 +262,19 @@ fn take_out_of_material(material: &mut Value, owner: &str, left_out: &mut LeftOu
 }
 
 fn name_unread_extensions(object: &Value, owner: &str, left_out: &mut LeftOut) {
-    for name in object["extensions"].as_object().into_iter().flat_map(|extensions| extensions.keys()).filter(|name| !is_read(name)) {
+    for name in entries(&object["extensions"]).map(|(name, _)| name).filter(|name| !is_read(name)) {
         left_out.add(format!("the extension {name}"), owner);
     }
 }
 
-fn is_read(extension: &str) -> bool {
-    READ_EXTENSIONS.contains(&extension)
-}
-
 /// The numbers of all textures that a material names.
 fn find_textures(value: &Value, found: &mut BTreeSet<usize>) {
-    for (name, member) in value.as_object().into_iter().flatten() {
+    for (name, member) in entries(value) {
         if name.ends_with("Texture") {
-            found.extend(number(&member["index"]));
+            found.extend(index(&member["index"]));
         }
         find_textures(member, found);
     }
-}
-
-fn number(value: &Value) -> Option<usize> {
-    value.as_u64().and_then(|number| number.try_into().ok())
-}
-
-fn items(list: &Value) -> impl Iterator<Item = &Value> {
-    list.as_array().into_iter().flatten()
-}
-
-/// With their places.
-fn items_mut<'a>(root: &'a mut Value, list: &str) -> impl Iterator<Item = (usize, &'a mut Value)> + use<'a> {
-    root.get_mut(list).and_then(Value::as_array_mut).into_iter().flatten().enumerate()
 }
 
 /// Whether it was there.
