@@ -64,13 +64,8 @@ impl Faces {
                 // Of a room the back is outside, and of a shell that is turned the front is inside.
                 hides: match closed.get(triangle) {
                     None => 1.0,
-                    Some(facing) => {
-                        if (*facing < 0.0) == is_turned(triangle) {
-                            *facing
-                        } else {
-                            0.0
-                        }
-                    }
+                    Some(facing) if (*facing < 0.0) == is_turned(triangle) => *facing,
+                    Some(_) => 0.0,
                 },
             };
             (0..if is_opaque { mesh.triangles.len() } else { 0 }).map(face)

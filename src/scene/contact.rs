@@ -48,13 +48,8 @@ impl Touching<'_> {
         let shows_both = cosine > 0.0 || self.material.has_two_sides() || other.material.has_two_sides();
         match (self.kind, other.kind) {
             (Kind::Solid, Kind::Solid) if has_medium(self.material) && has_medium(other.material) => Contact::Both,
-            (Kind::Solid, Kind::Solid) => {
-                if cosine > 0.0 {
-                    Contact::Once
-                } else {
-                    Contact::None
-                }
-            }
+            (Kind::Solid, Kind::Solid) if cosine > 0.0 => Contact::Once,
+            (Kind::Solid, Kind::Solid) => Contact::None,
             (Kind::Solid, Kind::Opaque) | (Kind::Opaque, Kind::Solid) => Contact::Once,
             _ if !shows_both => Contact::None,
             (Kind::Opaque, Kind::Opaque) => Contact::Once,

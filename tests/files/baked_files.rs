@@ -307,7 +307,7 @@ fn same_corners(before: &File, primitive: &Value, after: &File, new: &Value) -> 
     }
     for (name, old, new) in pairs {
         let (one, two) = (before.elements(old, "old").unwrap(), after.elements(new, "new").unwrap());
-        require(one.component_type == two.component_type && one.size == two.size, || format!("{name} has another type"))?;
+        require(one.kind == two.kind && one.size == two.size, || format!("{name} has another type"))?;
         let element = |of: &photonmill::scene::gltf::source::Elements, vertex: usize| of.bytes[vertex * of.size..][..of.size].to_vec();
         let is_same = old_vertices.len() == new_vertices.len()
             && old_vertices.iter().zip(&new_vertices).all(|(a, b)| element(&one, *a) == element(&two, *b));

@@ -11,7 +11,8 @@ use serde_json::{Value, json};
 
 use super::accessor::{integer, kind_of, largest, stored};
 use super::compressed;
-use super::malformed::{self, Chunk};
+use super::malformed;
+pub use super::malformed::Chunk;
 use super::members::{index, items};
 use super::{one_line, read_file, uri};
 use crate::error::{Error, Result};
