@@ -29,9 +29,7 @@ void add_to_parts(uint kept, uint pixel, uint pixel_count, uint part, uint chann
     if (kept != NONE) {
         add_to_part(place_of_part(kept, part, channel), units);
     }
-    if (HAS_PARTS) {
-        if (part != 0) {
-            add_to_part(place_of_pixel_part(pixel, pixel_count, part, channel), units);
-        }
+    if (HAS_PARTS && part != 0) {
+        add_to_part(place_of_pixel_part(pixel, pixel_count, part, channel), units);
     }
 }

@@ -137,10 +137,7 @@ void main()
             continue;
         }
         vec3 flux = gathered_flux((arrival - first_arrival) * push.point_count + place);
-        bool is_caustic = false;
-        if (HAS_CAUSTIC_MAP) {
-            is_caustic = arrival == 1;
-        }
+        bool is_caustic = HAS_CAUSTIC_MAP && arrival == 1;
         uint pixel = pixel_of_point(place, push.pixel_count);
         uint kind = is_caustic ? HIT_CAUSTIC_PHOTON : HIT_GLOBAL_PHOTON;
         bool is_new = !is_reached(pixel, kind);

@@ -23,11 +23,7 @@ void main()
         return;
     }
     uvec4 place = map[2 * index];
-    bool is_there = true;
-    if (HAS_SLOTS) {
-        is_there = place.w != NONE;
-    }
-    if (is_there) {
+    if (!HAS_SLOTS || place.w != NONE) {
         ranks[index] = atomicAdd(cells[bucket_of(cell_at(uintBitsToFloat(place.xyz), push), push)], 1);
     }
 }

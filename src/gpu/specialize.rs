@@ -1,8 +1,8 @@
-//! Branches on specialization constants are decided before a driver sees a module.
+//! What follows from specialization constants is decided before a driver sees a module: branches, and the `&&` and `||` that lead to them.
 //!
 //! A driver specializes a module too, but some inline every function first: what a run leaves out, strict arithmetic in
-//! every quotient above all, then costs them more time to compile than what it needs. Only the way through the code
-//! changes; blocks that no way leads to stay, and are passed over.
+//! every quotient above all, then costs them more time to compile than what it needs. So `if (HAS_X && condition)` leaves no more
+//! than `condition` in a branch, or nothing.
 
 use std::collections::{HashMap, HashSet};
 
@@ -20,13 +20,24 @@ mod op {
     pub const FUNCTION: u32 = 54;
     pub const FUNCTION_END: u32 = 56;
     pub const FUNCTION_CALL: u32 = 57;
+    pub const VARIABLE: u32 = 59;
+    pub const LOAD: u32 = 61;
+    pub const ACCESS_CHAIN: u32 = 65;
     pub const DECORATE: u32 = 71;
+    pub const COPY_OBJECT: u32 = 83;
+    /// The first and the last of those that compute a value: conversions, arithmetic, comparisons.
+    pub const CONVERT_F_TO_U: u32 = 109;
+    pub const BIT_COUNT: u32 = 205;
+    pub const LOGICAL_OR: u32 = 166;
+    pub const LOGICAL_AND: u32 = 167;
     pub const PHI: u32 = 245;
+    pub const LOOP_MERGE: u32 = 246;
     pub const SELECTION_MERGE: u32 = 247;
     pub const LABEL: u32 = 248;
     pub const BRANCH: u32 = 249;
     pub const BRANCH_CONDITIONAL: u32 = 250;
     pub const SWITCH: u32 = 251;
+    pub const NAME: u32 = 5;
     pub const ENTRY_POINT: u32 = 15;
     pub const EXECUTION_MODE: u32 = 16;
     pub const EXECUTION_MODE_ID: u32 = 331;
@@ -36,34 +47,22 @@ pub(super) const HEADER_WORDS: usize = 5;
 /// Of the decoration that gives a constant the number by which it is specialized.
 const SPEC_ID: u32 = 1;
 
-/// The module with its branches on these constants (number and value; others keep their defaults) decided.
+/// The module with all decided that these constants (number and value; others keep their defaults) decide.
 ///
 /// Numbers and names are those of the SPIR-V specification, version 1.6, section 3.
 pub(super) fn decided(words: &[u32], constants: &[(u32, u32)]) -> Vec<u32> {
-    let values = values(words, constants);
-    // Ways that are no longer taken: from block to block.
-    let mut closed: HashSet<(u32, u32)> = HashSet::new();
-    let mut result = words[..HEADER_WORDS].to_vec();
-    let mut block = 0;
-    let mut rest = instructions(words).peekable();
-    while let Some(instruction) = rest.next() {
-        if opcode(instruction) == op::LABEL {
-            block = instruction[1];
+    let mut values = values(words, constants);
+    let mut copies = HashMap::new();
+    let mut result = words.to_vec();
+    // What one step decides may decide more: a branch the phi behind it, and that phi the next branch.
+    loop {
+        let next = without_unreached(&folded(&result, &mut values, &mut copies));
+        if next == result {
+            break;
         }
-        let branch = rest.peek().filter(|next| opcode(instruction) == op::SELECTION_MERGE && opcode(next) == op::BRANCH_CONDITIONAL);
-        let known = branch.and_then(|branch| Some((*branch, *values.get(&branch[1])?)));
-        let Some((branch, condition)) = known else {
-            result.extend_from_slice(instruction);
-            continue;
-        };
-        let (taken, other) = if condition == 0 { (branch[3], branch[2]) } else { (branch[2], branch[3]) };
-        if taken != other {
-            closed.insert((block, other));
-        }
-        result.extend([first_word(op::BRANCH, 2), taken]);
-        rest.next();
+        result = next;
     }
-    without_ways(&result, &closed)
+    without_unused(&joined(&result), words)
 }
 
 /// Values of constants, by the id of their result: of integers and truth values of 32 bits, as far as they are known.
@@ -85,8 +84,7 @@ fn values(words: &[u32], constants: &[(u32, u32)]) -> HashMap<u32, u32> {
             (op::SPEC_CONSTANT_FALSE, [_, _, result]) => drop(values.insert(*result, u32::from(specialized(0) != 0))),
             (op::SPEC_CONSTANT, [_, _, result, default]) => drop(values.insert(*result, specialized(*default))),
             (op::SPEC_CONSTANT_OP, [_, _, result, operation, operands @ ..]) => {
-                let operands: Option<Vec<u32>> = operands.iter().map(|operand| values.get(operand).copied()).collect();
-                if let Some(value) = operands.and_then(|operands| value_of(*operation, &operands)) {
+                if let Some(value) = value_of_known(*operation, operands, &values) {
                     values.insert(*result, value);
                 }
             }
@@ -94,6 +92,12 @@ fn values(words: &[u32], constants: &[(u32, u32)]) -> HashMap<u32, u32> {
         }
     }
     values
+}
+
+/// The value of an operation whose operands are known.
+fn value_of_known(operation: u32, operands: &[u32], values: &HashMap<u32, u32>) -> Option<u32> {
+    let operands: Option<Vec<u32>> = operands.iter().map(|operand| values.get(operand).copied()).collect();
+    value_of(operation, &operands?)
 }
 
 /// What an operation makes of known operands; `None` for one that is not known here.
@@ -118,29 +122,192 @@ fn value_of(operation: u32, operands: &[u32]) -> Option<u32> {
     Some(value)
 }
 
-/// Values that a block takes by the way to it: not by ways that are closed.
-fn without_ways(words: &[u32], closed: &HashSet<(u32, u32)>) -> Vec<u32> {
+/// One step: branches on known conditions go one way, and phis and `&&` and `||` that come to one operand are copies of it.
+/// Adds what that makes known to `values`, and whose copy a result is to `copies`.
+fn folded(words: &[u32], values: &mut HashMap<u32, u32>, copies: &mut HashMap<u32, u32>) -> Vec<u32> {
+    let ways = ways(words);
     let mut result = words[..HEADER_WORDS].to_vec();
     let mut block = 0;
-    for instruction in instructions(words) {
-        match (opcode(instruction), instruction) {
-            (op::PHI, [_, kind, id, choices @ ..]) => {
-                let open: Vec<u32> =
-                    choices.chunks_exact(2).filter(|choice| !closed.contains(&(choice[1], block))).flatten().copied().collect();
-                result.extend([first_word(op::PHI, 3 + open.len()), *kind, *id]);
-                result.extend(open);
+    let mut rest = instructions(words).peekable();
+    while let Some(instruction) = rest.next() {
+        let source_of = |id: &u32| copies.get(id).copied().unwrap_or(*id);
+        let copied = match (opcode(instruction), instruction) {
+            (op::LABEL, [_, label]) => {
+                block = *label;
+                None
+            }
+            (op::SELECTION_MERGE, _) => {
+                let branch = rest.peek().filter(|next| opcode(next) == op::BRANCH_CONDITIONAL);
+                if let Some((branch, value)) = branch.and_then(|branch| Some((*branch, *values.get(&branch[1])?))) {
+                    result.extend([first_word(op::BRANCH, 2), branch[if value == 0 { 3 } else { 2 }]]);
+                    rest.next();
+                    continue;
+                }
+                None
+            }
+            (op::BRANCH_CONDITIONAL, [first, condition, targets @ ..]) => {
+                result.extend([*first, source_of(condition)]);
+                result.extend(targets);
                 continue;
             }
-            (op::LABEL, [_, label]) => block = *label,
-            _ => {}
+            (op::PHI, [_, kind, id, choices @ ..]) => {
+                let is_open = |choice: &&[u32]| ways.get(&choice[1]).is_some_and(|targets| targets.contains(&block));
+                let open: Vec<u32> =
+                    choices.chunks_exact(2).filter(is_open).flat_map(|choice| [source_of(&choice[0]), choice[1]]).collect();
+                if open.len() != 2 {
+                    result.extend([first_word(op::PHI, 3 + open.len()), *kind, *id]);
+                    result.extend(open);
+                    continue;
+                }
+                Some((*kind, *id, open[0]))
+            }
+            (operation @ (op::LOGICAL_OR | op::LOGICAL_AND), [_, kind, id, a, b]) => {
+                let value = |operand: &u32| values.get(operand).map(|value| *value != 0);
+                // True decides `||` and leaves `&&` to the other operand.
+                let operand = match (value(a), value(b)) {
+                    (Some(known), _) => Some(if known == (operation == op::LOGICAL_OR) { a } else { b }),
+                    (_, Some(known)) => Some(if known == (operation == op::LOGICAL_OR) { b } else { a }),
+                    _ => None,
+                };
+                operand.map(|operand| (*kind, *id, source_of(operand)))
+            }
+            (operation, [_, _, id, operands @ ..]) => {
+                if let Some(value) = value_of_known(operation, operands, values) {
+                    values.insert(*id, value);
+                }
+                None
+            }
+            _ => None,
+        };
+        match copied {
+            Some((kind, id, source)) => {
+                result.extend([first_word(op::COPY_OBJECT, 4), kind, id, source]);
+                copies.insert(id, source);
+                if let Some(value) = values.get(&source) {
+                    values.insert(id, *value);
+                }
+            }
+            None => result.extend_from_slice(instruction),
         }
-        result.extend_from_slice(instruction);
     }
     result
 }
 
-/// Digest of what a driver compiles of a decided module: the blocks that some way leads to, what they name, and the values of
-/// the constants (number and value) among that. Modules with the same digest are the same program.
+/// The blocks that each block names: those that it branches to, and those where its branches meet again, which have to exist. Block 0
+/// stands before the first block of each function.
+fn ways(words: &[u32]) -> HashMap<u32, Vec<u32>> {
+    let mut ways: HashMap<u32, Vec<u32>> = HashMap::new();
+    let mut block = 0;
+    for instruction in instructions(words) {
+        let targets = match (opcode(instruction), instruction) {
+            (op::FUNCTION_END, _) => {
+                block = 0;
+                continue;
+            }
+            (op::LABEL, [_, label]) => {
+                if block == 0 {
+                    ways.entry(0).or_default().push(*label);
+                }
+                block = *label;
+                continue;
+            }
+            (op::SELECTION_MERGE | op::BRANCH, [_, target, ..]) => std::slice::from_ref(target),
+            (op::LOOP_MERGE, [_, targets @ .., _]) | (op::BRANCH_CONDITIONAL, [_, _, targets @ ..]) => &targets[..2],
+            // Literals among the targets are no labels, or keep a block that nothing leads to.
+            (op::SWITCH, [_, _, targets @ ..]) => targets,
+            _ => continue,
+        };
+        ways.entry(block).or_default().extend(targets);
+    }
+    ways
+}
+
+/// Without the blocks that no way leads to.
+fn without_unreached(words: &[u32]) -> Vec<u32> {
+    let ways = ways(words);
+    let mut reached: HashSet<u32> = HashSet::new();
+    let mut rest = vec![0];
+    while let Some(block) = rest.pop() {
+        rest.extend(ways.get(&block).into_iter().flatten().filter(|to| reached.insert(**to)));
+    }
+    let mut result = words[..HEADER_WORDS].to_vec();
+    let mut is_reached = true;
+    for instruction in instructions(words) {
+        match opcode(instruction) {
+            op::LABEL => is_reached = reached.contains(&instruction[1]),
+            op::FUNCTION_END => is_reached = true,
+            _ => {}
+        }
+        if is_reached {
+            result.extend_from_slice(instruction);
+        }
+    }
+    result
+}
+
+/// A block that ends in a branch to the next one, which nothing else names, and that next one are one.
+fn joined(words: &[u32]) -> Vec<u32> {
+    let mut named: HashMap<u32, u32> = HashMap::new();
+    ways(words).values().flatten().for_each(|target| *named.entry(*target).or_default() += 1);
+    let code: Vec<&[u32]> = instructions(words).collect();
+    // Blocks that are the end of another, and that other.
+    let mut ends: HashMap<u32, u32> = HashMap::new();
+    let mut block = 0;
+    for three in code.windows(3).filter(|three| opcode(three[2]) == op::LABEL) {
+        let label = three[2][1];
+        let follows = opcode(three[1]) == op::BRANCH && three[1][1] == label && opcode(three[0]) != op::LOOP_MERGE;
+        if follows && named[&label] == 1 {
+            ends.insert(label, block);
+        } else {
+            block = label;
+        }
+    }
+    let mut result = words[..HEADER_WORDS].to_vec();
+    for instruction in code {
+        match (opcode(instruction), instruction) {
+            (op::LABEL | op::BRANCH, [_, label]) if ends.contains_key(label) => {}
+            (op::PHI, [first, kind, id, choices @ ..]) => {
+                result.extend([*first, *kind, *id]);
+                result.extend(choices.chunks_exact(2).flat_map(|choice| [choice[0], *ends.get(&choice[1]).unwrap_or(&choice[1])]));
+            }
+            _ => result.extend_from_slice(instruction),
+        }
+    }
+    result
+}
+
+/// Without values that nothing uses, and without names and decorations of what is no longer there and was in `before`.
+fn without_unused(words: &[u32], before: &[u32]) -> Vec<u32> {
+    let code: Vec<&[u32]> = instructions(words).collect();
+    let mut used: HashSet<u32> =
+        code.iter().filter(|instruction| opcode(instruction) == op::PHI).flat_map(|phi| &phi[3..]).copied().collect();
+    // But for phis, which may name what a loop computes later, what is used stands before its use.
+    let mut kept: Vec<&[u32]> = Vec::with_capacity(code.len());
+    for instruction in code.into_iter().rev() {
+        let only_computes =
+            matches!(opcode(instruction), op::LOAD | op::ACCESS_CHAIN | op::COPY_OBJECT | op::CONVERT_F_TO_U..=op::BIT_COUNT);
+        if !only_computes || used.contains(&instruction[2]) {
+            used.extend(&instruction[1..]);
+            kept.push(instruction);
+        }
+    }
+    kept.reverse();
+    let result = [&words[..HEADER_WORDS], &kept.concat()].concat();
+    let gone = &defined(before) - &defined(&result);
+    let is_about_gone = |instruction: &&[u32]| matches!(opcode(instruction), op::NAME | op::DECORATE) && gone.contains(&instruction[1]);
+    kept.retain(|instruction| !is_about_gone(instruction));
+    [&words[..HEADER_WORDS], &kept.concat()].concat()
+}
+
+/// Constants, variables, and what functions compute; of instructions without a result what they use, which is one of these too.
+fn defined(words: &[u32]) -> HashSet<u32> {
+    let (globals, functions) = parts(words);
+    let values = globals.into_iter().filter(|instruction| (op::CONSTANT_TRUE..=op::VARIABLE).contains(&opcode(instruction)));
+    values.chain(functions.into_values().flatten()).filter_map(|instruction| instruction.get(2)).copied().collect()
+}
+
+/// Digest of what a driver compiles of a decided module: the functions that are called, what they name, and the values of the
+/// constants (number and value) among that. Modules with the same digest are the same program.
 pub(super) fn content(words: &[u32], constants: &[(u32, u32)]) -> [u8; 32] {
     let (globals, functions) = parts(words);
     let mut hash = Sha256::new();
@@ -152,7 +319,7 @@ pub(super) fn content(words: &[u32], constants: &[(u32, u32)]) -> [u8; 32] {
     let mut next = 0;
     while let Some(function) = called.get(next).and_then(|id| functions.get(id)) {
         next += 1;
-        for instruction in reached(function) {
+        for instruction in function {
             add(instruction);
             named.extend(&instruction[1..]);
             if opcode(instruction) == op::FUNCTION_CALL && !called.contains(&instruction[3]) {
@@ -208,46 +375,6 @@ fn parts(words: &[u32]) -> (Instructions<'_>, HashMap<u32, Instructions<'_>>) {
     (globals, functions)
 }
 
-/// Instructions of a function, in their order, without the blocks that no way leads to.
-fn reached<'a>(function: &[&'a [u32]]) -> Instructions<'a> {
-    let mut block = 0;
-    let mut ways: HashMap<u32, Vec<u32>> = HashMap::new();
-    for instruction in function {
-        match (opcode(instruction), *instruction) {
-            (op::LABEL, [_, label]) => {
-                // The first block is where a call leads.
-                let first = ways.is_empty().then_some(*label);
-                block = *label;
-                ways.entry(0).or_default().extend(first);
-                ways.entry(block).or_default();
-            }
-            (op::BRANCH, [_, to]) => ways.entry(block).or_default().push(*to),
-            (op::BRANCH_CONDITIONAL, [_, _, to, other, ..]) => ways.entry(block).or_default().extend([*to, *other]),
-            // Literals among the targets are no labels, or keep a block that nothing leads to.
-            (op::SWITCH, [_, _, targets @ ..]) => ways.entry(block).or_default().extend(targets),
-            _ => {}
-        }
-    }
-    let mut reached: HashSet<u32> = HashSet::from([0]);
-    let mut rest = vec![0];
-    while let Some(block) = rest.pop() {
-        rest.extend(ways.get(&block).into_iter().flatten().filter(|to| reached.insert(**to)));
-    }
-    let mut is_reached = true;
-    let mut kept = Vec::new();
-    for instruction in function {
-        match (opcode(instruction), *instruction) {
-            (op::LABEL, [_, label]) => is_reached = reached.contains(label),
-            (op::FUNCTION_END, _) => is_reached = true,
-            _ => {}
-        }
-        if is_reached {
-            kept.push(*instruction);
-        }
-    }
-    kept
-}
-
 fn is_execution_mode(instruction: &[u32]) -> bool {
     matches!(opcode(instruction), op::EXECUTION_MODE | op::EXECUTION_MODE_ID)
 }
@@ -281,44 +408,45 @@ mod tests {
 
     use super::*;
 
-    /// A function that returns 1 if `%condition` holds, which the text defines, and else 2.
+    /// A function that returns 1 if `%condition` holds, which the text defines before all functions, and else 2.
     fn module(condition: &str) -> Vec<u32> {
-        let text = format!(
-            "OpCapability Shader
-             OpMemoryModel Logical GLSL450
-             OpDecorate %number SpecId 3
-             OpDecorate %flag SpecId 7
-             %bool = OpTypeBool
-             %uint = OpTypeInt 32 0
-             %function = OpTypeFunction %uint
-             %one = OpConstant %uint 1
-             %two = OpConstant %uint 2
-             %number = OpSpecConstant %uint 2
-             %flag = OpSpecConstantFalse %bool
-             {condition}
-             %main = OpFunction %uint None %function
-             %start = OpLabel
-             OpSelectionMerge %end None
+        let body = "OpSelectionMerge %end None
              OpBranchConditional %condition %then %end
              %then = OpLabel
              OpBranch %end
              %end = OpLabel
              %chosen = OpPhi %uint %one %then %two %start
-             OpReturnValue %chosen
+             OpReturnValue %chosen";
+        assembled("", condition, body)
+    }
+
+    /// A function of `%argument` with this body after `%start`.
+    fn assembled(decorations: &str, constants: &str, body: &str) -> Vec<u32> {
+        let text = format!(
+            "OpCapability Shader
+             OpMemoryModel Logical GLSL450
+             {decorations}
+             OpDecorate %number SpecId 3
+             OpDecorate %flag SpecId 7
+             %bool = OpTypeBool
+             %uint = OpTypeInt 32 0
+             %function = OpTypeFunction %uint %uint
+             %one = OpConstant %uint 1
+             %two = OpConstant %uint 2
+             %number = OpSpecConstant %uint 2
+             %flag = OpSpecConstantFalse %bool
+             {constants}
+             %main = OpFunction %uint None %function
+             %argument = OpFunctionParameter %uint
+             %start = OpLabel
+             {body}
              OpFunctionEnd"
         );
         Compiler::new().unwrap().assemble(&text, None).unwrap().as_binary().to_vec()
     }
 
-    /// The blocks that branches lead to without a condition, in the order of the text, and the choices of the last block.
-    fn ways(words: &[u32]) -> (Vec<u32>, usize) {
-        let branches = instructions(words).filter(|instruction| opcode(instruction) == op::BRANCH).map(|branch| branch[1]);
-        let phi = instructions(words).find(|instruction| opcode(instruction) == op::PHI).unwrap();
-        (branches.collect(), (phi.len() - 3) / 2)
-    }
-
-    fn labels(words: &[u32]) -> Vec<u32> {
-        instructions(words).filter(|instruction| opcode(instruction) == op::LABEL).map(|label| label[1]).collect()
+    fn opcodes(words: &[u32]) -> Vec<u32> {
+        instructions(words).map(opcode).collect()
     }
 
     const EQUAL: &str = "%condition = OpSpecConstantOp %bool IEqual %number %two";
@@ -326,30 +454,91 @@ mod tests {
 
     #[test]
     fn branches_go_where_their_constants_say() {
+        const RETURN_VALUE: u32 = 254;
         let both = "%other = OpSpecConstantOp %bool LogicalNot %flag
                     %large = OpSpecConstantOp %bool UGreaterThan %number %two
                     %condition = OpSpecConstantOp %bool LogicalAnd %large %other";
         for (condition, constants, expected) in [
-            (EQUAL, &[][..], true),
-            (EQUAL, &[(3, 2)][..], true),
-            (EQUAL, &[(3, 1)][..], false),
-            (EQUAL, &[(7, 1)][..], true),
-            (both, &[][..], false),
-            (both, &[(3, 3)][..], true),
-            (both, &[(3, 3), (7, 1)][..], false),
+            (EQUAL, &[][..], 1),
+            (EQUAL, &[(3, 2)][..], 1),
+            (EQUAL, &[(3, 1)][..], 2),
+            (EQUAL, &[(7, 1)][..], 1),
+            (both, &[][..], 2),
+            (both, &[(3, 3)][..], 1),
+            (both, &[(3, 3), (7, 1)][..], 2),
             // Any number but 0 is true.
-            (both, &[(3, 3), (7, 2)][..], false),
+            (both, &[(3, 3), (7, 2)][..], 2),
         ] {
-            let words = module(condition);
-            let found = decided(&words, constants);
-            let [_, then, end] = labels(&found)[..] else { panic!("blocks are lost") };
-            // Past %then, whose way to %end stays, or through it, so that the way past it is no choice of %end.
-            assert_eq!(
-                ways(&found),
-                (if expected { vec![then, end] } else { vec![end, end] }, if expected { 1 } else { 2 }),
-                "{condition}"
-            );
-            assert!(instructions(&found).all(|instruction| !matches!(opcode(instruction), op::SELECTION_MERGE | op::BRANCH_CONDITIONAL)));
+            let found = decided(&module(condition), constants);
+            let body = opcodes(&found).into_iter().skip_while(|opcode| *opcode != op::LABEL);
+            assert_eq!(body.collect::<Vec<_>>(), [op::LABEL, op::COPY_OBJECT, RETURN_VALUE, op::FUNCTION_END], "{condition}");
+            let returned = instructions(&found).find(|instruction| opcode(instruction) == op::COPY_OBJECT).unwrap()[3];
+            assert_eq!(values(&found, &[])[&returned], expected, "{condition}");
+        }
+    }
+
+    /// `if` with both conditions in one leaves what one `if` in another does, of all ways in which the compiler writes `&&` and `||`.
+    #[test]
+    fn one_condition_of_two_leaves_what_two_of_one_leave() {
+        const EQUALS: u32 = 170;
+        let asked = "%asked = OpIEqual %bool %argument %one";
+        let decorations = "OpName %asked \"asked\"\nOpDecorate %asked RelaxedPrecision\nOpDecorate %kept RelaxedPrecision";
+        let then = "%then = OpLabel
+             %kept = OpIAdd %uint %argument %two
+             OpReturnValue %kept";
+        let short = |targets: &str| {
+            format!(
+                "OpSelectionMerge %met None
+                 OpBranchConditional %flag {targets}
+                 %ask = OpLabel
+                 {asked}
+                 OpBranch %met
+                 %met = OpLabel
+                 %both = OpPhi %bool %flag %start %asked %ask"
+            )
+        };
+        let ending = |condition: &str| {
+            format!(
+                "{condition}
+                 OpSelectionMerge %end None
+                 OpBranchConditional %both %then %end
+                 {then}
+                 %end = OpLabel
+                 OpReturnValue %two"
+            )
+        };
+        let nested = |first: &str| {
+            format!(
+                "OpSelectionMerge %end None
+                 OpBranchConditional %flag {first}
+                 %ask = OpLabel
+                 {asked}
+                 OpSelectionMerge %inner None
+                 OpBranchConditional %asked %then %inner
+                 {then}
+                 %inner = OpLabel
+                 OpBranch %end
+                 %end = OpLabel
+                 OpReturnValue %two"
+            )
+        };
+        let and = [ending(&short("%ask %met")), ending(&format!("{asked}\n%both = OpLogicalAnd %bool %flag %asked"))];
+        let or = [ending(&short("%met %ask")), ending(&format!("{asked}\n%both = OpLogicalOr %bool %asked %flag"))];
+        let left = |body: &str, flag| decided(&assembled(decorations, "", body), &[(7, flag)]);
+        let count = |words: &[u32], wanted: u32| opcodes(words).into_iter().filter(|opcode| *opcode == wanted).count();
+        for (bodies, nested, asks) in [(&and, nested("%ask %end"), 1), (&or, nested("%end %ask"), 0)] {
+            for body in bodies {
+                let found = left(body, asks);
+                assert_eq!(opcodes(&found), opcodes(&left(&nested, asks)), "{body}");
+                let branch = instructions(&found).find(|instruction| opcode(instruction) == op::BRANCH_CONDITIONAL).unwrap();
+                let equal = instructions(&found).find(|instruction| opcode(instruction) == EQUALS).unwrap();
+                assert_eq!(branch[1], equal[2], "the branch asks what is asked");
+                assert_eq!((count(&found, op::PHI), count(&found, op::COPY_OBJECT), count(&found, op::NAME)), (0, 0, 1), "{body}");
+
+                // Otherwise the constant decides: nothing is asked, and names and decorations go with what they are about.
+                let found = left(body, 1 - asks);
+                assert_eq!(count(&found, op::LABEL), 1, "{body}");
+            }
         }
     }
 

@@ -14,20 +14,14 @@ const float AIM_MARGIN = 1.0 / 1048576.0;
 float emission_density(Emitter light, float versine)
 {
     float cosine = 1.0 - versine;
-    if (HAS_SPOT_LIGHTS) {
-        if (light.kind == EMITTER_SPOT) {
-            return divide(spot_falloff(light, versine), 6.28318530717958648 * spot_integral(light));
-        }
+    if (HAS_SPOT_LIGHTS && light.kind == EMITTER_SPOT) {
+        return divide(spot_falloff(light, versine), 6.28318530717958648 * spot_integral(light));
     }
-    if (HAS_DISC_LIGHTS) {
-        if (light.kind == EMITTER_DISC_UNIFORM) {
-            return cosine > 0.0 ? 0.15915494309189535 : 0.0;
-        }
+    if (HAS_DISC_LIGHTS && light.kind == EMITTER_DISC_UNIFORM) {
+        return cosine > 0.0 ? 0.15915494309189535 : 0.0;
     }
-    if (HAS_POINT_LIGHTS) {
-        if (light.kind == EMITTER_POINT) {
-            return 0.07957747154594767;
-        }
+    if (HAS_POINT_LIGHTS && light.kind == EMITTER_POINT) {
+        return 0.07957747154594767;
     }
     return max(cosine, 0.0) * 0.31830988618379067;
 }

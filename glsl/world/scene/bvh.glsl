@@ -101,10 +101,7 @@ void intersect_triangle(ShearedRay ray, uint index, inout Hit hit)
     }
     // A back at the same place as a front lies behind it, whichever way their distances were rounded.
     t += (determinant < 0.0) != (ray.shear.z < 0.0) ? min(certain, t * (1.0 / 262144.0)) : 0.0;
-    bool is_hidden = false;
-    if (HAS_OVERLAPS) {
-        is_hidden = triangle.plane >= HIDDEN;
-    }
+    bool is_hidden = HAS_OVERLAPS && triangle.plane >= HIDDEN;
     if (is_hidden) {
         float depth = 2.0 * certain + hidden_depth(ray, a, b, c);
         // What leaves one of those that hide it may start on either side of it.

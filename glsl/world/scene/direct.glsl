@@ -34,11 +34,9 @@ Target plain_target(vec3 position, float error, vec3 ng, vec3 ns, vec3 wo, uint 
 // What a layered surface lets pass straight.
 vec3 passing_at(Hit hit, vec3 wo, uint media)
 {
-    if (HAS_PANES) {
-        if (layered_materials[triangles[hit.triangle].material].transmission > 0.0) {
-            Surface surface = surface_at(hit, wo);
-            return lobes_of(surface, wo, index_ratio(surface, media, 1)).passing;
-        }
+    if (HAS_PANES && layered_materials[triangles[hit.triangle].material].transmission > 0.0) {
+        Surface surface = surface_at(hit, wo);
+        return lobes_of(surface, wo, index_ratio(surface, media, 1)).passing;
     }
     SurfaceMaterial material = materials[triangles[hit.triangle].material];
     return vec3(1.0 - coverage_of(material, hit.triangle, hit.u, hit.v));
@@ -95,10 +93,7 @@ ShadowRay cast_shadow_ray(Target point, Arriving arriving, Draws draws, uint ind
     // Before the guards below, which would drop what is no number.
     note_unless(is_finite(cosine) && is_finite(arriving.radiance) && (arriving.is_far || is_finite(arriving.target)), NONFINITE_LIGHT,
                 draws.domain, draws.round, index);
-    bool is_layered = false;
-    if (HAS_LAYERS) {
-        is_layered = point.kind == SURFACE_LAYERED;
-    }
+    bool is_layered = HAS_LAYERS && point.kind == SURFACE_LAYERED;
     vec3 leaves_along = point.ng;
     uint media = point.media;
     if (largest(arriving.radiance) > 0.0) {

@@ -1,5 +1,6 @@
 // What a scene and a request call for, as specialization constants: code of effects that are left out is
-// no part of the pipeline. src/plan/planning.rs sets them.
+// no part of the pipeline. src/plan/planning.rs sets them, and src/gpu/specialize.rs takes that code away: of a condition with `&&` and
+// `||` too, but not of one that a variable holds, of which only the driver knows.
 
 // A scene of few triangles needs no tree: its list is tested from end to end.
 layout(constant_id = 7) const bool HAS_BVH = true;

@@ -14,12 +14,10 @@ vec3 off_the_wall(uint index, vec3 position, vec3 normal)
         return position;
     }
     float before = dot(wall, position - triangle.a);
-    if (HAS_TWO_SIDED) {
-        if (materials[triangle.material].two_sided != 0 && before < 0.0) {
-            wall = -wall;
-            cosine = -cosine;
-            before = -before;
-        }
+    if (HAS_TWO_SIDED && materials[triangle.material].two_sided != 0 && before < 0.0) {
+        wall = -wall;
+        cosine = -cosine;
+        before = -before;
     }
     bool touches = before < least && before > -0.25 * least;
     return touches ? position + (wall - cosine * normal) * divide(least - before, sine_squared) : position;

@@ -8,6 +8,7 @@ const uint DEPTH_OF_WAYS = 8;
 const uint MOST_WAYS = 4;
 // Surfaces that another way is followed over: roulette ends nearly all before.
 const uint STEPS_OF_WAY = 2 * LOSSLESS_DEPTH;
+const bool RAYS_HIT_LIGHTS = HAS_ENVIRONMENT || HAS_TRIANGLE_LIGHTS || HAS_DISC_LIGHTS;
 
 struct Way {
     vec3 position;
@@ -21,17 +22,7 @@ Way ways[MOST_WAYS];
 
 bool follows_other_ways(uint depth)
 {
-    bool shines = HAS_ENVIRONMENT;
-    if (HAS_TRIANGLE_LIGHTS) {
-        shines = true;
-    }
-    if (HAS_DISC_LIGHTS) {
-        shines = true;
-    }
-    if (HAS_SPECULAR_CHAINS) {
-        return shines && chain.is_smooth && !chain.gathers && !chain.starts_nowhere && depth < DEPTH_OF_WAYS;
-    }
-    return false;
+    return HAS_SPECULAR_CHAINS && RAYS_HIT_LIGHTS && chain.is_smooth && !chain.gathers && !chain.starts_nowhere && depth < DEPTH_OF_WAYS;
 }
 
 // A way whose light counts `weight` times beside the path's own. `media` is what it runs through.
@@ -81,20 +72,16 @@ float part_at_layers(Surface surface, Lobes lobes, vec3 wo, ChosenLobe chosen, b
         if ((passes || lobe != chosen.lobe) && is_smooth_lobe(surface.layers, lobes, lobe)) {
             Scatter other = sample_facet(surface, lobes, wo, vec2(0.5), ChosenLobe(lobe, 1.0, 1.0), true);
             uint media = chain.media;
-            if (HAS_MEDIA) {
-                if (surface.layers.medium != 0 && dot(other.direction, surface.ng) < 0.0) {
-                    media = media_beyond(surface, media);
-                }
+            if (HAS_MEDIA && surface.layers.medium != 0 && dot(other.direction, surface.ng) < 0.0) {
+                media = media_beyond(surface, media);
             }
             ways_found++;
             add_way(surface, other, coverage * other.weight, media, depth);
         }
     }
-    if (HAS_PASSING) {
-        if (!passes && pass_chance > 0.0) {
-            ways_found++;
-            add_way(surface, Scatter(-wo, lobes.passing, true, false, true, 0.0), lobes.passing, chain.media, depth);
-        }
+    if (HAS_PASSING && !passes && pass_chance > 0.0) {
+        ways_found++;
+        add_way(surface, Scatter(-wo, lobes.passing, true, false, true, 0.0), lobes.passing, chain.media, depth);
     }
     return passes ? pass_chance : (is_own_smooth ? (1.0 - pass_chance) * chosen.chance : 1.0);
 }

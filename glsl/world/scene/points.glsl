@@ -12,15 +12,10 @@ layout(set = 1, binding = 16, scalar) writeonly buffer MattCoversOfPoints { Matt
 void write_matt_lobes(uint place, Lobes lobes)
 {
     matt_lobes[place] = lobes.matt;
-    bool has_cover = HAS_COATS;
-    if (HAS_SHEEN) {
-        has_cover = true;
-    }
     if (HAS_IRIDESCENCE) {
-        has_cover = true;
         lobes.cover.film = lobes.film;
     }
-    if (has_cover) {
+    if (HAS_COATS || HAS_SHEEN || HAS_IRIDESCENCE) {
         matt_covers[place] = lobes.cover;
     }
 }

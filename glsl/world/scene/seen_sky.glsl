@@ -59,12 +59,10 @@ vec3 passed_straight(vec3 position, vec3 direction)
         }
         Surface surface = surface_at(hit, -direction);
         vec3 passing = vec3(0.0);
-        if (HAS_LAYERS) {
-            if (surface.kind == SURFACE_LAYERED) {
-                passing = vec3(surface.scatters ? 0.0 : 1.0);
-                if (HAS_PASSING) {
-                    passing = surface.scatters ? lobes_of(surface, -direction, index_ratio(surface, chain.media, 1)).passing : passing;
-                }
+        if (HAS_LAYERS && surface.kind == SURFACE_LAYERED) {
+            passing = vec3(surface.scatters ? 0.0 : 1.0);
+            if (HAS_PASSING) {
+                passing = surface.scatters ? lobes_of(surface, -direction, index_ratio(surface, chain.media, 1)).passing : passing;
             }
         }
         share *= passing;

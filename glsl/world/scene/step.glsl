@@ -22,22 +22,17 @@ Step step_path(inout LightPath path, uint bounce)
         }
         vec3 wo = -path.direction;
         Surface surface = surface_at(hit, wo);
-        bool is_layered = false;
-        if (HAS_LAYERS) {
-            is_layered = surface.kind == SURFACE_LAYERED;
-        }
+        bool is_layered = HAS_LAYERS && surface.kind == SURFACE_LAYERED;
         Lobes lobes;
         bool has_matt = keeps_photons(triangles[hit.triangle].material);
         vec3 entering = arriving;
         if (is_layered) {
             uint channel = 1;
-            if (HAS_DISPERSION) {
-                if (is_dispersive(surface, path.media)) {
-                    // Once a path: of one channel it stays.
-                    uvec4 block = uvec4(path.photon, push.draws.round, CHANNEL_BLOCK, push.draws.domain);
-                    channel = choose_channel(arriving, philox_floats(block, push.draws.seed).x);
-                    entering = light_of_channel(arriving, channel);
-                }
+            if (HAS_DISPERSION && is_dispersive(surface, path.media)) {
+                // Once a path: of one channel it stays.
+                uvec4 block = uvec4(path.photon, push.draws.round, CHANNEL_BLOCK, push.draws.domain);
+                channel = choose_channel(arriving, philox_floats(block, push.draws.seed).x);
+                entering = light_of_channel(arriving, channel);
             }
             float eta = index_ratio(surface, path.media, channel);
             surface.ns = normal_of_refraction(surface, wo, eta, bounce);
