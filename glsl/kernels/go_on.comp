@@ -3,12 +3,29 @@
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "world/scene/work.glsl"
+#include "rng/draws.glsl"
+
+struct GoOnPush {
+    Draws draws;
+    WorkDivision work;
+    // That a pixel has.
+    uint most_samples;
+    uint path_count;
+    uint pixel_count;
+    uint emitter_count;
+    float film_scale;
+    float film_limit;
+    uint rounding;
+};
 
 layout(push_constant, scalar) uniform Push { GoOnPush push; };
-layout(set = 1, binding = 11, scalar) readonly buffer CameraPaths { CameraPath camera_paths[]; };
 
 #include "world/scene/camera_kernel.glsl"
+
+layout(set = 1, binding = 11, scalar) readonly buffer CameraPaths { CameraPath camera_paths[]; };
 
 void main()
 {

@@ -4,7 +4,26 @@
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "world/scene/receiver.glsl"
+#include "world/scene/work.glsl"
+#include "rng/draws.glsl"
+
+struct ReceivePush {
+    Draws draws;
+    WorkDivision work;
+    // Hash of the seed and the round that decides what is rounded up.
+    uint rounding;
+    uint first_point;
+    uint end_point;
+    uint point_count;
+    uint emitter_count;
+    float film_scale;
+    float film_limit;
+    // Within which a surface makes a point one of its own.
+    float radius;
+};
 
 layout(push_constant, scalar) uniform Push { ReceivePush push; };
 layout(set = 1, binding = 12, scalar) readonly buffer Receivers { Receiver receivers[]; };

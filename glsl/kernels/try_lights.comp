@@ -2,7 +2,21 @@
 // follow (src/plan/light_choice.rs).
 // Dispatched by src/engine/scene/light_trial.rs before a run. One thread = a point and a cluster.
 #extension GL_EXT_control_flow_attributes : require
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "world/scene/receiver.glsl"
+#include "rng/draws.glsl"
+
+// What each cluster of lights adds at some points.
+struct TryLightsPush {
+    Draws draws;
+    // Pairs of a point and a cluster, cluster by cluster of each point.
+    uint first_pair;
+    uint end_pair;
+    uint cluster_count;
+    // Shadow rays of each.
+    uint ray_count;
+};
 
 layout(push_constant, scalar) uniform Push { TryLightsPush push; };
 layout(set = 1, binding = 12, scalar) readonly buffer Receivers { Receiver receivers[]; };

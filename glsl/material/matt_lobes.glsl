@@ -1,6 +1,48 @@
 // Lobes that photon maps know, as they weigh light: diffuse, sheen, and what GGX reflects broadly. Expects material/albedo.glsl,
 // material/ggx.glsl and material/layers.glsl.
 
+// How the matt lobes of a layered visible point weigh light (glsl/material/matt_lobes.glsl). Those that are none have weight 0.
+struct MattLobes {
+    // All of the diffuse lobe but the factors of where light comes from.
+    vec3 diffuse;
+    // What the dielectric reflects along its normal and at the horizon, in the largest channel.
+    float e0;
+    float e90;
+    // Of the base's reflection.
+    float alpha;
+    vec3 f0;
+    float f90;
+};
+
+// A thin film on the base: how much of it is there, and shares of dielectric and metal in what is reflected below it, with their F0.
+struct MattFilm {
+    float share;
+    float ior;
+    float thickness;
+    float dielectric;
+    vec3 f0;
+    float metal;
+    vec3 metal_f0;
+    // What it reflects is no sharp lobe.
+    uint is_matt;
+};
+
+// What lies over them.
+struct MattCover {
+    float coat;
+    float coat_alpha;
+    // It is no sharp lobe.
+    uint has_coat_lobe;
+    uint coat_normal;
+    // What the coat reflects of all light towards the eye, and what white sheen would.
+    float coat_albedo;
+    float sheen_albedo;
+    vec3 sheen;
+    float sheen_alpha;
+    // Under them; here for it to be stored (drivers allow few buffers).
+    MattFilm film;
+};
+
 // Masking and density of sheen (Estevez and Kulla 2017).
 float sheen_fit(vec3 factors, vec2 line, float x)
 {

@@ -1,5 +1,110 @@
 // What a ray met: position, normals, material.
 
+// Shading normals at a triangle's corners, octahedral; all `NONE` on a flat triangle.
+struct TriangleNormals {
+    uint a;
+    uint b;
+    uint c;
+};
+
+// Texture coordinates at a triangle's corners.
+struct TriangleUvs {
+    vec2 base_a;
+    vec2 base_b;
+    vec2 base_c;
+    vec2 emission_a;
+    vec2 emission_b;
+    vec2 emission_c;
+};
+
+// Linear colours at a triangle's corners, which multiply the material's base colour, and alphas.
+struct TriangleColours {
+    vec3 a;
+    vec3 b;
+    vec3 c;
+    vec3 alphas;
+};
+
+// What layered materials need at a triangle's corners: texture coordinates of the mesh's first and second set; tangents, octahedral, for
+// normal map and anisotropy, and for the normal map of the coat. Bits 0 and 3 of `turned`: their bitangents are -(normal x tangent).
+struct TriangleLayers {
+    vec2 first_a;
+    vec2 first_b;
+    vec2 first_c;
+    vec2 second_a;
+    vec2 second_b;
+    vec2 second_c;
+    uint tangent_a;
+    uint tangent_b;
+    uint tangent_c;
+    uint coat_tangent_a;
+    uint coat_tangent_b;
+    uint coat_tangent_c;
+    uint turned;
+};
+
+// What a layered material adds to its `SurfaceMaterial`.
+struct LayeredMaterial {
+    float metallic;
+    float roughness;
+    float ior;
+    float specular;
+    vec3 specular_colour;
+    float transmission;
+    // It encloses a medium; else it is a thin wall.
+    uint is_solid;
+    // Number of its medium, from 1; 0: it is no solid, or media do not matter.
+    uint medium;
+    // Of the medium whose number is this record's place plus 1, for each unit of length.
+    vec3 medium_absorption;
+    float medium_ior;
+    // Half of what lies between the indices for red and for blue, of its solid, and of that medium.
+    float ior_spread;
+    float medium_spread;
+    // Of a thin film: how much of it is there, its index, its thickness, nanometres, from where a texture is 0 to where it is 1, and the
+    // least F0 with which Schlick's formula is above all that it reflects.
+    float iridescence;
+    float film_ior;
+    float film_least;
+    float film_most;
+    float film_bound;
+    // Share of what enters it that is scattered evenly beyond, and its colour.
+    float diffuse_transmission;
+    vec3 diffuse_transmission_colour;
+    // How much rougher the base is along a direction: 0 to 1, and cosine and sine of what turns the direction from the tangent.
+    float anisotropy;
+    vec2 anisotropy_turn;
+    float coat;
+    float coat_roughness;
+    vec3 sheen_colour;
+    float sheen_roughness;
+    float normal_scale;
+    float coat_normal_scale;
+    // `COVERAGE_...`.
+    uint coverage;
+    float alpha;
+    float cutoff;
+    uint is_unlit;
+    // Somewhere it has a lobe that photon maps know. Density estimates beside such a place count photons elsewhere, too.
+    uint is_matt;
+    // Its lookups, among the records of textures.
+    uint first_lookup;
+    uint end_lookup;
+};
+
+struct SurfaceMaterial {
+    vec3 base_colour;
+    // `SURFACE_...`.
+    uint surface;
+    // Radiance of the front, W/m2/sr.
+    vec3 emission;
+    // Exponent or index of refraction.
+    float parameter;
+    uint base_texture;
+    uint emission_texture;
+    uint two_sided;
+};
+
 layout(set = 0, binding = 2, scalar) readonly buffer Normals { TriangleNormals normals[]; };
 layout(set = 0, binding = 3, scalar) readonly buffer Uvs { TriangleUvs uvs[]; };
 layout(set = 0, binding = 4, scalar) readonly buffer Materials { SurfaceMaterial materials[]; };

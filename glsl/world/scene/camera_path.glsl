@@ -1,6 +1,29 @@
 // A camera path: mirrors and glass, the first surface that scatters (a visible point), and where a
 // final gather is asked for, a sampled ray and a second chain to a second visible point.
 
+#include "rng/draws.glsl"
+#include "world/scene/visible_point.glsl"
+#include "world/scene/work.glsl"
+
+// A path from the camera or a receiver, under way over mirrors and glass.
+struct CameraPath {
+    vec3 position;
+    Sample own;
+    vec3 direction;
+    // Bits 0 to 3: it saw a specular surface, it gathers, it starts at no surface, emission counts at its next one; bits 4
+    // and 5: visible points found; bit 6: it ends there; from bit 8 on: surfaces that it has met.
+    uint state;
+    vec3 weight;
+    // Of its smooth ways, where the others were followed too (glsl/world/scene/other_ways.glsl).
+    float chance;
+    // What it runs through (glsl/material/media.glsl).
+    uint media;
+    // Of a direction that a sharp lobe gave it, 1/sr, and the point and the normal there; 0: none.
+    float density;
+    vec3 from;
+    vec3 from_normal;
+};
+
 struct Chain {
     vec3 position;
     vec3 direction;

@@ -2,6 +2,8 @@
 // earlier dispatch left under way. Those that are still under way after push.flights bounces go to the next list; after
 // push.bounces bounces in all they are cut off.
 
+#include "world/scene/photon_push.glsl"
+
 layout(push_constant, scalar) uniform Push { SceneTracePersistentPush push; };
 
 #include "world/scene/rays.glsl"
