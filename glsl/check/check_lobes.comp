@@ -68,8 +68,7 @@ layout(set = 1, binding = 1, scalar) writeonly buffer Results { LobeSample resul
 #include "math/directions.glsl"
 #include "world/scene/bvh.glsl"
 #include "material/surface.glsl"
-#include "material/lobes.glsl"
-#include "material/scatter.glsl"
+#include "material/bsdf.glsl"
 
 Surface surface_of(LobeCase at)
 {

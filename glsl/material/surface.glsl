@@ -118,21 +118,6 @@ layout(set = 0, binding = 19, scalar) readonly buffer LayeredMaterials { Layered
 #include "material/layers.glsl"
 #include "material/textures.glsl"
 
-struct Surface {
-    vec3 position;
-    float error; // bound of each coordinate's
-    uint plane; // twice its number, plus 1 on the back
-    vec3 ng; // geometric normal on the side of wo
-    vec3 ns; // shading normal on the same side
-    bool front;
-    bool scatters;
-    uint kind;
-    float parameter;
-    vec3 base_colour;
-    vec3 emission; // radiance towards wo
-    Layers layers; // of SURFACE_LAYERED
-};
-
 vec2 mixed_uv(vec2 a, vec2 b, vec2 c, float u, float v)
 {
     return (1.0 - u - v) * a + u * b + v * c;
@@ -179,11 +164,9 @@ vec2 off_the_edges(Triangle triangle, vec2 weights, float error)
 // The value of the emission's texture, or 1.
 vec3 emission_texel(SurfaceMaterial material, uint index, float u, float v)
 {
-    if (HAS_TEXTURES) {
-        if (material.emission_texture != NONE) {
-            TriangleUvs at = uvs[index];
-            return sample_texture(textures[material.emission_texture], mixed_uv(at.emission_a, at.emission_b, at.emission_c, u, v)).rgb;
-        }
+    if (HAS_TEXTURES && material.emission_texture != NONE) {
+        TriangleUvs at = uvs[index];
+        return sample_texture(textures[material.emission_texture], mixed_uv(at.emission_a, at.emission_b, at.emission_c, u, v)).rgb;
     }
     return vec3(1.0);
 }
@@ -191,11 +174,9 @@ vec3 emission_texel(SurfaceMaterial material, uint index, float u, float v)
 // The value of the base colour's texture, or 1.
 vec4 base_texel(SurfaceMaterial material, uint index, float u, float v)
 {
-    if (HAS_TEXTURES) {
-        if (material.base_texture != NONE) {
-            TriangleUvs at = uvs[index];
-            return sample_texture(textures[material.base_texture], mixed_uv(at.base_a, at.base_b, at.base_c, u, v));
-        }
+    if (HAS_TEXTURES && material.base_texture != NONE) {
+        TriangleUvs at = uvs[index];
+        return sample_texture(textures[material.base_texture], mixed_uv(at.base_a, at.base_b, at.base_c, u, v));
     }
     return vec4(1.0);
 }
@@ -229,10 +210,8 @@ float coverage_of(SurfaceMaterial material, uint index, float u, float v)
 vec3 lamp_share(SurfaceMaterial material, uint index, float u, float v)
 {
     vec3 share = emission_texel(material, index, u, v);
-    if (HAS_PASSING) {
-        if (material.surface == SURFACE_LAYERED) {
-            share *= coverage_of(material, index, u, v);
-        }
+    if (HAS_PASSING && material.surface == SURFACE_LAYERED) {
+        share *= coverage_of(material, index, u, v);
     }
     return share;
 }
@@ -387,12 +366,10 @@ void add_layers(inout Surface surface, Hit hit, uint material_index, vec3 wo, fl
                                                surface.front);
         }
     }
-    if (HAS_ANISOTROPY) {
-        if (material.anisotropy > 0.0) {
-            vec3 texel = (found & (1u << LAYER_ANISOTROPY)) != 0 ? values[LAYER_ANISOTROPY].rgb : vec3(1.0, 0.5, 1.0);
-            mat3 frame = tangent_frame(base_tangents(layers_of_triangle(hit.triangle)), smooth_ns, surface.front, hit.u, hit.v);
-            stretch_facets(layers, material, texel, frame, surface.ns);
-        }
+    if (HAS_ANISOTROPY && material.anisotropy > 0.0) {
+        vec3 texel = (found & (1u << LAYER_ANISOTROPY)) != 0 ? values[LAYER_ANISOTROPY].rgb : vec3(1.0, 0.5, 1.0);
+        mat3 frame = tangent_frame(base_tangents(layers_of_triangle(hit.triangle)), smooth_ns, surface.front, hit.u, hit.v);
+        stretch_facets(layers, material, texel, frame, surface.ns);
     }
     surface.layers = layers;
 }
@@ -434,10 +411,8 @@ Surface surface_at(Hit hit, vec3 wo)
         surface.base_colour *= at.a + hit.u * (at.b - at.a) + hit.v * (at.c - at.a);
     }
     surface.emission = shown ? material.emission * emission_texel(material, hit.triangle, hit.u, hit.v) : vec3(0.0);
-    if (HAS_LAYERS) {
-        if (surface.kind == SURFACE_LAYERED) {
-            add_layers(surface, hit, triangle.material, wo, base.a);
-        }
+    if (HAS_LAYERS && surface.kind == SURFACE_LAYERED) {
+        add_layers(surface, hit, triangle.material, wo, base.a);
     }
     return surface;
 }
@@ -459,10 +434,8 @@ bool is_not_there(uint material)
 bool keeps_photons(uint material)
 {
     uint kind = materials[material].surface;
-    if (HAS_LAYERS) {
-        if (kind == SURFACE_LAYERED) {
-            return layered_materials[material].is_matt != 0;
-        }
+    if (HAS_LAYERS && kind == SURFACE_LAYERED) {
+        return layered_materials[material].is_matt != 0;
     }
     return kind != SURFACE_MIRROR && kind != SURFACE_DIELECTRIC;
 }

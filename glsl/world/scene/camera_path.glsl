@@ -388,7 +388,7 @@ bool step(uint pixel_count, Draws draws, uint emitter_count, uint depth)
     }
     vec3 u = stratified_at(number, index, block, draws).zxy;
     if (!is_layered) {
-        scatter = sample_scatter(surface, wo, u, depth, true);
+        scatter = sample_built_in(surface, wo, u, depth, true);
         if (HAS_DIELECTRIC) {
             if (surface.kind == SURFACE_DIELECTRIC && follows_other_ways(depth)) {
                 chance *= part_at_glass(surface, wo, dot(scatter.direction, surface.ng) > 0.0, depth);

@@ -18,7 +18,7 @@ void write_matt_lobes(uint place, Lobes lobes)
     }
     if (HAS_IRIDESCENCE) {
         has_cover = true;
-        lobes.cover.film = lobes.film;
+        lobes.cover.film = lobes.base.film;
     }
     if (has_cover) {
         matt_covers[place] = lobes.cover;

@@ -56,7 +56,7 @@ Step step_path(inout LightPath path, uint bounce)
                 scatter.weight *= scatter.passes ? 1.0 : divide(surface.layers.coverage, 1.0 - lobes.pass_chance);
             }
         } else {
-            scatter = sample_scatter(surface, wo, u.yzw, bounce, false);
+            scatter = sample_built_in(surface, wo, u.yzw, bounce, false);
         }
         bool specular = scatter.is_specular;
         vec3 flux = entering * scatter.weight;

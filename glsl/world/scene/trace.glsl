@@ -6,8 +6,7 @@
 layout(push_constant, scalar) uniform Push { FlightPush push; };
 
 #include "world/scene/rays.glsl"
-#include "material/lobes.glsl"
-#include "material/scatter.glsl"
+#include "material/bsdf.glsl"
 #include "ledger/totals.glsl"
 #include "world/scene/photon.glsl"
 #include "world/scene/path.glsl"
