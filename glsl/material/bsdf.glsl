@@ -9,7 +9,7 @@
 #include "material/lobes/mirror.glsl"
 #include "material/lobes/glass.glsl"
 
-bool is_layered(uint kind)
+bool has_layers(uint kind)
 {
     return HAS_LAYERS && kind == SURFACE_LAYERED;
 }
@@ -95,6 +95,14 @@ Lobes lobes_of(Surface surface, vec3 wo, float eta)
     lobes.transmission_chance = transmission * share;
     lobes.beyond_chance = beyond * share;
     return lobes;
+}
+
+// Of a layered surface that a path meets in these media, which has met `depth` before, for light of a channel.
+Lobes lobes_at(inout Surface surface, vec3 wo, uint media, uint channel, uint depth)
+{
+    float eta = index_ratio(surface, media, channel);
+    surface.ns = normal_of_refraction(surface, wo, eta, depth);
+    return lobes_of(surface, wo, eta);
 }
 
 // Probability of the matt lobes together, where the path does not pass.
@@ -243,10 +251,13 @@ Scatter sample_layered(Surface surface, Lobes lobes, vec3 wo, vec3 u, bool carri
     return sample_lobe_of_facets(surface, lobes, wo, u.yz, chosen, carries_radiance);
 }
 
-// Samples where a path goes on that came from wo, off the surface of a built-in scene; u = (choice, two for the direction). A camera path
-// carries radiance, which refraction compresses; a photon carries flux. The path has met `depth` surfaces before.
-Scatter sample_built_in(Surface surface, vec3 wo, vec3 u, uint depth, bool carries_radiance)
+// Samples where a path goes on that came from wo; u = (choice, two for the direction). A camera path carries radiance, which refraction
+// compresses; a photon carries flux. The path has met `depth` surfaces before. `lobes` are those of a layered surface.
+Scatter sample_surface(Surface surface, Lobes lobes, vec3 wo, vec3 u, uint depth, bool carries_radiance)
 {
+    if (has_layers(surface.kind)) {
+        return sample_layered(surface, lobes, wo, u, carries_radiance);
+    }
     if (HAS_MIRROR && surface.kind == SURFACE_MIRROR) {
         return sample_mirror(surface, wo);
     }

@@ -21,17 +21,8 @@ Way ways[MOST_WAYS];
 
 bool follows_other_ways(uint depth)
 {
-    bool shines = HAS_ENVIRONMENT;
-    if (HAS_TRIANGLE_LIGHTS) {
-        shines = true;
-    }
-    if (HAS_DISC_LIGHTS) {
-        shines = true;
-    }
-    if (HAS_SPECULAR_CHAINS) {
-        return shines && chain.is_smooth && !chain.gathers && !chain.starts_nowhere && depth < DEPTH_OF_WAYS;
-    }
-    return false;
+    return HAS_SPECULAR_CHAINS && (HAS_ENVIRONMENT || HAS_TRIANGLE_LIGHTS || HAS_DISC_LIGHTS) && chain.is_smooth && !has_gathered()
+        && depth < DEPTH_OF_WAYS;
 }
 
 // A way whose light counts `weight` times beside the path's own. `media` is what it runs through.
@@ -81,22 +72,30 @@ float part_at_layers(Surface surface, Lobes lobes, vec3 wo, ChosenLobe chosen, b
         if ((passes || lobe != chosen.lobe) && is_smooth_lobe(surface.layers, lobes, lobe)) {
             Scatter other = sample_lobe_of_facets(surface, lobes, wo, vec2(0.5), ChosenLobe(lobe, 1.0, 1.0), true);
             uint media = chain.media;
-            if (HAS_MEDIA) {
-                if (surface.layers.medium != 0 && dot(other.direction, surface.ng) < 0.0) {
-                    media = media_beyond(surface, media);
-                }
+            if (HAS_MEDIA && surface.layers.medium != 0 && dot(other.direction, surface.ng) < 0.0) {
+                media = media_beyond(surface, media);
             }
             ways_found++;
             add_way(surface, other, coverage * other.weight, media, depth);
         }
     }
-    if (HAS_PASSING) {
-        if (!passes && pass_chance > 0.0) {
-            ways_found++;
-            add_way(surface, Scatter(-wo, lobes.passing, true, false, true, 0.0), lobes.passing, chain.media, depth);
-        }
+    if (HAS_PASSING && !passes && pass_chance > 0.0) {
+        ways_found++;
+        add_way(surface, Scatter(-wo, lobes.passing, true, false, true, 0.0), lobes.passing, chain.media, depth);
     }
     return passes ? pass_chance : (is_own_smooth ? (1.0 - pass_chance) * chosen.chance : 1.0);
+}
+
+// The same at any surface, where u has chosen the lobe of the path's own way.
+float leave_other_ways(Vertex at, float u, uint depth)
+{
+    if (at.is_layered) {
+        return part_at_layers(at.surface, at.lobes, at.wo, choose_lobe(at.lobes, u), at.scatter.passes, depth);
+    }
+    if (HAS_DIELECTRIC && at.surface.kind == SURFACE_DIELECTRIC) {
+        return part_at_glass(at.surface, at.wo, dot(at.scatter.direction, at.surface.ng) > 0.0, depth);
+    }
+    return 1.0;
 }
 
 // Goes on with a way that was left; its depth.
@@ -107,13 +106,11 @@ uint take_way()
     chain.direction = way.direction;
     chain.weight = way.weight;
     chain.media = way.media;
+    chain.role = ROLE_OTHER_WAY;
     chain.saw_specular = (way.depth & 1u) != 0;
     chain.chance = 1.0;
     chain.is_smooth = true;
-    chain.is_other_way = true;
-    chain.gathers = false;
     chain.sees_emission = true;
-    chain.ends_at_light = false;
     chain.density = 0.0;
     return way.depth >> 1;
 }
