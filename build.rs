@@ -1,6 +1,6 @@
 //! Compiles every kernel of `glsl/kernels` to SPIR-V and writes `kernels.rs`: for each kernel a
-//! struct whose fields are its buffers, with everything else that reflection knows of it. Writes `records.rs` too, the records
-//! that Rust and GLSL share, and `charts.md`, the charts of the guide.
+//! struct whose fields are its buffers, with everything else that reflection knows of it. Writes `records.rs` too, the structs
+//! in those buffers and in push constants, and `charts.md`, the charts of the guide.
 //!
 //! Without the feature `compile-glsl`, as in the packed crate, the SPIR-V is that of `glsl/prebuilt`, which `tools/package` puts there.
 
@@ -36,6 +36,7 @@ fn main() {
     let mut layouts = String::new();
     let mut max_buffers = 0;
     let mut scene_elements: BTreeMap<String, String> = BTreeMap::new();
+    let mut records: BTreeMap<String, String> = BTreeMap::new();
     for Module { name, path, words, files } in &modules {
         let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
         fs::write(spirv.join(format!("{name}.spv")), bytes).expect("OUT_DIR can be written");
@@ -47,6 +48,10 @@ fn main() {
         max_buffers = max_buffers.max(scene_bindings + kernel.buffers.len());
         write_kernel(&mut structs, path, name, &kernel);
         write_layouts(&mut layouts, name, &kernel);
+        let sources: Vec<String> = files.iter().map(|file| read(&glsl, file)).collect();
+        for record in kernel.records.iter().map(struct_name) {
+            records.entry(record).or_insert_with_key(|record| rust_record(&sources, record));
+        }
     }
     fs::write(spirv.join(LIST), list(&glsl, &modules)).expect("OUT_DIR can be written");
     write_worlds(&mut structs, &scene_elements);
@@ -56,7 +61,8 @@ fn main() {
         "{structs}\n{buffer_count}\n/// Every struct in a buffer or push-constant block of a kernel.\npub const STRUCTS: &[(&str, ReflectedStruct)] = &[\n{layouts}];\n"
     );
     fs::write(out.join("kernels.rs"), source).expect("OUT_DIR can be written");
-    fs::write(out.join("records.rs"), records(&glsl)).expect("OUT_DIR can be written");
+    fs::write(out.join("records.rs"), format!("records! {{\n{}\n}}\n", records.into_values().collect::<Vec<_>>().join("\n")))
+        .expect("OUT_DIR can be written");
     fs::write(out.join("charts.md"), charts()).expect("OUT_DIR can be written");
 }
 
@@ -153,22 +159,25 @@ fn hash(glsl: &Path) -> String {
     hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Files of `glsl` whose structs are records of Rust too.
-const RECORDS: [&str; 2] = ["records.glsl", "world/scene/path.glsl"];
+fn read(glsl: &Path, name: &str) -> String {
+    fs::read_to_string(glsl.join(name)).unwrap_or_else(|error| panic!("glsl/{name}: {error}"))
+}
 
-/// Their structs with their comments, as the macro `records!` of `src/records.rs` takes them.
-fn records(glsl: &Path) -> String {
-    let text = RECORDS.map(|name| fs::read_to_string(glsl.join(name)).unwrap_or_else(|error| panic!("glsl/{name}: {error}"))).concat();
-    // What stands between structs is no comment of one.
-    let blocks = text.split("\n\n").filter(|block| block.contains("struct "));
-    let rust = blocks.flat_map(str::lines).map(|line| match line.trim().split([' ', ';']).collect::<Vec<_>>()[..] {
+/// A struct that one of these files declares, with its comments, as the macro `records!` of `src/records.rs` takes it.
+fn rust_record(sources: &[String], name: &str) -> String {
+    let start = format!("struct {name} {{\n");
+    let split = sources.iter().find_map(|source| source.split_once(&start));
+    let (before, after) = split.unwrap_or_else(|| panic!("no file declares {name}"));
+    let [comment, fields] = [before.rsplit("\n\n").next(), after.split("};").next()].map(|part| part.expect("a split has a part"));
+    let declaration = format!("{comment}{start}{fields}}}");
+    let rust = declaration.lines().map(|line| match line.trim().split([' ', ';']).collect::<Vec<_>>()[..] {
         ["//", ..] => line.replacen("//", "///", 1),
         ["struct", name, "{"] => format!("{name} {{"),
-        ["}", ""] => "}".to_owned(),
+        ["}"] => "}".to_owned(),
         [kind, field, ""] => format!("    {field}: {},", rust_type(kind)),
         _ => panic!("{line}: a record has a field a line"),
     });
-    format!("records! {{\n{}\n}}\n", rust.collect::<Vec<_>>().join("\n"))
+    rust.collect::<Vec<_>>().join("\n")
 }
 
 fn rust_type(glsl: &str) -> &str {

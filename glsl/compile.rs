@@ -70,6 +70,8 @@ pub struct Compiled {
 /// The module is left unoptimised: drivers optimise it anyway, and the optimiser would drop names
 /// and unused bindings that reflection needs.
 ///
+/// A file that several others include stands where the first of them does so, and nowhere else.
+///
 /// `edit` changes the text of files on their way (path within `glsl`, text): tests plant faults by it.
 pub fn compile(glsl: &Path, kernel: &Source, macros: &[(&str, u32)], edit: &dyn Fn(&str, String) -> String) -> Result<Compiled, String> {
     let read = |name: &str| -> Result<String, String> {
@@ -90,8 +92,8 @@ pub fn compile(glsl: &Path, kernel: &Source, macros: &[(&str, u32)], edit: &dyn 
     }
     options.set_include_callback(|name, _kind, from, _depth| {
         let name = &kernel.choices.iter().fold(name.to_owned(), |name, (word, value)| name.replace(word, value));
-        files.borrow_mut().insert(glsl.join(name));
-        let content = read(name).map_err(|error| format!("included from {from}: {error}"))?;
+        let is_new = files.borrow_mut().insert(glsl.join(name));
+        let content = if is_new { read(name).map_err(|error| format!("included from {from}: {error}"))? } else { String::new() };
         Ok(ResolvedInclude { resolved_name: format!("glsl/{name}"), content })
     });
     let shown = format!("glsl/{} ({})", kernel.path, kernel.name);

@@ -1,5 +1,5 @@
-//! Records that Rust and GLSL share: those of `glsl/records.glsl` and, of a scene, `glsl/world/scene/path.glsl`, as build.rs
-//! writes them for Rust. `tests/engine/layout.rs` compares the two field by field with what reflection finds in the kernels.
+//! Records that Rust and GLSL share, in `scalar` layout: the structs of buffers and push constants, which build.rs finds by reflection
+//! and takes with their comments from the GLSL. `tests/engine/layout.rs` compares the two field by field with what reflection finds.
 //!
 //! Lengths are in metres, directions point along the photon's flight, `flux` is relative: the power
 //! of a photon divided by that of the strongest photon of the run (see [`crate::engine::room::film`]).

@@ -1,7 +1,61 @@
 // The lobes of layered surfaces: sampled, and as they weigh light from where the sample goes.
 // Dispatched by tests/materials/lobe_sampling.rs. One thread = one sample; each case has equally many.
 #extension GL_EXT_control_flow_attributes : require
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+// A layered surface as `glsl/check/check_lobes.comp` sees it.
+struct LobeCase {
+    // Unit vectors: towards the eye, and normals on its side.
+    vec3 wo;
+    vec3 ng;
+    vec3 ns;
+    vec3 coat_normal;
+    vec3 base_colour;
+    float metallic;
+    float alpha;
+    uint is_stretched;
+    float alpha_along;
+    vec3 tangent;
+    float ior;
+    float specular;
+    float transmission;
+    uint is_solid;
+    // Index of refraction where wo is, over that beyond.
+    float eta;
+    float coat;
+    float coat_alpha;
+    vec3 sheen;
+    float sheen_alpha;
+    float diffuse_transmission;
+    vec3 diffuse_transmission_colour;
+    float iridescence;
+    float film_ior;
+    float film_thickness;
+    float film_bound;
+    float coverage;
+    // The only lobe that has a chance; NONE: all have.
+    uint lobe;
+    // Radiance is carried, as by a camera path, and no flux.
+    uint carries_radiance;
+    // Of random numbers.
+    uint seed;
+};
+
+// A sample of its lobes, and how they weigh light from there.
+struct LobeSample {
+    vec3 direction;
+    vec3 weight;
+    float density;
+    uint is_alive;
+    uint is_sharp;
+    uint passes;
+    // The chosen one, where the path does not pass, and its probability.
+    uint lobe;
+    float chance;
+    // BRDF times cosine.
+    vec3 matt;
+    vec3 sharp;
+};
 
 layout(set = 1, binding = 0, scalar) readonly buffer Cases { LobeCase cases[]; };
 layout(set = 1, binding = 1, scalar) writeonly buffer Results { LobeSample results[]; };
@@ -14,8 +68,7 @@ layout(set = 1, binding = 1, scalar) writeonly buffer Results { LobeSample resul
 #include "math/directions.glsl"
 #include "world/scene/bvh.glsl"
 #include "material/surface.glsl"
-#include "material/lobes.glsl"
-#include "material/scatter.glsl"
+#include "material/bsdf.glsl"
 
 Surface surface_of(LobeCase at)
 {

@@ -1,6 +1,24 @@
 // The functions of math/math.glsl at given numbers.
 // Dispatched by src/gpu/check.rs. One thread = one pair of operands.
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+// Functions of `glsl/math/math.glsl` at (a, b).
+struct MathResults {
+    // The bits of a, taken for an integer.
+    float converted;
+    // a b + a
+    float sum_of_product;
+    // a / b
+    float quotient;
+    // Of a.
+    float root;
+    float inverse_root;
+    float exp2;
+    float log2;
+    // Angle of (b, a).
+    float angle;
+    float asinh;
+};
 
 layout(set = 1, binding = 0, scalar) readonly buffer Operands { vec2 operands[]; };
 layout(set = 1, binding = 1, scalar) writeonly buffer Results { MathResults results[]; };

@@ -1,6 +1,22 @@
 // The room's photons and paths, packed and unpacked.
 // Dispatched by tests/engine/packing.rs. One thread = one case, which stands beside what Rust packed of it.
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "check/packing_case.glsl"
+
+// An entry of the room's photon map and a path, unpacked.
+struct UnpackedRoom {
+    vec3 place;
+    uint wall;
+    float flux;
+    float weight;
+    vec3 position;
+    uint path_wall;
+    vec3 direction;
+    uint photon;
+    uvec2 stream;
+    float path_flux;
+};
 
 layout(set = 1, binding = 0, scalar) readonly buffer Cases { PackingCase cases[]; };
 layout(set = 1, binding = 1, scalar) readonly buffer Photons { uvec4 photons[]; };

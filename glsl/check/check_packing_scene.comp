@@ -1,10 +1,26 @@
 // Photons of scenes of triangles, normals and directions, boxes of a node and the bits of one hit, packed and unpacked.
 // Dispatched by tests/engine/packing.rs. One thread = one case, which stands beside what Rust packed of it.
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "check/packing_case.glsl"
+
+// An entry of the map of a scene of triangles, unit vectors packed and unpacked, and a child of a node.
+struct UnpackedScene {
+    vec3 position;
+    uint plane;
+    vec3 flux;
+    uint wi;
+    uint normal_code;
+    vec3 normal;
+    uint direction_code;
+    vec3 low;
+    vec3 high;
+    uint meta;
+    uint child_nodes;
+};
 
 layout(set = 1, binding = 0, scalar) readonly buffer Cases { PackingCase cases[]; };
 layout(set = 1, binding = 1, scalar) readonly buffer Map { uvec4 map[]; };
-layout(set = 1, binding = 2, scalar) readonly buffer NodeCases { BvhNode node_cases[]; };
 layout(set = 1, binding = 4, scalar) writeonly buffer SortedMap { uvec4 sorted_map[]; };
 layout(set = 1, binding = 5, scalar) writeonly buffer Results { UnpackedScene results[]; };
 
@@ -14,6 +30,8 @@ layout(set = 1, binding = 5, scalar) writeonly buffer Results { UnpackedScene re
 #include "world/scene/photon.glsl"
 #include "world/scene/bvh_node.glsl"
 #include "world/scene/one_hit.glsl"
+
+layout(set = 1, binding = 2, scalar) readonly buffer NodeCases { BvhNode node_cases[]; };
 
 void main()
 {

@@ -1,6 +1,42 @@
 // The functions that sample, at given random words.
 // Dispatched by src/gpu/check.rs. One thread = one case.
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+// What the functions that sample are asked at.
+struct SamplingCase {
+    // Two random words, as the generator gives them.
+    uvec2 words;
+    // Of a disc, and of what is made into a frame or packed; a unit vector.
+    vec3 normal;
+    // Of a lobe.
+    float exponent;
+    // Unit vectors: corners of a spherical triangle.
+    vec3 a;
+    vec3 b;
+    vec3 c;
+};
+
+// What the functions of `glsl/rng/sampling.glsl`, `glsl/world/scene/filter.glsl` and `glsl/world/scene` make of a case.
+struct Samples {
+    // Around the z axis.
+    vec3 cosine_hemisphere;
+    vec3 uniform_hemisphere;
+    vec3 sphere;
+    vec3 lobe;
+    // A point of the unit disc around the origin.
+    vec3 disc;
+    // Barycentric.
+    vec2 triangle;
+    vec2 filter_offset;
+    // A direction within the spherical triangle, and the angle that it was chosen from.
+    vec3 in_triangle;
+    float solid_angle;
+    vec3 tangent;
+    vec3 bitangent;
+    // The normal, packed in 2 x 16 and in 2 x 15 bits.
+    vec3 unpacked_normal;
+    vec3 unpacked_direction;
+};
 
 layout(set = 1, binding = 0, scalar) readonly buffer Cases { SamplingCase cases[]; };
 layout(set = 1, binding = 1, scalar) writeonly buffer Results { Samples results[]; };

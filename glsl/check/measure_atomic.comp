@@ -1,6 +1,8 @@
 // The rate of atomic additions whose answer is used, at random counters up to number `mask`, or with mask 0 at one.
 // Dispatched by src/measure/bench/rates.rs. One thread = `step_count` additions.
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "check/measure_push.glsl"
 
 layout(push_constant, scalar) uniform Push { MeasurePush push; };
 layout(set = 1, binding = 0, scalar) buffer Counts { uint counts[]; };

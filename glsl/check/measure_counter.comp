@@ -2,7 +2,9 @@
 // Dispatched by src/measure/bench/rates.rs. One thread = `step_count` additions by its subgroup.
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_ballot : require
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "check/measure_push.glsl"
 
 layout(push_constant, scalar) uniform Push { MeasurePush push; };
 layout(set = 1, binding = 0, scalar) buffer Counters { uint counters[]; };

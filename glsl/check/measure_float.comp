@@ -1,7 +1,9 @@
 // The rate of single-precision sums and products, each rounded by itself as everywhere else here.
 // Dispatched by src/measure/bench/rates.rs. One thread = four points that turn around the origin, which neither settle nor
 // wait for each other; a step takes 16 sums and products.
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "check/measure_push.glsl"
 
 layout(push_constant, scalar) uniform Push { MeasurePush push; };
 layout(set = 1, binding = 0, scalar) writeonly buffer Results { float results[]; };

@@ -1,6 +1,8 @@
 // The rate of reads of 32 bytes, a record's size, at random places of a large buffer.
 // Dispatched by src/measure/bench/rates.rs. One thread = `step_count` reads, at pairs of blocks up to number `mask`.
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "check/measure_push.glsl"
 
 layout(push_constant, scalar) uniform Push { MeasurePush push; };
 layout(set = 1, binding = 0, scalar) readonly buffer Blocks { uvec4 blocks[]; };

@@ -1,6 +1,8 @@
 // How much of a disc lies on its wall, edges and corners counted out. Twin of src/cpu/nearest.rs; in f64 it is
 // src/scene/rectangle.rs.
 
+#include "world/room/walls.glsl"
+
 // Area of the unit disc within 0 <= x <= a, 0 <= y <= b, for a and b up to 1: a rectangle; or, where the circle
 // cuts its corner off, the triangles and the sector of the circle that are left.
 float quadrant_area(float a, float b)

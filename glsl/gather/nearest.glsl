@@ -10,6 +10,16 @@
 // are the same ones whatever order the map has. A search goes on in a further dispatch where it takes many
 // steps. The including kernel chose how the film adds.
 
+// A search for a point's nearest photons, between two dispatches.
+struct Search {
+    // Leaves before it are done; `NONE`: all are.
+    uint next_leaf;
+    // Photons found.
+    uint found;
+    // Squared distance beyond which no photon is wanted.
+    float limit;
+};
+
 layout(set = 0, binding = 3, scalar) readonly buffer Points { Point points[]; };
 layout(set = 0, binding = 0, scalar) readonly buffer Rooms { Room rooms[]; };
 // Heaps, the farthest photon on top: (bits of the squared distance, place in the tree), entry by entry of all points.

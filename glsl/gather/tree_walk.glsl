@@ -1,6 +1,8 @@
 // A walk over the leaves of a wall's kd-tree (glsl/index/tree.glsl) that may hold a photon within a distance, from
 // left to right. The places say what comes next, so it needs no stack.
 
+#include "gather/points.glsl"
+
 layout(set = 1, binding = 1, scalar) readonly buffer WallBegins { uint wall_begins[]; };
 layout(set = 1, binding = 2, scalar) readonly buffer Planes { float planes[]; };
 layout(set = 1, binding = 3, scalar) readonly buffer TreePhotons { uvec4 tree_photons[]; };

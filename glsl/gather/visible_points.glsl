@@ -3,6 +3,8 @@
 // every point at first, then those of the few points that have more. Of a slice, as many invocations as there are
 // lanes take every so many-th candidate. The including kernel chose how sums are added.
 
+#include "world/scene/visible_point.glsl"
+
 layout(set = 1, binding = 4, scalar) readonly buffer VisiblePoints { VisiblePoint visible_points[]; };
 layout(set = 1, binding = 2, scalar) readonly buffer SortedMap { uvec4 sorted_map[]; };
 // Points with more than one slice: how many, the longest one's candidates; then which, and each one's candidates.

@@ -3,7 +3,9 @@
 // After it longest[0] = candidates of the busiest point.
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "gather/points.glsl"
 
 layout(push_constant, scalar) uniform Push { GatherPush push; };
 layout(set = 0, binding = 3, scalar) readonly buffer Points { Point points[]; };

@@ -2,7 +2,10 @@
 // Dispatched by src/engine/room/index.rs once a chunk. One thread = one entry of the photon map.
 // After it cells[c] = photons in cell c; ranks[i] = photons that came to the cell of entry i before it. That order
 // varies from run to run; the integer sums of the film do not see it.
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "world/room/walls.glsl"
+#include "index/push.glsl"
 
 layout(push_constant, scalar) uniform Push { IndexPush push; };
 layout(set = 0, binding = 0, scalar) readonly buffer Rooms { Room rooms[]; };

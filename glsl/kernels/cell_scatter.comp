@@ -1,7 +1,10 @@
 // Writes each photon to its place in cell order.
 // Dispatched by src/engine/room/index.rs once a chunk. One thread = one entry of the photon map.
 // cells[c] = first place of cell c; ranks from cell_count.comp.
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "world/room/walls.glsl"
+#include "index/push.glsl"
 
 layout(push_constant, scalar) uniform Push { IndexPush push; };
 layout(set = 0, binding = 0, scalar) readonly buffer Rooms { Room rooms[]; };

@@ -3,7 +3,16 @@
 // Dispatched by src/engine/scene/trial.rs once, before a run, and by src/engine/scene/radius_class.rs in its first round.
 // One thread = one visible point.
 #extension GL_EXT_control_flow_attributes : require
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "world/scene/visible_point.glsl"
+
+struct ClearancePush {
+    uint first_point;
+    uint end_point;
+    // Which of the distances in 8 directions is taken, in ascending order from 0.
+    uint rank;
+};
 
 layout(push_constant, scalar) uniform Push { ClearancePush push; };
 layout(set = 1, binding = 1, scalar) readonly buffer VisiblePoints { VisiblePoint visible_points[]; };

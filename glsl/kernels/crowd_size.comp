@@ -1,6 +1,13 @@
 // Size of the second part of a lookup: points with more candidates than one slice along x, their other slices along y.
 // Dispatched by src/engine/scene/estimate.rs as one thread.
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "dispatch/dispatch_size.glsl"
+
+struct CrowdSizePush {
+    uint items_per_group;
+    uint max_groups;
+};
 
 layout(local_size_x = 1) in;
 layout(push_constant, scalar) uniform Push { CrowdSizePush push; };

@@ -1,7 +1,28 @@
 // Finds the walls that cut the discs of density estimates off.
 // Dispatched by src/engine/scene/estimate.rs once a round for each map. One thread = one visible point.
 #extension GL_EXT_control_flow_attributes : require
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "world/scene/visible_point.glsl"
+#include "world/scene/work.glsl"
+
+// Where walls cut the discs of density estimates off.
+struct DiscCutsPush {
+    WorkDivision work;
+    uint first_point;
+    uint end_point;
+    uint pixel_count;
+    // Of the picture; 0 where points are receivers, in an order of their own.
+    uint width;
+    uint height;
+    // Mask of the arrivals that the map holds.
+    uint arrivals;
+    // `GLOBAL_CLASS` or `CAUSTIC_CLASS`, and where its cuts begin.
+    uint map_class;
+    uint first_cut;
+    // Of class 0.
+    float radius;
+};
 
 layout(push_constant, scalar) uniform Push { DiscCutsPush push; };
 layout(set = 1, binding = 1, scalar) readonly buffer VisiblePoints { VisiblePoint visible_points[]; };

@@ -1,14 +1,15 @@
 // Turns a counter on the device into the size of the next indirect dispatch, so that the host need
 // not wait for it.
 // Dispatched by src/engine/room/index.rs and src/engine/scene/trace.rs as one thread.
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "dispatch/dispatch_size.glsl"
 
 layout(local_size_x = 1) in;
 layout(push_constant, scalar) uniform Push { DispatchSizePush push; };
 layout(set = 1, binding = 0, scalar) readonly buffer Counters { uint counters[]; };
 layout(set = 1, binding = 1, scalar) writeonly buffer Sizes { DispatchArgs dispatch_args[]; };
 
-#include "dispatch/dispatch_size.glsl"
 
 void main()
 {

@@ -1,6 +1,25 @@
 // Pixels of a window from what is shown: exposed, with the tone curve and transfer function of PNG files, or in false colours.
 // Dispatched by src/view/picture.rs once a frame. One thread = one pixel of the window.
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+// What is shown, as pixels of a window; see `glsl/kernels/display.comp`.
+struct DisplayPush {
+    // Of the window, and of what is shown.
+    uint width;
+    uint height;
+    uint shown_width;
+    uint shown_height;
+    // Pixels of the window along each side of one that is shown.
+    uint zoom;
+    // Stops by which values are made brighter.
+    float stops;
+    // 1: values are errors, for false colours.
+    uint is_error;
+    // 1: values are radiance; 0: the paper's display values.
+    uint is_light;
+    // 1: the window wants blue first.
+    uint blue_first;
+};
 
 layout(push_constant, scalar) uniform Push { DisplayPush push; };
 layout(set = 1, binding = 0, scalar) readonly buffer Shown { vec4 shown[]; };

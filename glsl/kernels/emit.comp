@@ -1,8 +1,7 @@
 // Photons as they leave their lights.
 // Dispatched by src/engine/WORLD/trace.rs once a chunk, in the paper's box once a light and chunk. One thread = one photon.
 #extension GL_EXT_control_flow_attributes : require
-#include "records.glsl"
-
+#extension GL_EXT_scalar_block_layout : require
 
 #include "world/WORLD/emit_kernel.glsl"
 

@@ -1,6 +1,11 @@
 // Ends a block: its row of what a smaller radius would change joins the row that its number shares with others, and is empty for the
 // next block. Dispatched by src/engine/scene/estimate.rs once a block. One thread = one sum.
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+struct EndDifferencePush {
+    uint row_length;
+    uint block;
+};
 
 layout(push_constant, scalar) uniform Push { EndDifferencePush push; };
 layout(set = 1, binding = 0, scalar) buffer Differences { uvec2 differences[]; };

@@ -2,7 +2,14 @@
 // squares, and the film is empty for the next round. Of some points the sum itself is kept, for the latest rounds.
 // Dispatched by src/engine/room/estimate.rs once a round. One thread = one film sum.
 // Squares lie in two buffers, 64 bits each, so that none is larger than twice the film.
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+struct EndRoundPush {
+    uint sum_count;
+    // Sums of each point.
+    uint channel_count;
+    uint round;
+};
 
 layout(push_constant, scalar) uniform Push { EndRoundPush push; };
 layout(set = 1, binding = 0, scalar) buffer Film { uvec2 film[]; };

@@ -1,7 +1,14 @@
 // Ends a bounce whose survivors took places from striped counters (builder/striped_counters.glsl): says how many places that
 // makes, gaps included, marks the gaps as no photon and no path, and empties the counters for the next bounce.
 // Dispatched by src/engine/room/trace.rs once a bounce, as one work group. One thread = every so many-th gap.
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+struct FillGapsPush {
+    uint bounce;
+    uint bounces;
+    uint path_capacity;
+    uint photon_capacity;
+};
 
 layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { FillGapsPush push; };

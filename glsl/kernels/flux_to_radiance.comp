@@ -5,7 +5,36 @@
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "world/scene/visible_point.glsl"
+#include "world/scene/work.glsl"
+
+struct FluxToRadiancePush {
+    WorkDivision work;
+    uint first_point;
+    uint end_point;
+    uint point_count;
+    uint pixel_count;
+    // Of the picture; 0 where points are receivers, in an order of their own.
+    uint width;
+    uint height;
+    // Mask of the arrivals that some map holds.
+    uint arrivals;
+    uint round;
+    // Hash of the seed and the round that decides what is rounded up.
+    uint rounding;
+    float film_scale;
+    float film_limit;
+    // Of class 0.
+    float global_radius;
+    float caustic_radius;
+    // Where the caustic map's cuts begin.
+    uint first_caustic_cut;
+    // Flux of a photon of relative flux 1, over the photons of the round.
+    float global_flux;
+    float caustic_flux;
+};
 
 layout(push_constant, scalar) uniform Push { FluxToRadiancePush push; };
 layout(set = 1, binding = 1, scalar) readonly buffer VisiblePoints { VisiblePoint visible_points[]; };
@@ -32,7 +61,6 @@ layout(set = 1, binding = 2, scalar) buffer Estimates { uvec2 estimates[]; };
 #include "film/kept_parts.glsl"
 #include "film/differences.glsl"
 #include "world/scene/tiles.glsl"
-#include "world/scene/no_point.glsl"
 #include "world/scene/one_hit.glsl"
 
 float flux_of(uvec2 sum)

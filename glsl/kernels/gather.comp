@@ -3,7 +3,9 @@
 // threads = one point.
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 #extension GL_EXT_shader_atomic_int64 : require
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "gather/points.glsl"
 
 layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { GatherPush push; };

@@ -3,7 +3,9 @@
 // After it cells[b] = photons in bucket b; ranks[i] = photons that came to the bucket of photon i before it. That order
 // varies from run to run; the integer sums of the lookup do not see it.
 #extension GL_EXT_control_flow_attributes : require
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "index/push.glsl"
 
 layout(push_constant, scalar) uniform Push { CellPush push; };
 layout(set = 1, binding = 0, scalar) readonly buffer Map { uvec4 map[]; };

@@ -2,7 +2,9 @@
 // Dispatched by src/engine/scene/index.rs once a chunk and grid. One thread = half a photon, twice.
 // cells[b] = first place of bucket b; ranks from map_count.comp.
 #extension GL_EXT_control_flow_attributes : require
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "index/push.glsl"
 
 layout(push_constant, scalar) uniform Push { CellPush push; };
 layout(set = 1, binding = 0, scalar) readonly buffer Map { uvec4 map[]; };

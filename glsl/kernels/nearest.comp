@@ -2,7 +2,21 @@
 // Dispatched by src/engine/room/estimate/tree.rs until all searches are done. One thread = one point.
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 #extension GL_EXT_shader_atomic_int64 : require
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+struct NearestPush {
+    // Points `first_point` to `end_point` - 1.
+    uint first_point;
+    uint end_point;
+    // How many photons are wanted.
+    uint nearest;
+    // 1: the searches begin.
+    uint is_first;
+    // Of the full radius: how far the nearest photons are looked for.
+    float radius_squared;
+    // log2 of the film's units in 1.
+    uint film_shift;
+};
 
 layout(push_constant, scalar) uniform Push { NearestPush push; };
 

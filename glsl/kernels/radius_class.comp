@@ -3,7 +3,32 @@
 // Dispatched by src/engine/scene/radius_class.rs for each grid, from the finest to the widest, in a run's first round. One thread =
 // one visible point.
 #extension GL_EXT_control_flow_attributes : require
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "world/scene/visible_point.glsl"
+#include "index/push.glsl"
+
+// Which radius each visible point has, by photons of a trial around it.
+struct RadiusClassPush {
+    uint first_point;
+    uint end_point;
+    // `GLOBAL_CLASS` or `CAUSTIC_CLASS`, the first of the classes that this grid serves, and how many there are.
+    uint map_class;
+    uint first_class;
+    uint class_count;
+    // Where nothing tells.
+    uint usual_class;
+    // Of class 0.
+    float radius;
+    // Photons of the trial within a radius that is to hold as many of a round as wanted.
+    float wanted;
+    // Of what is clear around a point: larger radii are halved, once or twice.
+    float clearance_share;
+    // No radius need be smaller than this share of a point's distance from the eye: half a pixel.
+    vec3 eye;
+    float pixel_share;
+    CellPush cells;
+};
 
 layout(push_constant, scalar) uniform Push { RadiusClassPush push; };
 layout(set = 1, binding = 4, scalar) readonly buffer VisiblePoints { VisiblePoint visible_points[]; };

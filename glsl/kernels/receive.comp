@@ -4,7 +4,26 @@
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "world/scene/receiver.glsl"
+#include "world/scene/work.glsl"
+#include "rng/draws.glsl"
+
+struct ReceivePush {
+    Draws draws;
+    WorkDivision work;
+    // Hash of the seed and the round that decides what is rounded up.
+    uint rounding;
+    uint first_point;
+    uint end_point;
+    uint point_count;
+    uint emitter_count;
+    float film_scale;
+    float film_limit;
+    // Within which a surface makes a point one of its own.
+    float radius;
+};
 
 layout(push_constant, scalar) uniform Push { ReceivePush push; };
 layout(set = 1, binding = 12, scalar) readonly buffer Receivers { Receiver receivers[]; };
@@ -28,7 +47,7 @@ void main()
     vec3 ng = receiver.normal;
     vec3 ns = receiver.shading_normal;
     vec3 position = off_the_walls(receiver.position, ng);
-    Target here = plain_target(position, position_error(position), ng, ns, ns, SURFACE_RECEIVER, 0.0);
+    Target here = receiver_at(position, position_error(position), ng, ns);
     start_chain(position, ns, vec3(1.0));
     if (HAS_MEDIA) {
         chain.media = media_at(position, ng);
@@ -56,15 +75,11 @@ void main()
         // Irradiance is pi times the radiance that arrives from cosine-weighted directions.
         vec3 u = philox_floats(uvec4(index, push.draws.round, 0, push.draws.domain), push.draws.seed).xyz;
         chain.direction = to_frame(sample_cosine_hemisphere(u.y, u.z), ns);
-        chain.position = offset_origin(position, here.error, ng, chain.direction);
+        chain.position = offset_origin(position, here.surface.error, ng, chain.direction);
         chain.weight = vec3(3.14159265358979324);
-        chain.gathers = true;
-        chain.starts_nowhere = !on_surface;
+        chain.role = on_surface ? ROLE_GATHER : ROLE_GATHER_IN_AIR;
         // Neither shadow rays nor photons know what shines on a point in the air, where the maps are to hold it.
-        chain.sees_emission = false;
-        if (HAS_ALL_ARRIVALS) {
-            chain.sees_emission = !on_surface;
-        }
+        chain.sees_emission = HAS_ALL_ARRIVALS && !on_surface;
         follow(push.point_count, push.draws, push.emitter_count, 0);
     }
     note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), NONFINITE_LIGHT, push.draws.domain,

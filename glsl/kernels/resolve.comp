@@ -3,7 +3,23 @@
 // picture: of all light, and of what surfaces scatter, which errors refer to. Of some pixels the parts of a block's light are kept;
 // where a picture keeps its parts, those of all pixels join the sums of theirs.
 // Dispatched by src/engine/scene/estimate.rs once a round. One thread = one pixel or receiver.
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "world/scene/work.glsl"
+
+struct ResolvePush {
+    WorkDivision work;
+    uint first_pixel;
+    uint end_pixel;
+    uint pixel_count;
+    // Visible points of a path that photons may have lit.
+    uint points_per_path;
+    // Whether what paths find counts.
+    uint counts_paths;
+    uint block;
+    // 1: it is the last round of its block.
+    uint ends_block;
+};
 
 layout(push_constant, scalar) uniform Push { ResolvePush push; };
 layout(set = 1, binding = 0, scalar) readonly buffer PassSums { uvec2 pass_sums[]; };

@@ -1,7 +1,9 @@
 // Adds what stands before each block to the block's own prefix sums.
 // Dispatched by src/engine/prefix_sum.rs once a level. One thread = SCAN_ITEMS neighbouring items.
 // `block_sums` holds exclusive prefix sums by now.
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "index/push.glsl"
 
 layout(push_constant, scalar) uniform Push { ScanPush push; };
 layout(set = 1, binding = 0, scalar) buffer Items { uint items[]; };

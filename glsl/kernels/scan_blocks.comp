@@ -2,7 +2,9 @@
 // Dispatched by src/engine/prefix_sum.rs once a level. One thread = SCAN_ITEMS neighbouring items.
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "index/push.glsl"
 
 layout(push_constant, scalar) uniform Push { ScanPush push; };
 layout(set = 1, binding = 0, scalar) buffer Items { uint items[]; };

@@ -1,6 +1,27 @@
 // Photons of a map as dots on the pixels of a window, where nothing that the camera sees first hides them.
 // Dispatched by src/engine/scene/live.rs. One thread = one photon.
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "world/scene/visible_point.glsl"
+
+// Photons of a map as dots; see `glsl/kernels/show_photons.comp`.
+struct ShowPhotonsPush {
+    uint photon_count;
+    uint width;
+    uint height;
+    uint shown_width;
+    uint shown_height;
+    uint zoom;
+    vec3 eye;
+    vec3 forward;
+    // To the picture's right and upper edge, as camera rays have them.
+    vec3 right;
+    vec3 up;
+    uint is_orthographic;
+    // As the window has it, and pixels along each side of a dot.
+    uint colour;
+    uint dot_size;
+};
 
 layout(push_constant, scalar) uniform Push { ShowPhotonsPush push; };
 layout(set = 1, binding = 0, scalar) readonly buffer Map { uvec4 map[]; };

@@ -1,7 +1,30 @@
 // What the walls of the paper's box hold after whole rounds, seen by a camera: the paper's illumination, or its error. Walls are seen
 // from within alone, so that one can look in from everywhere.
 // Dispatched by src/engine/room/live.rs. One thread = one pixel.
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "gather/points.glsl"
+
+// The same of the paper's box; see `glsl/kernels/show_room.comp`.
+struct ShowRoomPush {
+    uint width;
+    uint height;
+    vec3 eye;
+    vec3 forward;
+    vec3 right;
+    vec3 up;
+    uint shows;
+    uint channel_count;
+    // Texels along each side of a wall, and walls, each with its texels one behind the other.
+    uint mesh;
+    uint wall_count;
+    // Of the box.
+    vec3 middle;
+    uint rounds;
+    // Illumination that a film unit is worth after these rounds, and the mean of what is shown, of which errors are relative.
+    float unit;
+    float mean;
+};
 
 layout(push_constant, scalar) uniform Push { ShowRoomPush push; };
 layout(set = 0, binding = 3, scalar) readonly buffer Points { Point points[]; };

@@ -1,6 +1,21 @@
 // What the film of a scene holds after whole rounds, with those of the block under way: light, a part of it, or its error.
 // Dispatched by src/engine/scene/live.rs. One thread = one pixel of the film.
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+// What a window shows of a scene's film; see `glsl/kernels/show_scene.comp`.
+struct ShowScenePush {
+    uint pixel_count;
+    // SHOW_...
+    uint shows;
+    uint rounds;
+    // Whole blocks, and the rounds of these.
+    uint blocks;
+    uint rounds_of_blocks;
+    // W/m2/sr of a film unit.
+    float unit;
+    // Mean radiance of the picture, of which errors are relative.
+    float mean;
+};
 
 layout(push_constant, scalar) uniform Push { ShowScenePush push; };
 layout(set = 1, binding = 0, scalar) readonly buffer FilmSums { uvec2 film_sums[]; };

@@ -1,6 +1,8 @@
 // Size of a gather in slices: invocations for the points along x, slices of their candidates along y.
 // Dispatched by src/engine/room/estimate.rs as one thread.
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "dispatch/dispatch_size.glsl"
 
 layout(local_size_x = 1) in;
 layout(push_constant, scalar) uniform Push { DispatchSizePush push; };

@@ -3,13 +3,15 @@
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_ballot : require
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
 
 layout(set = 1, binding = 3, scalar) buffer Counters { uint counters[]; };
-layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 
 #include "world/WORLD/trace.glsl"
 #include "ledger/tally_copy.glsl"
+
+layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
+
 #include "ledger/tally.glsl"
 #include "builder/BUILDER.glsl"
 

@@ -1,6 +1,8 @@
 // What the kd-tree sorts its photons by along one axis of their walls.
 // Dispatched by src/engine/room/index/tree.rs once an axis. One thread = one entry of the photon map.
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "index/push.glsl"
 
 layout(push_constant, scalar) uniform Push { TreePush push; };
 #include "index/photon_list.glsl"

@@ -1,6 +1,6 @@
 // Writes each photon to its place in the leaves of the kd-tree.
 // Dispatched by src/engine/room/index/tree.rs once a chunk. One thread = one photon of a leaf.
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
 
 layout(set = 1, binding = 0, scalar) readonly buffer Photons { uvec4 photons[]; };
 layout(set = 1, binding = 1, scalar) readonly buffer WallBegins { uint wall_begins[]; };

@@ -1,7 +1,9 @@
 // Moves photons to their places of a pass of the radix sort of index/tree_digits.glsl.
 // Dispatched by src/engine/room/index/tree.rs once a digit. One thread = a run of TREE_RUN photons.
 // counts[d * runs + r] = first place of the photons of run r with the digit d.
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "index/push.glsl"
 
 layout(push_constant, scalar) uniform Push { TreePush push; };
 #include "world/room/photon.glsl"

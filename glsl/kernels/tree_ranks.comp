@@ -1,7 +1,9 @@
 // Splits the nodes of one height along one axis: notes the place of every photon in the order along it, and
 // the planes.
 // Dispatched by src/engine/room/index/tree.rs once a height. One thread = one photon of a node.
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "index/push.glsl"
 
 layout(push_constant, scalar) uniform Push { TreePush push; };
 #include "index/tree_nodes.glsl"

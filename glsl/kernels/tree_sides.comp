@@ -1,7 +1,9 @@
 // Says which photons go to the left half of their node, in the order along the other axis.
 // Dispatched by src/engine/room/index/tree.rs once a height. One thread = one photon of a node.
 // After it counts[i] = 1 where photon i goes left.
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "index/push.glsl"
 
 layout(push_constant, scalar) uniform Push { TreePush push; };
 #include "index/tree_nodes.glsl"

@@ -1,6 +1,8 @@
 // Sizes of the dispatches that build the kd-tree: a photon, a run of them, a share of a prefix sum an invocation.
 // Dispatched by src/engine/room/index/tree.rs as one thread.
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "dispatch/dispatch_size.glsl"
 
 layout(local_size_x = 1) in;
 layout(push_constant, scalar) uniform Push { DispatchSizePush push; };

@@ -2,7 +2,9 @@
 // that no node is ever sorted again.
 // Dispatched by src/engine/room/index/tree.rs once a height. One thread = one photon of a node.
 // counts[i] = photons before i that go left.
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "index/push.glsl"
 
 layout(push_constant, scalar) uniform Push { TreePush push; };
 #include "index/tree_nodes.glsl"

@@ -1,6 +1,8 @@
 // Where the photons of each wall begin once they are sorted, and how many the fullest wall has.
 // Dispatched by src/engine/room/index/tree.rs as one thread, before the last pass of a sort moves its photons.
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "index/push.glsl"
 
 layout(local_size_x = 1) in;
 layout(push_constant, scalar) uniform Push { TreePush push; };

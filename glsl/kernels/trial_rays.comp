@@ -2,7 +2,26 @@
 // (src/scene/openings.rs), and which places light the points (src/engine/scene/light_trial.rs).
 // Dispatched by src/engine/scene/trial_rays.rs before a run. One thread = two rays.
 #extension GL_EXT_control_flow_attributes : require
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "world/scene/receiver.glsl"
+
+// A ray of a trial, and the place that it meets with the normal of its side.
+struct TrialRay {
+    vec3 origin;
+    vec3 direction;
+    vec3 met;
+    vec3 normal;
+    // 1: it leaves the scene, and meets nothing.
+    uint escapes;
+};
+
+struct TrialRaysPush {
+    uvec2 seed;
+    uint first_ray;
+    uint end_ray;
+    uint rays_of_point;
+};
 
 layout(push_constant, scalar) uniform Push { TrialRaysPush push; };
 layout(set = 1, binding = 12, scalar) readonly buffer Receivers { Receiver receivers[]; };

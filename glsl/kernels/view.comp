@@ -4,7 +4,39 @@
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-#include "records.glsl"
+#extension GL_EXT_scalar_block_layout : require
+
+#include "world/scene/work.glsl"
+#include "rng/draws.glsl"
+
+struct ViewPush {
+    Draws draws;
+    WorkDivision work;
+    // Hash of the seed and the round that decides what is rounded up.
+    uint rounding;
+    uint width;
+    uint height;
+    // Paths of all pixels, those of each together, and behind them extra samples.
+    uint first_path;
+    uint end_path;
+    vec3 eye;
+    vec3 forward;
+    // To the picture's right and upper edge: at unit distance, or where parallel rays start.
+    vec3 right;
+    vec3 up;
+    uint is_orthographic;
+    // 0: a pinhole.
+    float lens_radius;
+    // Distance of the plane in focus along the view.
+    float focus;
+    uint emitter_count;
+    // Width of a pixel's filter over the distance between pixels.
+    float footprint;
+    // Film units in 1 W/m2/sr.
+    float film_scale;
+    // Largest sum of one pass, film units.
+    float film_limit;
+};
 
 layout(push_constant, scalar) uniform Push { ViewPush push; };
 

@@ -1,5 +1,26 @@
 // Thin films over a base: light that is reflected at both of their boundaries interferes (Belcour and Barla 2017, as
-// KHR_materials_iridescence has it). Expects rng/sampling.glsl.
+// KHR_materials_iridescence has it).
+
+#include "rng/sampling.glsl"
+#include "material/ggx.glsl"
+
+// A thin film on the base: how much of it is there, and shares of dielectric and metal in what is reflected below it, with their F0.
+struct MattFilm {
+    float share;
+    float ior;
+    float thickness;
+    float dielectric;
+    vec3 f0;
+    float metal;
+    vec3 metal_f0;
+    // What it reflects is no sharp lobe.
+    uint is_matt;
+};
+
+MattFilm no_film()
+{
+    return MattFilm(0.0, 1.0, 0.0, 0.0, vec3(0.0), 0.0, vec3(0.0), 0);
+}
 
 // Amplitude of a wave of this phase shift, for X, Y, Z of the observer: Gaussians in the frequency's Fourier space.
 vec3 sensitivity(float path, vec3 shift)

@@ -34,3 +34,19 @@ struct Layers {
     float coverage;
     bool is_unlit;
 };
+
+// What a ray met.
+struct Surface {
+    vec3 position;
+    float error; // bound of each coordinate's
+    uint plane; // twice its number, plus 1 on the back
+    vec3 ng; // geometric normal on the side of wo
+    vec3 ns; // shading normal on the same side
+    bool front;
+    bool scatters;
+    uint kind;
+    float parameter;
+    vec3 base_colour;
+    vec3 emission; // radiance towards wo
+    Layers layers; // of SURFACE_LAYERED
+};

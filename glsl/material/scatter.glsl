@@ -1,4 +1,6 @@
-// Where paths go on from a surface.
+// What all lobes share: where light goes on, and the optics of a boundary.
+
+#include "math/math.glsl"
 
 struct Scatter {
     vec3 direction;
@@ -8,6 +10,18 @@ struct Scatter {
     bool passes; // straight, as if no surface were there
     float density; // of the direction, 1/sr; 0: that of a delta, of the diffuse lobe or of sheen
 };
+
+vec3 mirrored(vec3 w, vec3 n)
+{
+    return 2.0 * dot(w, n) * n - w;
+}
+
+// A direction on the side that a unit vector points to. A shading normal may send a mirrored or refracted ray to the wrong side
+// of its triangle; mirrored in the triangle's plane, as if it met the surface once more, it leaves with all of its light.
+vec3 on_side(vec3 direction, vec3 side)
+{
+    return direction - 2.0 * min(dot(direction, side), 0.0) * side;
+}
 
 // Fresnel reflectance of unpolarised light; eta = n_i / n_t.
 float fresnel(float cos_i, float cos_t, float eta)
@@ -23,83 +37,28 @@ float refracted_cosine_squared(float cos_i, float eta)
     return eta * eta * cos_i * cos_i + (1.0 - eta) * (1.0 + eta);
 }
 
-// A direction on the side that a unit vector points to. A shading normal may send a mirrored or refracted ray to the wrong side
-// of its triangle; mirrored in the triangle's plane, as if it met the surface once more, it leaves with all of its light.
-vec3 on_side(vec3 direction, vec3 side)
+// Exact Fresnel reflectance at a cosine; 1 in total reflection.
+float reflectance_at(float cosine, float eta)
 {
-    return direction - 2.0 * min(dot(direction, side), 0.0) * side;
+    float cos_t_squared = refracted_cosine_squared(cosine, eta);
+    return cos_t_squared > 0.0 ? fresnel(cosine, sqrt(cos_t_squared), eta) : 1.0;
 }
 
-#include "material/layered_lobes.glsl"
-#include "material/layered_sampling.glsl"
-
-// What smooth glass does with light that came from wo.
-struct Glass {
-    vec3 normal;
-    float eta; // index where wo is over that beyond
-    float cos_i;
-    float cos_t;
-    float reflectance;
-};
-
-// The path has met `depth` surfaces before.
-Glass glass_at(Surface surface, vec3 wo, uint depth)
+// What a shading normal changes about a photon's flux (Veach 1997, section 5.3): the ratio of the cosines
+// that the light sees to those that the eye sees.
+float shading_gain(float shading_cosine, float geometric_cosine)
 {
-    float eta = surface.front ? divide(1.0, surface.parameter) : surface.parameter;
-    vec3 normal = surface.ns;
-    float cos_i = min(dot(wo, normal), 1.0);
-    float cos_t_squared = refracted_cosine_squared(cos_i, eta);
-    if (HAS_SMOOTH_NORMALS) {
-        // Smooth normals do not keep phase space: without an end, some of what enters a coarse sphere is reflected in it
-        // for ever. What enters a solid by its triangles alone also leaves it.
-        if (cos_t_squared <= 0.0 && depth >= SMOOTH_TOTAL_REFLECTIONS) {
-            normal = surface.ng;
-            cos_i = min(dot(wo, normal), 1.0);
-            cos_t_squared = refracted_cosine_squared(cos_i, eta);
-        }
-    }
-    float cos_t = sqrt(max(cos_t_squared, 0.0));
-    return Glass(normal, eta, cos_i, cos_t, cos_t_squared > 0.0 ? fresnel(cos_i, cos_t, eta) : 1.0);
+    return min(divide(abs(shading_cosine), max(abs(geometric_cosine), 1e-6)), float(MAX_SHADING_GAIN));
 }
 
-// Where light goes on that glass reflects or refracts, as if it did all of it.
-Scatter way_of_glass(Surface surface, Glass glass, vec3 wo, bool reflects, bool carries_radiance)
+// The share of a light sample that counts beside the sampling of a lobe (the balance heuristic, Veach 1997, section 9.2); 0: no ray of
+// a lobe meets this light.
+float light_share(float light_density, float lobe_density)
 {
-    if (reflects) {
-        vec3 wi = on_side(mirrored(wo, glass.normal), surface.ng);
-        return Scatter(wi, surface.base_colour, dot(wi, surface.ng) > 0.0, true, false, 0.0);
-    }
-    vec3 wi = on_side(normalize((glass.eta * glass.cos_i - glass.cos_t) * glass.normal - glass.eta * wo), -surface.ng);
-    float weight = carries_radiance ? glass.eta * glass.eta : 1.0;
-    return Scatter(wi, weight * surface.base_colour, dot(wi, surface.ng) < 0.0, true, false, 0.0);
+    return light_density > 0.0 ? divide(light_density, light_density + lobe_density) : 1.0;
 }
 
-// Samples where a path goes on that came from wo; u = (choice, two for the direction). A camera path
-// carries radiance, which refraction compresses; a photon carries flux. The path has met `depth` surfaces before.
-Scatter sample_scatter(Surface surface, vec3 wo, vec3 u, uint depth, bool carries_radiance)
+float largest(vec3 v)
 {
-    vec3 ns = surface.ns;
-    if (HAS_MIRROR) {
-        if (surface.kind == SURFACE_MIRROR) {
-            vec3 wi = on_side(mirrored(wo, ns), surface.ng);
-            return Scatter(wi, surface.base_colour, dot(wi, surface.ng) > 0.0, true, false, 0.0);
-        }
-    }
-    if (HAS_DIELECTRIC) {
-        if (surface.kind == SURFACE_DIELECTRIC) {
-            Glass glass = glass_at(surface, wo, depth);
-            return way_of_glass(surface, glass, wo, u.x < glass.reflectance, carries_radiance);
-        }
-    }
-    if (HAS_GLOSSY) {
-        if (surface.kind == SURFACE_GLOSSY) {
-            float n = surface.parameter;
-            vec3 wi = to_frame(sample_lobe(n, u.y, u.z), mirrored(wo, ns));
-            float cos_out = dot(wi, ns);
-            vec3 weight = surface.base_colour * (divide(n + 2.0, n + 1.0) * max(cos_out, 0.0));
-            return Scatter(wi, weight, cos_out > 0.0 && dot(wi, surface.ng) > 0.0, false, false, 0.0);
-        }
-    }
-    vec3 wi = to_frame(sample_cosine_hemisphere(u.y, u.z), ns);
-    return Scatter(wi, surface.base_colour, dot(wi, surface.ng) > 0.0, false, false, 0.0);
+    return max(v.x, max(v.y, v.z));
 }

@@ -1,5 +1,110 @@
 // What a ray met: position, normals, material.
 
+// Shading normals at a triangle's corners, octahedral; all `NONE` on a flat triangle.
+struct TriangleNormals {
+    uint a;
+    uint b;
+    uint c;
+};
+
+// Texture coordinates at a triangle's corners.
+struct TriangleUvs {
+    vec2 base_a;
+    vec2 base_b;
+    vec2 base_c;
+    vec2 emission_a;
+    vec2 emission_b;
+    vec2 emission_c;
+};
+
+// Linear colours at a triangle's corners, which multiply the material's base colour, and alphas.
+struct TriangleColours {
+    vec3 a;
+    vec3 b;
+    vec3 c;
+    vec3 alphas;
+};
+
+// What layered materials need at a triangle's corners: texture coordinates of the mesh's first and second set; tangents, octahedral, for
+// normal map and anisotropy, and for the normal map of the coat. Bits 0 and 3 of `turned`: their bitangents are -(normal x tangent).
+struct TriangleLayers {
+    vec2 first_a;
+    vec2 first_b;
+    vec2 first_c;
+    vec2 second_a;
+    vec2 second_b;
+    vec2 second_c;
+    uint tangent_a;
+    uint tangent_b;
+    uint tangent_c;
+    uint coat_tangent_a;
+    uint coat_tangent_b;
+    uint coat_tangent_c;
+    uint turned;
+};
+
+// What a layered material adds to its `SurfaceMaterial`.
+struct LayeredMaterial {
+    float metallic;
+    float roughness;
+    float ior;
+    float specular;
+    vec3 specular_colour;
+    float transmission;
+    // It encloses a medium; else it is a thin wall.
+    uint is_solid;
+    // Number of its medium, from 1; 0: it is no solid, or media do not matter.
+    uint medium;
+    // Of the medium whose number is this record's place plus 1, for each unit of length.
+    vec3 medium_absorption;
+    float medium_ior;
+    // Half of what lies between the indices for red and for blue, of its solid, and of that medium.
+    float ior_spread;
+    float medium_spread;
+    // Of a thin film: how much of it is there, its index, its thickness, nanometres, from where a texture is 0 to where it is 1, and the
+    // least F0 with which Schlick's formula is above all that it reflects.
+    float iridescence;
+    float film_ior;
+    float film_least;
+    float film_most;
+    float film_bound;
+    // Share of what enters it that is scattered evenly beyond, and its colour.
+    float diffuse_transmission;
+    vec3 diffuse_transmission_colour;
+    // How much rougher the base is along a direction: 0 to 1, and cosine and sine of what turns the direction from the tangent.
+    float anisotropy;
+    vec2 anisotropy_turn;
+    float coat;
+    float coat_roughness;
+    vec3 sheen_colour;
+    float sheen_roughness;
+    float normal_scale;
+    float coat_normal_scale;
+    // `COVERAGE_...`.
+    uint coverage;
+    float alpha;
+    float cutoff;
+    uint is_unlit;
+    // Somewhere it has a lobe that photon maps know. Density estimates beside such a place count photons elsewhere, too.
+    uint is_matt;
+    // Its lookups, among the records of textures.
+    uint first_lookup;
+    uint end_lookup;
+};
+
+struct SurfaceMaterial {
+    vec3 base_colour;
+    // `SURFACE_...`.
+    uint surface;
+    // Radiance of the front, W/m2/sr.
+    vec3 emission;
+    // Exponent or index of refraction.
+    float parameter;
+    uint base_texture;
+    uint emission_texture;
+    uint two_sided;
+};
+
 layout(set = 0, binding = 2, scalar) readonly buffer Normals { TriangleNormals normals[]; };
 layout(set = 0, binding = 3, scalar) readonly buffer Uvs { TriangleUvs uvs[]; };
 layout(set = 0, binding = 4, scalar) readonly buffer Materials { SurfaceMaterial materials[]; };
@@ -12,21 +117,6 @@ layout(set = 0, binding = 19, scalar) readonly buffer LayeredMaterials { Layered
 
 #include "material/layers.glsl"
 #include "material/textures.glsl"
-
-struct Surface {
-    vec3 position;
-    float error; // bound of each coordinate's
-    uint plane; // twice its number, plus 1 on the back
-    vec3 ng; // geometric normal on the side of wo
-    vec3 ns; // shading normal on the same side
-    bool front;
-    bool scatters;
-    uint kind;
-    float parameter;
-    vec3 base_colour;
-    vec3 emission; // radiance towards wo
-    Layers layers; // of SURFACE_LAYERED
-};
 
 vec2 mixed_uv(vec2 a, vec2 b, vec2 c, float u, float v)
 {
@@ -74,11 +164,9 @@ vec2 off_the_edges(Triangle triangle, vec2 weights, float error)
 // The value of the emission's texture, or 1.
 vec3 emission_texel(SurfaceMaterial material, uint index, float u, float v)
 {
-    if (HAS_TEXTURES) {
-        if (material.emission_texture != NONE) {
-            TriangleUvs at = uvs[index];
-            return sample_texture(textures[material.emission_texture], mixed_uv(at.emission_a, at.emission_b, at.emission_c, u, v)).rgb;
-        }
+    if (HAS_TEXTURES && material.emission_texture != NONE) {
+        TriangleUvs at = uvs[index];
+        return sample_texture(textures[material.emission_texture], mixed_uv(at.emission_a, at.emission_b, at.emission_c, u, v)).rgb;
     }
     return vec3(1.0);
 }
@@ -86,11 +174,9 @@ vec3 emission_texel(SurfaceMaterial material, uint index, float u, float v)
 // The value of the base colour's texture, or 1.
 vec4 base_texel(SurfaceMaterial material, uint index, float u, float v)
 {
-    if (HAS_TEXTURES) {
-        if (material.base_texture != NONE) {
-            TriangleUvs at = uvs[index];
-            return sample_texture(textures[material.base_texture], mixed_uv(at.base_a, at.base_b, at.base_c, u, v));
-        }
+    if (HAS_TEXTURES && material.base_texture != NONE) {
+        TriangleUvs at = uvs[index];
+        return sample_texture(textures[material.base_texture], mixed_uv(at.base_a, at.base_b, at.base_c, u, v));
     }
     return vec4(1.0);
 }
@@ -124,10 +210,8 @@ float coverage_of(SurfaceMaterial material, uint index, float u, float v)
 vec3 lamp_share(SurfaceMaterial material, uint index, float u, float v)
 {
     vec3 share = emission_texel(material, index, u, v);
-    if (HAS_PASSING) {
-        if (material.surface == SURFACE_LAYERED) {
-            share *= coverage_of(material, index, u, v);
-        }
+    if (HAS_PASSING && material.surface == SURFACE_LAYERED) {
+        share *= coverage_of(material, index, u, v);
     }
     return share;
 }
@@ -282,12 +366,10 @@ void add_layers(inout Surface surface, Hit hit, uint material_index, vec3 wo, fl
                                                surface.front);
         }
     }
-    if (HAS_ANISOTROPY) {
-        if (material.anisotropy > 0.0) {
-            vec3 texel = (found & (1u << LAYER_ANISOTROPY)) != 0 ? values[LAYER_ANISOTROPY].rgb : vec3(1.0, 0.5, 1.0);
-            mat3 frame = tangent_frame(base_tangents(layers_of_triangle(hit.triangle)), smooth_ns, surface.front, hit.u, hit.v);
-            stretch_facets(layers, material, texel, frame, surface.ns);
-        }
+    if (HAS_ANISOTROPY && material.anisotropy > 0.0) {
+        vec3 texel = (found & (1u << LAYER_ANISOTROPY)) != 0 ? values[LAYER_ANISOTROPY].rgb : vec3(1.0, 0.5, 1.0);
+        mat3 frame = tangent_frame(base_tangents(layers_of_triangle(hit.triangle)), smooth_ns, surface.front, hit.u, hit.v);
+        stretch_facets(layers, material, texel, frame, surface.ns);
     }
     surface.layers = layers;
 }
@@ -329,10 +411,8 @@ Surface surface_at(Hit hit, vec3 wo)
         surface.base_colour *= at.a + hit.u * (at.b - at.a) + hit.v * (at.c - at.a);
     }
     surface.emission = shown ? material.emission * emission_texel(material, hit.triangle, hit.u, hit.v) : vec3(0.0);
-    if (HAS_LAYERS) {
-        if (surface.kind == SURFACE_LAYERED) {
-            add_layers(surface, hit, triangle.material, wo, base.a);
-        }
+    if (HAS_LAYERS && surface.kind == SURFACE_LAYERED) {
+        add_layers(surface, hit, triangle.material, wo, base.a);
     }
     return surface;
 }
@@ -354,10 +434,8 @@ bool is_not_there(uint material)
 bool keeps_photons(uint material)
 {
     uint kind = materials[material].surface;
-    if (HAS_LAYERS) {
-        if (kind == SURFACE_LAYERED) {
-            return layered_materials[material].is_matt != 0;
-        }
+    if (HAS_LAYERS && kind == SURFACE_LAYERED) {
+        return layered_materials[material].is_matt != 0;
     }
     return kind != SURFACE_MIRROR && kind != SURFACE_DIELECTRIC;
 }

@@ -1,5 +1,23 @@
 // Textures: their texels as they lie in memory, and values between texels. Twin of src/scene/texture.rs.
 
+// A texture; behind those of the scene, each that a layered material looks up, for which the rest counts.
+struct TextureInfo {
+    uint width;
+    uint height;
+    uint first_texel;
+    // 0 repeat, 1 mirrored, 2 clamp: of u, and of v times 4; plus 16 where the nearest texel alone counts.
+    uint wrap;
+    // `TEXELS_...`.
+    uint encoding;
+    // `LAYER_...`: what it multiplies, or says.
+    uint layer;
+    uint uv_set;
+    // It is looked up at (dot(row_u, uv), dot(row_v, uv)) + offset.
+    vec2 row_u;
+    vec2 row_v;
+    vec2 offset;
+};
+
 layout(set = 0, binding = 5, scalar) readonly buffer Textures { TextureInfo textures[]; };
 // The linear values of 8-bit codes, then texels; more of them in the next buffers, as devices may bound the size of one.
 layout(set = 0, binding = 6, scalar) readonly buffer Texels { uint texels[]; };

@@ -1,6 +1,8 @@
 // Directions from uniform numbers. Twin of src/cpu/sampling.rs; `precise` keeps the operations apart,
 // so that every kernel and the twin round alike.
 
+#include "world/room/walls.glsl"
+
 // (sin, cos) of `turns` full turns, turns in [0, 1). Vulkan promises sin and cos only to 2^-11, so
 // the angle is reduced to an eighth of a turn, exactly, and a Taylor polynomial (error 1e-8) does
 // the rest.

@@ -215,6 +215,6 @@ fn no_material_of_the_kernels_returns_more_than_it_receives() {
     let Some(mut gpu) = device() else { return };
     assert_holds("random materials", kernels_check(&gpu, 200));
     let (from, to) = ("max(dot(layers.coat_normal, wo), 1e-6)", "cosine");
-    gpu.replace(planted::kernels(&["check_lobes"], "material/layered_lobes.glsl", &[(from, to)]));
+    gpu.replace(planted::kernels(&["check_lobes"], "material/bsdf.glsl", &[(from, to)]));
     assert_complains("coats that dim by the base's normal", kernels_check(&gpu, 20));
 }

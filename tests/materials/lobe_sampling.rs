@@ -532,8 +532,6 @@ struct Fault {
     noticed: &'static str,
 }
 
-const SAMPLING: &str = "material/layered_sampling.glsl";
-
 #[rustfmt::skip]
 const FAULTS: [Fault; 12] = [
     Fault { what: "facets of a stretch 2 % too large", subject: Some(6), noticed: "chi-square",
@@ -552,25 +550,25 @@ const FAULTS: [Fault; 12] = [
         file: "material/ggx.glsl", from: "vec3 stretched = normalize(vec3(alpha * v.xy, v.z));",
         to: "vec3 stretched = vec3(0.0, 0.0, 1.0);" },
     Fault { what: "a weight with the masking of an alpha 1 % too large", subject: Some(1), noticed: "weights are off",
-        file: SAMPLING, from: "4.0 * facet_visibility(facets,",
+        file: "material/ggx.glsl", from: "4.0 * facet_visibility(facets,",
         to: "4.0 * facet_visibility(even_facets(facets.n, 1.01 * facets.alpha)," },
     Fault { what: "a density 1 % too large", subject: Some(2), noticed: "densities are off",
-        file: SAMPLING, from: "density *= 0.25;",
+        file: "material/ggx.glsl", from: "density *= 0.25;",
         to: "density *= 0.2525;" },
     Fault { what: "refraction by an index 1 % too large", subject: Some(3), noticed: "weights are off",
-        file: SAMPLING, from: "refracted_cosine_squared(along, lobes.eta);",
-        to: "refracted_cosine_squared(along, 1.01 * lobes.eta);" },
+        file: "material/lobes/transmission.glsl", from: "refracted_cosine_squared(facet.along, eta);",
+        to: "refracted_cosine_squared(facet.along, 1.01 * eta);" },
     Fault { what: "a density without the cosine of what is refracted", subject: Some(4), noticed: "densities are off",
-        file: SAMPLING, from: "density *= along * divide(l_h,",
-        to: "density *= along * divide(1.0," },
+        file: "material/lobes/transmission.glsl", from: "density *= facet.along * divide(l_h,",
+        to: "density *= facet.along * divide(1.0," },
     Fault { what: "a BTDF without the squared index", subject: Some(4), noticed: "the BRDF is off",
-        file: "material/layered_lobes.glsl", from: "float value = eta * eta * both",
+        file: "material/lobes/transmission.glsl", from: "float value = eta * eta * both",
         to: "float value = both" },
     Fault { what: "a number that chooses the lobe and the direction", subject: None, noticed: "chi-square",
-        file: SAMPLING, from: "return sample_facet(surface, lobes, wo, u.yz,",
-        to: "return sample_facet(surface, lobes, wo, u.xz," },
+        file: "material/bsdf.glsl", from: "return sample_lobe_of_facets(surface, lobes, wo, u.yz,",
+        to: "return sample_lobe_of_facets(surface, lobes, wo, u.xz," },
     Fault { what: "a number that chooses the gap and the direction", subject: None, noticed: "chi-square",
-        file: SAMPLING, from: "u.y = divide(u.y - lobes.pass_chance, 1.0 - lobes.pass_chance);",
+        file: "material/bsdf.glsl", from: "u.y = divide(u.y - lobes.pass_chance, 1.0 - lobes.pass_chance);",
         to: "" },
 ];
 

@@ -1,5 +1,14 @@
 // Emission of a disc light flush with its wall. Twin of src/cpu/emission.rs.
 
+// A disc of light flush with a wall.
+struct DiscLight {
+    vec3 centre;
+    float radius;
+    uint wall;
+    // Relative flux of each of its photons, in (0, 1].
+    float flux;
+};
+
 layout(constant_id = 2) const uint EMISSION_LAW = EMISSION_UNIFORM;
 
 // `u`: disc radius, disc angle, cosine, azimuth.

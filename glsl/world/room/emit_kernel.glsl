@@ -1,5 +1,8 @@
 // What kernels/emit.comp needs of the paper's box.
 
+#include "world/room/walls.glsl"
+#include "world/room/photon_push.glsl"
+
 layout(push_constant, scalar) uniform Push { EmitPush push; };
 layout(set = 0, binding = 1, scalar) readonly buffer Walls { Wall walls[]; };
 layout(set = 1, binding = 1, scalar) writeonly buffer NextPaths { uvec4 next_paths[]; };

@@ -5,6 +5,8 @@
 // their bits leave room for the wall: its axis in the upper two of z, beside the flux, its side in the uppermost of w,
 // beside the weight. Axis 3 is no wall: an empty slot.
 
+#include "world/room/walls.glsl"
+
 struct Photon {
     vec3 position;
     uint wall;

@@ -1,5 +1,7 @@
 // What builder/scan_move.glsl needs of the paper's box.
 
+#include "world/room/photon_push.glsl"
+
 layout(push_constant, scalar) uniform Push { TracePush push; };
 
 #include "world/room/photon.glsl"

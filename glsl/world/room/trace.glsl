@@ -1,6 +1,8 @@
 // What a builder that goes bounce by bounce needs of the paper's box: the push constants, the lists of paths, the photon map, and
 // step_path(), which takes a path to the next wall.
 
+#include "world/room/photon_push.glsl"
+
 layout(push_constant, scalar) uniform Push { TracePush push; };
 
 #include "math/math.glsl"

@@ -1,5 +1,7 @@
 // What the persistent builder needs of the paper's box.
 
+#include "world/room/photon_push.glsl"
+
 layout(push_constant, scalar) uniform Push { TracePersistentPush push; };
 
 #include "math/math.glsl"

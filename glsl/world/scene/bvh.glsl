@@ -1,6 +1,17 @@
 // Rays against the scene's triangles: a compressed wide BVH (Ylitie, Karras and Laine 2017), and the
 // watertight test of Woop, Benthin and Wald (2013).
 
+// In the order of the BVH's leaves; its front is where it runs counter-clockwise.
+struct Triangle {
+    vec3 a;
+    vec3 b;
+    vec3 c;
+    uint material;
+    // Number of its front's plane; plus `HIDDEN` if others that lie in it hide a part: then it counts as no surface,
+    // triangles of their own stand for what is visible of it, and rays meet it only between those.
+    uint plane;
+};
+
 #include "world/scene/bvh_node.glsl"
 
 layout(set = 0, binding = 0, scalar) readonly buffer Nodes { BvhNode nodes[]; };

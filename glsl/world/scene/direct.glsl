@@ -1,31 +1,24 @@
 // Direct light by shadow rays.
 
-// A point that light arrives at: a surface, or a receiver.
+// A point that light arrives at: of a surface, or a receiver.
 struct Target {
-    vec3 position;
-    float error;
-    vec3 ng;
-    vec3 ns;
-    vec3 wo;
-    uint kind;
-    float exponent;
-    uint media; // on the side of wo
-    // Of a layered surface.
     Surface surface;
-    Lobes lobes;
+    vec3 wo;
+    Lobes lobes; // of a layered surface
+    uint media; // on the side of wo
     bool asks_lobes; // a ray of its matt lobes sees lights, too
 };
 
-Target plain_target(vec3 position, float error, vec3 ng, vec3 ns, vec3 wo, uint kind, float exponent)
+Target receiver_at(vec3 position, float error, vec3 ng, vec3 ns)
 {
     Target target;
-    target.position = position;
-    target.error = error;
-    target.ng = ng;
-    target.ns = ns;
-    target.wo = wo;
-    target.kind = kind;
-    target.exponent = exponent;
+    target.surface.position = position;
+    target.surface.error = error;
+    target.surface.ng = ng;
+    target.surface.ns = ns;
+    target.surface.kind = SURFACE_RECEIVER;
+    target.surface.parameter = 0.0;
+    target.wo = ns;
     target.media = 0;
     target.asks_lobes = false;
     return target;
@@ -89,31 +82,30 @@ struct ShadowRay {
 ShadowRay cast_shadow_ray(Target point, Arriving arriving, Draws draws, uint index)
 {
     ShadowRay ray = ShadowRay(vec3(0.0), vec3(0.0), false, false);
-    float cosine = dot(arriving.wi, point.ns);
+    Surface surface = point.surface;
+    float cosine = dot(arriving.wi, surface.ns);
     // Before the guards below, which would drop what is no number.
     note_unless(is_finite(cosine) && is_finite(arriving.radiance) && (arriving.is_far || is_finite(arriving.target)), NONFINITE_LIGHT,
                 draws.domain, draws.round, index);
-    bool is_layered = HAS_LAYERS && point.kind == SURFACE_LAYERED;
-    vec3 leaves_along = point.ng;
+    vec3 leaves_along = surface.ng;
     uint media = point.media;
     if (largest(arriving.radiance) > 0.0) {
-        if (is_layered) {
-            LobeLight light = weigh_light(point.surface, point.lobes, point.wo, arriving.wi, float(work.shadow_rays) * arriving.density, point.asks_lobes);
+        if (has_layers(surface.kind)) {
+            LobeLight light = weigh_light(surface, point.lobes, point.wo, arriving.wi, float(work.shadow_rays) * arriving.density, point.asks_lobes);
             ray.light = arriving.radiance * light.matt;
             ray.sharp_light = arriving.radiance * light.sharp;
             ray.is_asked = largest(ray.light) > 0.0 || largest(ray.sharp_light) > 0.0;
             leaves_along = arriving.wi;
-            if (HAS_MEDIA) {
-                bool is_beyond = point.surface.layers.medium != 0 && dot(arriving.wi, point.ng) < 0.0;
-                media = is_beyond ? media_beyond(point.surface, media) : media;
+            if (HAS_MEDIA && surface.layers.medium != 0 && dot(arriving.wi, surface.ng) < 0.0) {
+                media = media_beyond(surface, media);
             }
-        } else if (cosine > 0.0 && dot(arriving.wi, point.ng) > 0.0) {
-            ray.light = arriving.radiance * (cosine * lobe_weight(point.kind, point.exponent, point.ns, point.wo, arriving.wi));
+        } else if (cosine > 0.0 && dot(arriving.wi, surface.ng) > 0.0) {
+            ray.light = arriving.radiance * (cosine * lobe_weight(surface.kind, surface.parameter, surface.ns, point.wo, arriving.wi));
             ray.is_asked = true;
         }
     }
     if (ray.is_asked) {
-        vec3 start = offset_origin(point.position, point.error, point.ng, leaves_along);
+        vec3 start = offset_origin(surface.position, surface.error, surface.ng, leaves_along);
         vec3 way = arriving.is_far ? arriving.wi : arriving.target - start;
         vec3 share = light_through(start, way, arriving.is_far ? uintBitsToFloat(0x7f7fffffu) : 1.0, media);
         ray.is_hidden = share == vec3(0.0);
@@ -144,6 +136,7 @@ vec3 sharp_light = vec3(0.0);
 // the place `index` in a block of rounds share random numbers.
 vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uint number, uint block)
 {
+    Surface surface = point.surface;
     vec3 sum = vec3(0.0);
     stopped_light = vec3(0.0);
     light_arrived = false;
@@ -159,7 +152,7 @@ vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uin
     uint ray_count = work.shadow_rays;
     uint unseen_row = 0;
     if (HAS_LIGHT_CLUSTERS) {
-        unseen_row = row_of_shares(point.position, point.ng, false);
+        unseen_row = row_of_shares(surface.position, surface.ng, false);
         bool asks_unseen = ((number + mix32(words.x + words.y)) & (SAMPLES_PER_UNSEEN - 1)) == 0 && !is_empty(unseen_row);
         ray_count += uint(asks_unseen);
     }
@@ -176,7 +169,7 @@ vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uin
                 // For the samples that cast none.
                 count = float(SAMPLES_PER_UNSEEN * work.shadow_rays);
             }
-            ChosenLight chosen = choose_light(row, point.position, u.z, mix32(words.w + (number * (work.shadow_rays + 1) + ray)));
+            ChosenLight chosen = choose_light(row, surface.position, u.z, mix32(words.w + (number * (work.shadow_rays + 1) + ray)));
             light = emitters[chosen.emitter];
             by_power = light.probability;
             light.probability = chosen.probability;
@@ -184,7 +177,7 @@ vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uin
             light = emitters[pick_emitter(emitter_count, u.z)];
             by_power = light.probability;
         }
-        Arriving arriving = sample_light(light, point.position, point.ns, u.xy);
+        Arriving arriving = sample_light(light, surface.position, surface.ns, u.xy);
         if (HAS_LAYERS) {
             // Both samplings weigh each other as if lights were chosen by power everywhere: shares that add up to 1 make no bias.
             arriving.density *= by_power;

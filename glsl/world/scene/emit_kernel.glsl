@@ -1,5 +1,7 @@
 // What kernels/emit.comp needs of a scene of triangles.
 
+#include "world/scene/photon_push.glsl"
+
 layout(push_constant, scalar) uniform Push { EmissionPush push; };
 
 #include "world/scene/rays.glsl"

@@ -1,6 +1,25 @@
 // Which light a shadow ray asks: first a cluster of them, by what clusters did at points of a trial round about (plan::light_choice),
 // then one of its lights, by power over squared distance (scene::light_tree).
 
+// A node of the tree of lights (`scene::light_tree`): those within a sphere.
+struct LightNode {
+    vec3 centre;
+    float radius_squared;
+    // Share of all lights' power.
+    float power;
+    // Of its children, which lie side by side, the first; of a leaf `LIGHT_LEAF` and its emitter.
+    uint child;
+};
+
+// A node of the tree of regions, in each of which shadow rays choose lights alike (`plan::light_choice`).
+struct LightRegion {
+    // 0 to 2: a coordinate of the position, 3 to 5: of the normal; `NONE`: a leaf.
+    uint axis;
+    float split;
+    // Of what lies below `split`, after which comes what lies above; of a leaf its number.
+    uint next;
+};
+
 layout(set = 0, binding = 10, scalar) readonly buffer LightNodes { LightNode light_nodes[]; };
 layout(set = 0, binding = 11, scalar) readonly buffer LightRegions { LightRegion light_regions[]; };
 // The number of clusters, as bits; then two rows of cumulative shares a region: of the clusters that the trial saw there, and of the

@@ -1,5 +1,31 @@
 // Lights: where photons start, and what arrives at a point straight from them.
 
+// A light, or a triangle that shines. Lengths are those of the normalised scene.
+struct Emitter {
+    // `EMITTER_...`.
+    uint kind;
+    uint triangle;
+    // Share of the emitters up to and with this one.
+    float cumulative;
+    float probability;
+    // Relative flux of each of its photons.
+    vec3 flux;
+    // Radiance, radiant intensity or irradiance, as its kind has it; of a uniform disc the
+    // intensity of a unit of area.
+    vec3 strength;
+    // Of a triangle the weights of its second and third corner where the piece that shines begins, and the piece's width over the
+    // triangle's (`scene::geometry::lamp_pieces`).
+    vec3 position;
+    // Its axis or normal; a directional light's flight; towards the brightest part of a sky's picture.
+    vec3 direction;
+    // Radius of a disc; versine (1 - cosine) of a spot's inner cone, of which a narrow one keeps its digits.
+    float size;
+    // Versine of a spot's outer cone; of a sky, the share of light samples that its table chooses.
+    float outer_versine;
+    // Of a cone around the brightest part of a sky's picture.
+    float sun_versine;
+};
+
 layout(set = 0, binding = 7, scalar) readonly buffer Emitters { Emitter emitters[]; };
 
 // Chosen by power: the first emitter whose cumulative share lies above u.

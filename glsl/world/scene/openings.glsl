@@ -2,6 +2,12 @@
 // are aimed at them, but for a share that is not: so none is impossible, and each weighs by the density of both ways together (the balance
 // heuristic, Veach 1997, section 9.2).
 
+// A sphere around surfaces that make caustics, which photons are aimed at.
+struct CausticTarget {
+    vec3 centre;
+    float radius;
+};
+
 // Of radius 0: there are no more.
 layout(set = 0, binding = 13, scalar) readonly buffer Openings { CausticTarget openings[]; };
 

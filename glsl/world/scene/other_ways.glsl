@@ -22,7 +22,7 @@ Way ways[MOST_WAYS];
 
 bool follows_other_ways(uint depth)
 {
-    return HAS_SPECULAR_CHAINS && RAYS_HIT_LIGHTS && chain.is_smooth && !chain.gathers && !chain.starts_nowhere && depth < DEPTH_OF_WAYS;
+    return HAS_SPECULAR_CHAINS && RAYS_HIT_LIGHTS && chain.is_smooth && !has_gathered() && depth < DEPTH_OF_WAYS;
 }
 
 // A way whose light counts `weight` times beside the path's own. `media` is what it runs through.
@@ -70,7 +70,7 @@ float part_at_layers(Surface surface, Lobes lobes, vec3 wo, ChosenLobe chosen, b
     }
     for (uint lobe = LOBE_REFLECTION; lobe <= LOBE_TRANSMISSION; lobe++) {
         if ((passes || lobe != chosen.lobe) && is_smooth_lobe(surface.layers, lobes, lobe)) {
-            Scatter other = sample_facet(surface, lobes, wo, vec2(0.5), ChosenLobe(lobe, 1.0, 1.0), true);
+            Scatter other = sample_lobe_of_facets(surface, lobes, wo, vec2(0.5), ChosenLobe(lobe, 1.0, 1.0), true);
             uint media = chain.media;
             if (HAS_MEDIA && surface.layers.medium != 0 && dot(other.direction, surface.ng) < 0.0) {
                 media = media_beyond(surface, media);
@@ -86,6 +86,18 @@ float part_at_layers(Surface surface, Lobes lobes, vec3 wo, ChosenLobe chosen, b
     return passes ? pass_chance : (is_own_smooth ? (1.0 - pass_chance) * chosen.chance : 1.0);
 }
 
+// The same at any surface, where u has chosen the lobe of the path's own way.
+float leave_other_ways(Vertex at, float u, uint depth)
+{
+    if (at.is_layered) {
+        return part_at_layers(at.surface, at.lobes, at.wo, choose_lobe(at.lobes, u), at.scatter.passes, depth);
+    }
+    if (HAS_DIELECTRIC && at.surface.kind == SURFACE_DIELECTRIC) {
+        return part_at_glass(at.surface, at.wo, dot(at.scatter.direction, at.surface.ng) > 0.0, depth);
+    }
+    return 1.0;
+}
+
 // Goes on with a way that was left; its depth.
 uint take_way()
 {
@@ -94,13 +106,11 @@ uint take_way()
     chain.direction = way.direction;
     chain.weight = way.weight;
     chain.media = way.media;
+    chain.role = ROLE_OTHER_WAY;
     chain.saw_specular = (way.depth & 1u) != 0;
     chain.chance = 1.0;
     chain.is_smooth = true;
-    chain.is_other_way = true;
-    chain.gathers = false;
     chain.sees_emission = true;
-    chain.ends_at_light = false;
     chain.density = 0.0;
     return way.depth >> 1;
 }

@@ -13,7 +13,7 @@ void write_matt_lobes(uint place, Lobes lobes)
 {
     matt_lobes[place] = lobes.matt;
     if (HAS_IRIDESCENCE) {
-        lobes.cover.film = lobes.film;
+        lobes.cover.film = lobes.base.film;
     }
     if (HAS_COATS || HAS_SHEEN || HAS_IRIDESCENCE) {
         matt_covers[place] = lobes.cover;

@@ -1,6 +1,8 @@
 // Where samples of pixels stand. Each pixel has `work.samples`; those of tiles whose paths vary more have others on top, and stand behind
 // those of all pixels, one pixel after another.
 
+#include "world/scene/work.glsl"
+
 // Of this dispatch. It is no constant, so that another division needs no other pipeline; `main` sets it.
 WorkDivision work = WorkDivision(1, 1, 1, 0);
 

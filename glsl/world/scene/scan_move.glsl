@@ -1,5 +1,7 @@
 // What builder/scan_move.glsl needs of a scene of triangles.
 
+#include "world/scene/photon_push.glsl"
+
 layout(push_constant, scalar) uniform Push { FlightPush push; };
 
 #include "ledger/totals.glsl"

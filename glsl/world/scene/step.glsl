@@ -22,7 +22,7 @@ Step step_path(inout LightPath path, uint bounce)
         }
         vec3 wo = -path.direction;
         Surface surface = surface_at(hit, wo);
-        bool is_layered = HAS_LAYERS && surface.kind == SURFACE_LAYERED;
+        bool is_layered = has_layers(surface.kind);
         Lobes lobes;
         bool has_matt = keeps_photons(triangles[hit.triangle].material);
         vec3 entering = arriving;
@@ -34,9 +34,7 @@ Step step_path(inout LightPath path, uint bounce)
                 channel = choose_channel(arriving, philox_floats(block, push.draws.seed).x);
                 entering = light_of_channel(arriving, channel);
             }
-            float eta = index_ratio(surface, path.media, channel);
-            surface.ns = normal_of_refraction(surface, wo, eta, bounce);
-            lobes = lobes_of(surface, wo, eta);
+            lobes = lobes_at(surface, wo, path.media, channel, bounce);
             has_matt = has_matt && surface.scatters;
         }
         // Also where alpha has a gap: the light there is that of the surface about it, whose area the density estimate counts.
@@ -44,14 +42,9 @@ Step step_path(inout LightPath path, uint bounce)
         taken.photon = Photon(surface.position, surface.plane, arriving, pack_direction(wo, findLSB(path.arrival)));
 
         vec4 u = philox_floats(uvec4(path.photon, push.draws.round, EMISSION_BLOCKS + bounce, push.draws.domain), push.draws.seed);
-        Scatter scatter;
-        if (is_layered) {
-            scatter = sample_layered(surface, lobes, wo, u.yzw, false);
-            if (HAS_PASSING) {
-                scatter.weight *= scatter.passes ? 1.0 : divide(surface.layers.coverage, 1.0 - lobes.pass_chance);
-            }
-        } else {
-            scatter = sample_scatter(surface, wo, u.yzw, bounce, false);
+        Scatter scatter = sample_surface(surface, lobes, wo, u.yzw, bounce, false);
+        if (HAS_PASSING && is_layered) {
+            scatter.weight *= scatter.passes ? 1.0 : divide(surface.layers.coverage, 1.0 - lobes.pass_chance);
         }
         bool specular = scatter.is_specular;
         vec3 flux = entering * scatter.weight;
@@ -96,9 +89,8 @@ Step step_path(inout LightPath path, uint bounce)
             onward = path.arrival >= ARRIVED_INDIRECT ? path.arrival : (wanted ? ARRIVED_CAUSTIC : ARRIVED_UNWANTED);
         }
         uint media = path.media;
-        if (HAS_MEDIA) {
-            bool is_refracted = specular && !scatter.passes && surface.layers.medium != 0 && dot(scatter.direction, surface.ng) < 0.0;
-            media = is_layered && is_refracted ? media_beyond(surface, media) : media;
+        if (HAS_MEDIA && is_layered && specular && surface.layers.medium != 0 && dot(scatter.direction, surface.ng) < 0.0) {
+            media = media_beyond(surface, media);
         }
         path = LightPath(start, path.photon, scatter.direction, onward, flux, media);
     }

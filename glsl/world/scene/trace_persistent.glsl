@@ -2,6 +2,8 @@
 // earlier dispatch left under way. Those that are still under way after push.flights bounces go to the next list; after
 // push.bounces bounces in all they are cut off.
 
+#include "world/scene/photon_push.glsl"
+
 layout(push_constant, scalar) uniform Push { SceneTracePersistentPush push; };
 
 #include "world/scene/rays.glsl"
@@ -9,8 +11,7 @@ layout(push_constant, scalar) uniform Push { SceneTracePersistentPush push; };
 #include "world/scene/lights.glsl"
 #include "world/scene/path.glsl"
 #include "world/scene/aim.glsl"
-#include "material/lobes.glsl"
-#include "material/scatter.glsl"
+#include "material/bsdf.glsl"
 #include "ledger/totals.glsl"
 #include "world/scene/photon.glsl"
 #include "world/scene/map.glsl"

@@ -1,11 +1,10 @@
-// How surfaces weigh light that arrives.
+// The modified Phong lobe of glossy surfaces (Lafortune and Willems 1994), and the lobe by which the paper weighs what leaves to the eye.
 
+#include "rng/sampling.glsl"
+#include "math/directions.glsl"
+#include "material/layers.glsl"
 #include "material/phong_lobe.glsl"
-
-vec3 mirrored(vec3 w, vec3 n)
-{
-    return 2.0 * dot(w, n) * n - w;
-}
+#include "material/scatter.glsl"
 
 // The factor in front of a surface's lobe: f = scale * lobe_weight.
 float scatter_scale(uint kind, float exponent)
@@ -16,17 +15,7 @@ float scatter_scale(uint kind, float exponent)
 // Whether a surface weighs light by its direction.
 bool has_lobe(uint kind)
 {
-    bool has = false;
-    if (HAS_GLOSSY) {
-        has = has || kind == SURFACE_GLOSSY;
-    }
-    if (HAS_PAPER_PHONG) {
-        has = has || kind == SURFACE_PAPER_PHONG;
-    }
-    if (HAS_LAYERS) {
-        has = has || kind == SURFACE_LAYERED;
-    }
-    return has;
+    return (HAS_GLOSSY && kind == SURFACE_GLOSSY) || (HAS_PAPER_PHONG && kind == SURFACE_PAPER_PHONG) || (HAS_LAYERS && kind == SURFACE_LAYERED);
 }
 
 // How a lobe weighs light from wi towards wo; 1 on a Lambertian surface.
@@ -42,9 +31,11 @@ float lobe_weight(uint kind, float exponent, vec3 ns, vec3 wo, vec3 wi)
     return phong_lobe(dot(mirror, wo), 0.5 * dot(apart, apart), exponent);
 }
 
-// What a shading normal changes about a photon's flux (Veach 1997, section 5.3): the ratio of the cosines
-// that the light sees to those that the eye sees.
-float shading_gain(float shading_cosine, float geometric_cosine)
+Scatter sample_glossy(Surface surface, vec3 wo, vec2 u)
 {
-    return min(divide(abs(shading_cosine), max(abs(geometric_cosine), 1e-6)), float(MAX_SHADING_GAIN));
+    float n = surface.parameter;
+    vec3 wi = to_frame(sample_lobe(n, u.x, u.y), mirrored(wo, surface.ns));
+    float cos_out = dot(wi, surface.ns);
+    vec3 weight = surface.base_colour * (divide(n + 2.0, n + 1.0) * max(cos_out, 0.0));
+    return Scatter(wi, weight, cos_out > 0.0 && dot(wi, surface.ng) > 0.0, false, false, 0.0);
 }

@@ -1,0 +1,271 @@
+// All lobes of a surface together: with which probability a path follows each, how they weigh light, and where a path goes on. Each lobe has
+// a file in material/lobes.
+
+#include "material/matt_brdf.glsl"
+#include "material/lobes/transmission.glsl"
+#include "material/lobes/diffuse_transmission.glsl"
+#include "material/lobes/lambert.glsl"
+#include "material/lobes/phong.glsl"
+#include "material/lobes/mirror.glsl"
+#include "material/lobes/glass.glsl"
+
+bool has_layers(uint kind)
+{
+    return HAS_LAYERS && kind == SURFACE_LAYERED;
+}
+
+// `eta`: index where wo is over that beyond, of a solid.
+Lobes lobes_of(Surface surface, vec3 wo, float eta)
+{
+    Layers layers = surface.layers;
+    float cosine = max(dot(surface.ns, wo), 1e-6);
+    Lobes lobes;
+    lobes.base = base_of(surface, eta);
+    lobes.cover = cover_of(layers);
+    LayerAlbedos seen = albedos_at(layers.alpha, lobes.cover, cosine, max(dot(layers.coat_normal, wo), 1e-6));
+    lobes.cover.coat_albedo = seen.coat;
+    lobes.cover.sheen_albedo = seen.sheen;
+
+    // What is scattered evenly, to either side.
+    vec2 bound = reflectance_bound(lobes.base, layers);
+    lobes.matt.e0 = bound.x;
+    lobes.matt.e90 = bound.y;
+    lobes.matt.alpha = layers.alpha;
+    float below_diffuse = share_below(layers, lobes.matt, seen, cosine), left = mean_share_below(layers, lobes.matt);
+    float left_over = (0.31830988618379067 * divide(below_diffuse, max(left, 1e-6)));
+    vec3 colour = surface.base_colour;
+    lobes.beyond = vec3(0.0);
+    if (HAS_DIFFUSE_TRANSMISSION) {
+        vec3 beyond = lobes.base.opaque_share * layers.diffuse_transmission * layers.diffuse_transmission_colour;
+        lobes.beyond = beyond * left_over;
+        colour *= 1.0 - layers.diffuse_transmission;
+    }
+    lobes.matt.diffuse = lobes.base.opaque_share * colour * left_over;
+
+    bool is_in_map = is_matt_reflection(lobes, layers);
+    if (HAS_IRIDESCENCE) {
+        lobes.base.film.is_matt = uint(is_in_map);
+    }
+    lobes.matt.f0 = is_in_map ? lobes.base.f0 : vec3(0.0);
+    lobes.matt.f90 = is_in_map ? lobes.base.f90 : 0.0;
+    lobes.transmitted = (1.0 - layers.metallic) * layers.transmission * surface.base_colour;
+
+    // Of light from wo, the share that each lobe takes.
+    vec3 exact = vec3(0.0);
+    if (HAS_TRANSMISSION && layers.transmission > 0.0) {
+        exact = dielectric_reflectance(lobes.base, layers.is_solid, cosine);
+    }
+    float left_by_sheen = below_sheen(lobes.cover.sheen, seen.sheen);
+    float below = (1.0 - seen.coat) * left_by_sheen;
+    vec3 transmitted = transmission_along(lobes, layers, exact);
+    lobes.passing = vec3(0.0);
+    lobes.pass_chance = 0.0;
+    float coat = seen.coat;
+    float sheen = (1.0 - left_by_sheen) * (1.0 - seen.coat);
+    float diffuse = largest(lobes.base.opaque_share * colour) * below_diffuse * left_by_sheen;
+    float reflection = reflection_weight(lobes.base, layers, seen, exact, cosine, below);
+    float transmission = largest(transmitted) * below;
+    float beyond = 0.0;
+    if (HAS_DIFFUSE_TRANSMISSION) {
+        beyond = lobes.base.opaque_share * layers.diffuse_transmission * largest(layers.diffuse_transmission_colour) * below_diffuse * left_by_sheen;
+    }
+    if (HAS_PASSING) {
+        lobes.passing = vec3(1.0 - layers.coverage);
+        if (HAS_TRANSMISSION && !layers.is_solid && layers.transmission > 0.0 && layers.alpha < DELTA_ALPHA) {
+            lobes.passing += layers.coverage * below * transmitted;
+            transmission = 0.0;
+        }
+        lobes.pass_chance = min(largest(lobes.passing), 1.0);
+    }
+    float sum = diffuse + sheen + reflection + coat + transmission;
+    if (HAS_DIFFUSE_TRANSMISSION) {
+        sum += beyond;
+    }
+    float share = sum > 0.0 ? divide(1.0, sum) : 0.0;
+    if (layers.is_unlit) {
+        share = 0.0;
+        lobes.matt.diffuse = lobes.matt.f0 = vec3(0.0);
+        lobes.matt.f90 = 0.0;
+        lobes.base.film.is_matt = 0;
+    }
+    lobes.diffuse_chance = diffuse * share;
+    lobes.sheen_chance = sheen * share;
+    lobes.reflection_chance = reflection * share;
+    lobes.coat_chance = coat * share;
+    lobes.transmission_chance = transmission * share;
+    lobes.beyond_chance = beyond * share;
+    return lobes;
+}
+
+// Of a layered surface that a path meets in these media, which has met `depth` before, for light of a channel.
+Lobes lobes_at(inout Surface surface, vec3 wo, uint media, uint channel, uint depth)
+{
+    float eta = index_ratio(surface, media, channel);
+    surface.ns = normal_of_refraction(surface, wo, eta, depth);
+    return lobes_of(surface, wo, eta);
+}
+
+// Probability of the matt lobes together, where the path does not pass.
+float matt_chance(Lobes lobes, Layers layers)
+{
+    return lobes.diffuse_chance + lobes.sheen_chance + (is_matt_reflection(lobes, layers) ? lobes.reflection_chance : 0.0)
+         + (is_matt(layers.coat_alpha) ? lobes.coat_chance : 0.0);
+}
+
+// Density with which the matt lobes together send a path along wi, 1/sr.
+float density_of_matt_lobes(Surface surface, Lobes lobes, vec3 wo, vec3 wi)
+{
+    float density = (lobes.diffuse_chance + lobes.sheen_chance) * even_density(surface.ns, wi);
+    if (is_matt_reflection(lobes, surface.layers)) {
+        density += reflection_density(surface, lobes, wo, wi);
+    }
+    if (HAS_COATS && is_matt(surface.layers.coat_alpha)) {
+        density += coat_density(surface, lobes, wo, wi);
+    }
+    return density;
+}
+
+// What arrives from a direction, as matt and as sharp lobes weigh it: BRDF times cosine.
+struct LobeLight {
+    vec3 matt;
+    vec3 sharp;
+};
+
+// `asks_matt`: rays of the matt lobes see the light, too.
+LobeLight weigh_light(Surface surface, Lobes lobes, vec3 wo, vec3 wi, float light_density, bool asks_matt)
+{
+    LobeLight light = LobeLight(vec3(0.0), vec3(0.0));
+    float cosine = dot(wi, surface.ns);
+    LayerAlbedos lit = albedos_towards(surface, lobes.cover, wi);
+    if (dot(wi, surface.ng) <= 0.0) {
+        if (HAS_TRANSMISSION) {
+            light.sharp = sharp_transmission(surface, lobes, lit, wo, wi, light_density);
+        }
+        light.sharp += sharp_diffuse_transmission(surface, lobes, lit, wi, light_density);
+        return light;
+    }
+    if (cosine > 0.0) {
+        light.matt = matt_brdf(lobes.matt, lobes.cover, lobes.base.film, lit, surface.ns, wo, wi) * cosine;
+        if (asks_matt) {
+            light.matt *= light_share(light_density, density_of_matt_lobes(surface, lobes, wo, wi));
+        }
+    }
+    light.sharp = sharp_reflection(surface, lobes, lit, wo, wi, light_density);
+    if (HAS_COATS) {
+        light.sharp += sharp_coat(surface, lobes, wo, wi, light_density);
+    }
+    return light;
+}
+
+const uint LOBE_DIFFUSE = 0;
+const uint LOBE_REFLECTION = 1;
+const uint LOBE_COAT = 2;
+const uint LOBE_TRANSMISSION = 3;
+const uint LOBE_SHEEN = 4;
+const uint LOBE_DIFFUSE_TRANSMISSION = 5;
+
+struct ChosenLobe {
+    uint lobe;
+    float chance;
+    float end; // sum of the chances so far
+};
+
+// Lobes without a chance are never chosen, and the last one that has some catches what rounding leaves below 1.
+void consider(inout ChosenLobe chosen, uint lobe, float chance, float u)
+{
+    if (chance > 0.0 && u >= chosen.end) {
+        chosen.lobe = lobe;
+        chosen.chance = chance;
+    }
+    chosen.end += chance;
+}
+
+ChosenLobe choose_lobe(Lobes lobes, float u)
+{
+    ChosenLobe chosen = ChosenLobe(LOBE_DIFFUSE, lobes.diffuse_chance, lobes.diffuse_chance);
+    consider(chosen, LOBE_REFLECTION, lobes.reflection_chance, u);
+    if (HAS_COATS) {
+        consider(chosen, LOBE_COAT, lobes.coat_chance, u);
+    }
+    if (HAS_TRANSMISSION) {
+        consider(chosen, LOBE_TRANSMISSION, lobes.transmission_chance, u);
+    }
+    if (HAS_SHEEN) {
+        consider(chosen, LOBE_SHEEN, lobes.sheen_chance, u);
+    }
+    if (HAS_DIFFUSE_TRANSMISSION) {
+        consider(chosen, LOBE_DIFFUSE_TRANSMISSION, lobes.beyond_chance, u);
+    }
+    return chosen;
+}
+
+// Whether light may leave by this lobe in one direction alone.
+bool is_smooth_lobe(Layers layers, Lobes lobes, uint lobe)
+{
+    return (lobe == LOBE_REFLECTION && is_smooth_reflection(layers, lobes))
+        || (HAS_COATS && lobe == LOBE_COAT && is_smooth_coat(layers, lobes))
+        || (HAS_TRANSMISSION && lobe == LOBE_TRANSMISSION && is_smooth_transmission(layers, lobes));
+}
+
+Scatter sample_lobe_of_facets(Surface surface, Lobes lobes, vec3 wo, vec2 u, ChosenLobe chosen, bool carries_radiance)
+{
+    bool is_coat = HAS_COATS && chosen.lobe == LOBE_COAT, is_beyond = HAS_TRANSMISSION && chosen.lobe == LOBE_TRANSMISSION;
+    Facets facets = base_facets(surface);
+    if (is_coat) {
+        facets = coat_facets(surface);
+    }
+    bool is_delta = facets.alpha < DELTA_ALPHA || (is_beyond && goes_straight(surface.layers, lobes));
+    SampledFacet facet = sample_facet(facets, is_delta, wo, u, chosen.chance);
+    if (is_coat) {
+        return sample_coat(surface, facets, facet, wo, chosen.chance);
+    }
+    if (is_beyond) {
+        return sample_transmission(surface, lobes, facets, facet, wo, chosen.chance, carries_radiance);
+    }
+    return sample_reflection(surface, lobes, facets, facet, wo, chosen.chance);
+}
+
+// u.x chooses the lobe, the others the direction. A path that does not pass keeps the share `coverage` over one less the probability of
+// passing, which the weight leaves to the caller.
+Scatter sample_layered(Surface surface, Lobes lobes, vec3 wo, vec3 u, bool carries_radiance)
+{
+    if (HAS_PASSING) {
+        if (u.y < lobes.pass_chance) {
+            return Scatter(-wo, divide(lobes.passing, lobes.pass_chance), true, false, true, 0.0);
+        }
+        u.y = divide(u.y - lobes.pass_chance, 1.0 - lobes.pass_chance);
+    }
+    ChosenLobe chosen = choose_lobe(lobes, u.x);
+    if (chosen.chance <= 0.0) {
+        return Scatter(-wo, vec3(0.0), false, false, false, 0.0);
+    }
+    if (chosen.lobe == LOBE_DIFFUSE) {
+        return sample_diffuse(surface, lobes, u.yz, chosen.chance);
+    }
+    if (HAS_SHEEN && chosen.lobe == LOBE_SHEEN) {
+        return sample_sheen(surface, lobes, wo, u.yz, chosen.chance);
+    }
+    if (HAS_DIFFUSE_TRANSMISSION && chosen.lobe == LOBE_DIFFUSE_TRANSMISSION) {
+        return sample_diffuse_transmission(surface, lobes, u.yz, chosen.chance);
+    }
+    return sample_lobe_of_facets(surface, lobes, wo, u.yz, chosen, carries_radiance);
+}
+
+// Samples where a path goes on that came from wo; u = (choice, two for the direction). A camera path carries radiance, which refraction
+// compresses; a photon carries flux. The path has met `depth` surfaces before. `lobes` are those of a layered surface.
+Scatter sample_surface(Surface surface, Lobes lobes, vec3 wo, vec3 u, uint depth, bool carries_radiance)
+{
+    if (has_layers(surface.kind)) {
+        return sample_layered(surface, lobes, wo, u, carries_radiance);
+    }
+    if (HAS_MIRROR && surface.kind == SURFACE_MIRROR) {
+        return sample_mirror(surface, wo);
+    }
+    if (HAS_DIELECTRIC && surface.kind == SURFACE_DIELECTRIC) {
+        return sample_glass(surface, wo, u.x, depth, carries_radiance);
+    }
+    if (HAS_GLOSSY && surface.kind == SURFACE_GLOSSY) {
+        return sample_glossy(surface, wo, u.yz);
+    }
+    return sample_lambert(surface, u.yz);
+}

@@ -1,0 +1,63 @@
+// The diffuse lobe: light enters below coat, sheen and reflection, and is scattered back evenly.
+
+#include "material/layering.glsl"
+
+// Bound of what stretched facets reflect beyond even ones as sharp as they are across, at a cosine, by a reflectance that is 1 at the horizon.
+float stretch_excess(float cosine)
+{
+    return 0.004 + 0.1 * max(1.0 - 4.5 * cosine, 0.0);
+}
+
+// F0 and F90 of a bound of what the dielectric reflects.
+vec2 reflectance_bound(Base base, Layers layers)
+{
+    float e0 = largest(base.dielectric_f0), e90 = base.dielectric_f90;
+    if (HAS_IRIDESCENCE) {
+        e0 += layers.iridescence * (layers.film_bound - e0);
+        e90 += layers.iridescence * (1.0 - e90);
+    }
+    return vec2(e0, e90);
+}
+
+// Share of light from wo that gets below coat and reflection.
+float share_below(Layers layers, MattLobes matt, LayerAlbedos seen, float cosine)
+{
+    float below = below_base(matt.e0, matt.e90, seen.base);
+    if (HAS_ANISOTROPY && layers.is_stretched) {
+        below = max(below - matt.e90 * stretch_excess(cosine), 0.0);
+    }
+    return below * (1.0 - seen.coat);
+}
+
+// The mean of that share over all directions.
+float mean_share_below(Layers layers, MattLobes matt)
+{
+    vec2 mean = mean_albedo(layers.alpha);
+    float left = 1.0 - (matt.e0 * mean.x + matt.e90 * mean.y);
+    if (HAS_COATS && layers.coat > 0.0) {
+        vec2 coat_mean = mean_albedo(layers.coat_alpha);
+        vec2 first = mean_products(layers.alpha, layers.coat_alpha, false);
+        vec2 second = mean_products(layers.alpha, layers.coat_alpha, true);
+        left += layers.coat * (matt.e0 * (0.04 * first.x + first.y) + matt.e90 * (0.04 * second.x + second.y) - (0.04 * coat_mean.x + coat_mean.y));
+    }
+    return left;
+}
+
+// The diffuse lobe under coat and sheen, 1/sr.
+vec3 diffuse_brdf(MattLobes lobes, MattCover cover, LayerAlbedos lit)
+{
+    return below_all(lobes.diffuse, lobes, cover, lit);
+}
+
+// Of the diffuse lobe, and of sheen.
+float even_density(vec3 n, vec3 wi)
+{
+    return 0.31830988618379067 * max(dot(wi, n), 0.0);
+}
+
+Scatter sample_diffuse(Surface surface, Lobes lobes, vec2 u, float chance)
+{
+    vec3 wi = to_frame(sample_cosine_hemisphere(u.x, u.y), surface.ns);
+    vec3 brdf = diffuse_brdf(lobes.matt, lobes.cover, albedos_towards(surface, lobes.cover, wi));
+    return Scatter(wi, brdf * divide(3.14159265358979324, chance), dot(wi, surface.ng) > 0.0, false, false, 0.0);
+}
