@@ -2,7 +2,7 @@
 //! struct whose fields are its buffers, with everything else that reflection knows of it. Writes `records.rs` too, the structs
 //! in those buffers and in push constants, and `charts.md`, the charts of the guide.
 //!
-//! Without the feature `compile-glsl`, as in the packed crate, the SPIR-V is that of `glsl/prebuilt`, which `tools/package` puts there.
+//! Without the feature `compile-glsl` the SPIR-V is that of `glsl/prebuilt`, where `tools/package` puts it in the packed crate.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -104,13 +104,15 @@ fn modules(glsl: &Path) -> Vec<Module> {
 fn modules(glsl: &Path) -> Vec<Module> {
     let prebuilt = glsl.join("prebuilt");
     let end = |what: &str| -> ! {
-        eprintln!("{what}; build with --features compile-glsl, which needs the library shaderc");
-        std::process::exit(1);
+        println!("cargo::error={what}; add photonmill's feature compile-glsl, which needs the library shaderc, or use the packed crate");
+        std::process::exit(0);
     };
-    let Ok(list) = fs::read_to_string(prebuilt.join(LIST)) else { end("there is no SPIR-V in glsl/prebuilt, as the packed crate has it") };
+    let Ok(list) = fs::read_to_string(prebuilt.join(LIST)) else {
+        end("this copy of photonmill has no compiled kernels (glsl/prebuilt), as the packed crate does")
+    };
     let (sources, kernels) = list.split_once('\n').unwrap_or_default();
     if sources != hash(glsl) {
-        end("the SPIR-V in glsl/prebuilt was made from other sources than those in glsl");
+        end("the compiled kernels in glsl/prebuilt are of other sources than those in glsl");
     }
     let module = |line: &str| {
         let mut words = line.split(' ').map(str::to_owned);

@@ -1,11 +1,6 @@
 //! Photon mapping on any Vulkan GPU: GLSL compute kernels on raw Vulkan, results that are the same to the bit however
 //! the work is split, and a ledger of every photon.
 //!
-//! The [`guide`] holds what a user needs: [the paper's box](guide::paper), [the window](guide::view), [scenes](guide::scenes),
-//! [materials](guide::materials), [accuracy](guide::accuracy), a [study](guide::study) of what accuracy costs,
-//! [performance](guide::performance), [scale](guide::scale), [hard cases](guide::hard_cases), [Python](guide::python) and [file formats](guide::formats).
-//! [Architecture](guide::architecture) explains how the program is built, why its results repeat, and how it is tested.
-//!
 //! A scene to a picture ([`render`] has points and lightmaps, too):
 //!
 //! ```
@@ -26,6 +21,28 @@
 //! # assert!(picture.run.error().noise < 1.0 && std::path::Path::new("picture.png").is_file());
 //! # Ok::<(), photonmill::error::Error>(())
 //! ```
+//!
+//! # Depending on it
+//!
+//! From a clone of the sources, whose kernels are compiled with the library shaderc (`tools/setup` installs it, and `SHADERC_LIB_DIR` says where
+//! it is; without it cargo builds it):
+//!
+//! ```toml
+//! photonmill = { path = "photonmill", default-features = false, features = ["compile-glsl"] }
+//! ```
+//!
+//! From the crate that `tools/package` packs, which has the kernels compiled, so that Rust alone builds it:
+//!
+//! ```toml
+//! photonmill = { path = "photonmill-0.1.0", default-features = false }
+//! ```
+//!
+//! The features `program` (the commands), `window` (`photonmill view`) and `lab` (`study`, `bench`, `gallery` and `paper`) are for the program.
+//!
+//! The [`guide`] holds what a user needs: [the paper's box](guide::paper), [the window](guide::view), [scenes](guide::scenes),
+//! [materials](guide::materials), [accuracy](guide::accuracy), a [study](guide::study) of what accuracy costs,
+//! [performance](guide::performance), [scale](guide::scale), [hard cases](guide::hard_cases), [Python](guide::python) and [file formats](guide::formats).
+//! [Architecture](guide::architecture) explains how the program is built, why its results repeat, and how it is tested.
 //!
 //! # Versions
 //!
@@ -56,7 +73,13 @@
 //!
 //! `tests/program/architecture.rs` checks it.
 
+#![cfg_attr(
+    not(all(feature = "program", feature = "window", feature = "lab")),
+    allow(dead_code, reason = "what only the program, the window or the lab uses")
+)]
+
 pub mod bake;
+#[cfg(feature = "program")]
 pub mod cli;
 pub mod constants;
 pub mod cpu;
@@ -67,6 +90,7 @@ pub mod gpu;
 #[cfg(doc)]
 pub mod guide;
 pub mod ledger;
+#[cfg(feature = "lab")]
 pub mod measure;
 #[expect(unsafe_code, reason = "the functions of Open Image Denoise, which is loaded at run time, are unsafe")]
 pub mod oidn;
@@ -82,4 +106,5 @@ pub mod settings;
 pub mod text;
 pub mod timings;
 pub mod verify;
+#[cfg(feature = "window")]
 pub mod view;

@@ -41,15 +41,6 @@ Examples:
   photonmill render scene.glb -o picture.png --camera Camera.001 --time 1m --error-image error.exr
       Another camera, one minute, and the standard error of each pixel";
 
-pub(super) const VIEW: &str = "\
-Examples:
-  photonmill view scene.glb
-      A window: drag to look around, wheel to come nearer, W A S D to fly
-  photonmill view cornell-spheres --size 640x480 --photons 65536
-      A built-in scene, with a picture of this size
-  photonmill view box
-      The paper's box, round by round";
-
 pub(super) const REPEAT: &str = "\
 Examples:
   photonmill repeat picture.exr
@@ -129,34 +120,6 @@ Examples:
       Checks the default device
   photonmill selfcheck --device 1 --json selfcheck.json
       Checks another device; the report is JSON";
-
-pub(super) const STUDY: &str = "\
-Examples:
-  photonmill study open-box -o study
-      Two minutes of measurements; open study/index.html
-  photonmill study scene.glb -o study --budget 10m
-      A scene of your own, in ten minutes";
-
-pub(super) const BENCH: &str = "\
-Examples:
-  photonmill bench --only open-box,cornell
-      Two experiments, as text
-  photonmill bench --scale -o bench
-      Time and memory against photons and triangles, with charts";
-
-pub(super) const GALLERY: &str = "\
-Examples:
-  photonmill gallery -o gallery
-      Eleven pictures; open gallery/index.html
-  photonmill gallery -o gallery --size 320 --error 2%
-      Smaller, and sooner done";
-
-pub(super) const PAPER: &str = "\
-Examples:
-  photonmill paper -o paper
-      All figures and tables; open paper/index.html
-  photonmill paper -o paper --threads all --longest 20s
-      Also with all CPU threads; leaves out rows that would take longer than 20 s";
 
 pub(super) const COMPLETIONS: &str = "\
 Examples:

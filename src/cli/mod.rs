@@ -1,20 +1,25 @@
 //! The command line: clap structs turned into settings, one file per subcommand. Nothing else knows clap.
 
 mod bake;
+#[cfg(feature = "lab")]
 mod bench;
 mod compare;
 mod config;
 mod devices;
 mod display;
+#[cfg(feature = "lab")]
 mod gallery;
 mod help;
 mod info;
 mod interrupt;
+#[cfg(feature = "lab")]
+mod lab;
 mod manual;
 mod map;
 mod merge;
 mod messages;
 mod options;
+#[cfg(feature = "lab")]
 mod paper;
 mod plan;
 mod probe;
@@ -25,9 +30,11 @@ mod request;
 mod run;
 mod selected;
 mod selfcheck;
+#[cfg(feature = "lab")]
 mod study;
 mod usage;
 mod values;
+#[cfg(feature = "window")]
 mod view;
 
 use std::ffi::OsString;
@@ -64,7 +71,8 @@ enum Command {
     #[command(after_help = help::RENDER)]
     Render(Box<render::RenderArgs>),
     /// Look at a scene, or at the paper's box, while its picture is refined, and fly through it
-    #[command(after_help = help::VIEW, mut_arg("scene", |argument| argument.help(format!("{}; or `box`, the paper's", help::scene()))))]
+    #[cfg(feature = "window")]
+    #[command(after_help = view::HELP, mut_arg("scene", |argument| argument.help(format!("{}; or `box`, the paper's", help::scene()))))]
     View(view::ViewArgs),
     /// Bake the irradiance of all surfaces of a scene into lightmaps
     #[command(after_help = help::BAKE)]
@@ -96,18 +104,9 @@ enum Command {
     /// Check the results of a device against known solutions, in less than a minute
     #[command(after_help = help::SELFCHECK)]
     Selfcheck(selfcheck::SelfcheckArgs),
-    /// Measure error against time for every setting on this device, and write a page about it
-    #[command(after_help = help::STUDY)]
-    Study(study::StudyArgs),
-    /// Measure the speed of every pass against the limits of the device
-    #[command(after_help = help::BENCH)]
-    Bench(bench::BenchArgs),
-    /// Make pictures that show what photonmill does best, each with its time and its error, and a page of them
-    #[command(after_help = help::GALLERY)]
-    Gallery(gallery::GalleryArgs),
-    /// Reproduce every figure and table of the paper as images, CSV and one HTML page
-    #[command(after_help = help::PAPER)]
-    Paper(paper::PaperArgs),
+    #[cfg(feature = "lab")]
+    #[command(flatten)]
+    Lab(lab::Command),
     /// Print a script by which a shell completes commands and options
     #[command(after_help = help::COMPLETIONS)]
     Completions(manual::CompletionsArgs),
@@ -240,6 +239,7 @@ pub fn main() -> u8 {
         None => interruptible(|| run::run(&cli.run, &cancelled)),
         Some(Command::Devices(args)) => devices::run(&args).map(|()| End::Finished),
         Some(Command::Render(args)) => render::run(&args, &cancelled),
+        #[cfg(feature = "window")]
         Some(Command::View(args)) => view::run(&args, &cancelled),
         Some(Command::Repeat(args)) => repeat::run(args, &cancelled),
         Some(Command::Bake(args)) => bake::run(&args, &cancelled),
@@ -250,10 +250,8 @@ pub fn main() -> u8 {
         Some(Command::Info(args)) => info::run(&args).map(|()| End::Finished),
         Some(Command::Compare(args)) => compare::run(&args).map(|()| End::Finished),
         Some(Command::Selfcheck(args)) => interruptible(|| selfcheck::run(&args, &cancelled)),
-        Some(Command::Study(args)) => interruptible(|| study::run(&args, &cancelled)),
-        Some(Command::Bench(args)) => interruptible(|| bench::run(&args, &cancelled)),
-        Some(Command::Gallery(args)) => interruptible(|| gallery::run(&args, &cancelled)),
-        Some(Command::Paper(args)) => interruptible(|| paper::run(&args, &cancelled)),
+        #[cfg(feature = "lab")]
+        Some(Command::Lab(command)) => interruptible(|| lab::run(&command, &cancelled)),
         Some(Command::Completions(args)) => manual::completions(&args, Cli::command()).map(|()| End::Finished),
         Some(Command::Man(args)) => manual::man(&args, Cli::command()).map(|()| End::Finished),
     };

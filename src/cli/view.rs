@@ -19,6 +19,15 @@ use crate::settings::RoomSettings;
 use crate::settings::scene::{SceneSettings, Stop};
 use crate::view::{self, Subject, ViewRequest};
 
+pub(super) const HELP: &str = "\
+Examples:
+  photonmill view scene.glb
+      A window: drag to look around, wheel to come nearer, W A S D to fly
+  photonmill view cornell-spheres --size 640x480 --photons 65536
+      A built-in scene, with a picture of this size
+  photonmill view box
+      The paper's box, round by round";
+
 #[derive(Args)]
 pub(super) struct ViewArgs {
     #[command(flatten)]

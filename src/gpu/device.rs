@@ -5,10 +5,9 @@ use std::sync::Arc;
 
 use ash::vk;
 use serde::Serialize;
-use winit::window::Window;
 
 use super::kernels::MAX_BUFFERS;
-use super::window::instance_extensions;
+use super::window::{Window, instance_extensions};
 use super::{call, platform, validation::Messages};
 use crate::error::{Error, Result};
 

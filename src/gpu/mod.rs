@@ -16,7 +16,11 @@ mod reconvergence;
 mod specialize;
 pub mod timestamps;
 mod validation;
+#[cfg(feature = "window")]
 pub mod window;
+#[cfg(not(feature = "window"))]
+#[path = "no_window.rs"]
+mod window;
 
 use std::cell::{Cell, RefCell};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -36,7 +40,7 @@ use clock::Idleness;
 use device::Loaded;
 use labels::Labels;
 use validation::Messages;
-use window::Surface;
+use window::{Surface, Window};
 
 /// The kernels that `build.rs` found, one struct each.
 pub mod kernels {
@@ -66,8 +70,6 @@ pub struct Options {
     pub without_timestamps: bool,
     /// Behave as on a device without 64-bit atomics.
     pub without_int64_atomics: bool,
-    /// A window that the device is to show pictures in.
-    pub window: Option<Arc<winit::window::Window>>,
     /// SPIR-V in place of a kernel's own, by the kernel's name: how tests plant faults.
     pub replaced: Vec<(String, Vec<u32>)>,
 }
@@ -151,15 +153,20 @@ pub const LEAST_MEMORY: u64 = 1 << 20;
 impl Gpu {
     /// Opens a device and runs the start-up check on it.
     pub fn open(options: &Options) -> Result<Gpu> {
+        Gpu::open_in(options, None)
+    }
+
+    /// The same for pictures in a window.
+    pub(crate) fn open_in(options: &Options, window: Option<&Arc<Window>>) -> Result<Gpu> {
         faults::check()?;
-        let loaded = device::instance(options.validate, options.window.as_ref()).map_err(|error| match (error, &options.device) {
+        let loaded = device::instance(options.validate, window).map_err(|error| match (error, &options.device) {
             (Error::NoVulkan { reason }, Some(wanted)) => {
                 Error::DeviceAbsent { wanted: wanted.clone(), present: format!("none ({reason})") }
             }
             (error, _) => error,
         })?;
         let Loaded { entry, instance, messages, has_labels } = loaded;
-        let surface = options.window.as_ref().map(|window| Surface::new(&entry, &instance, window)).transpose();
+        let surface = window.map(|window| Surface::new(&entry, &instance, window)).transpose();
         let opened = surface.and_then(|surface| {
             let opened = device::choose(&instance, options.device.as_deref()).and_then(|(physical, mut facts)| {
                 if let Some(surface) = &surface {
@@ -272,7 +279,8 @@ impl Gpu {
     pub fn reopen(&mut self) -> Result<()> {
         let index = self.facts.index.to_string();
         let usable_memory_bytes = self.facts.usable_memory_bytes;
-        let fresh = Gpu::open(&Options { device: Some(index), ..self.options.clone() })?;
+        let window = self.context.surface.as_ref().map(Surface::window);
+        let fresh = Gpu::open_in(&Options { device: Some(index), ..self.options.clone() }, window)?;
         *self = Gpu { options: self.options.clone(), ..fresh };
         self.facts.usable_memory_bytes = usable_memory_bytes;
         Ok(())

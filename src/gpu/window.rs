@@ -8,7 +8,7 @@ use ash::{khr, vk};
 use egui::{ClippedPrimitive, TexturesDelta};
 use egui_ash_renderer::{DynamicRendering, Options as PainterOptions, RenderMode, Renderer, allocator::DefaultAllocator};
 use winit::raw_window_handle::{HasDisplayHandle, HasWindowHandle, RawDisplayHandle};
-use winit::window::Window;
+pub use winit::window::Window;
 
 use super::{Buffer, Context, DeviceFacts, Gpu, call};
 use crate::error::{Error, Result};
@@ -42,6 +42,10 @@ impl Surface {
         let raw = unsafe { ash_window::create_surface(entry, instance, display, handle, None) }
             .map_err(|code| no_window(format!("Vulkan cannot draw in it ({code})")))?;
         Ok(Surface { raw, functions: khr::surface::Instance::new(entry, instance), window: window.clone() })
+    }
+
+    pub(super) fn window(&self) -> &Arc<Window> {
+        &self.window
     }
 
     pub(super) fn destroy(self) {

@@ -2,6 +2,7 @@
 
 pub mod colour;
 pub mod command;
+#[cfg(feature = "lab")]
 pub mod csv_table;
 pub mod destination;
 pub mod exr_file;
@@ -9,13 +10,16 @@ pub mod image;
 pub mod lightmap;
 pub mod merge_report;
 pub mod metadata;
+#[cfg(feature = "lab")]
 pub mod page;
 pub mod photon_map;
 pub mod report;
 pub mod room_report;
 pub mod scene_report;
 pub mod show;
+#[cfg(feature = "lab")]
 pub mod svg;
+#[cfg(feature = "program")]
 pub mod tev;
 pub mod trace_file;
 pub mod words;

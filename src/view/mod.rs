@@ -65,7 +65,7 @@ pub fn run(request: ViewRequest) -> Result<()> {
         [width * zoom, height * zoom]
     });
     let mut events = Events::open(&format!("{name} - photonmill"), window, &interface)?;
-    let gpu = Gpu::open(&Options { window: Some(events.window().clone()), ..request.options.clone() })?;
+    let gpu = Gpu::open_in(&request.options, Some(events.window()))?;
     // The box costs what its walls do, whoever looks.
     let is_slow = gpu.facts().kind == "cpu" && matches!(request.subject, Subject::Scene { .. });
     let zoom = if is_slow && request.size.is_none() { ZOOM_OF_CPU } else { 1 };

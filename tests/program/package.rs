@@ -1,4 +1,5 @@
-//! The packed crate: SPIR-V of every kernel, from the sources beside it, and no shaderc by default.
+//! The packed crate: SPIR-V of every kernel, from the sources beside it, and no shaderc by default. What who uses the library alone has to
+//! build for it.
 
 use std::fs;
 use std::process::Command;
@@ -77,8 +78,9 @@ fn check_package(compiled: &[(String, Vec<u32>)]) {
     let folder = packed(place.path());
     assert!(compiled.len() > 50, "{} kernels", compiled.len());
     assert_holds("the packed crate", check(&folder, compiled));
-    let manifest = fs::read_to_string(folder.join("Cargo.toml")).unwrap();
-    assert!(manifest.contains("default = []"), "{manifest}");
+    let manifest: toml::Table = fs::read_to_string(folder.join("Cargo.toml")).unwrap().parse().unwrap();
+    let wanted = ["program", "window", "lab"].map(toml::Value::from);
+    assert_eq!(manifest["features"]["default"], toml::Value::from(wanted.to_vec()));
     let absent = [".ci", ".shaderc", "tests", "target"].into_iter().find(|name| folder.join(name).exists());
     assert_eq!(absent, None);
 
@@ -89,4 +91,47 @@ fn check_package(compiled: &[(String, Vec<u32>)]) {
     assert_complains("another kernel", check(&folder, compiled));
     fs::remove_file(&prebuilt).unwrap();
     assert_complains("no kernel", check(&folder, compiled));
+}
+
+/// Crates that the library is built with, each with its distance from it.
+fn crates(features: &[&str]) -> BTreeSet<(usize, String)> {
+    let mut tree = Command::new(env!("CARGO"));
+    let tree = tree.args(["tree", "--offline", "--edges", "normal", "--prefix", "depth", "--format", " {p}"]).args(features);
+    let tree = tree.current_dir(root("")).output().expect("cargo starts");
+    assert!(tree.status.success(), "{}", text(&tree.stderr));
+    let line = |line: &str| {
+        let mut words = line.split(' ').map(str::to_owned);
+        let [distance, name] = [(); 2].map(|()| words.next().expect("a line has a distance and a name"));
+        (distance.parse().unwrap(), name)
+    };
+    text(&tree.stdout).lines().map(line).collect()
+}
+
+/// What only the command line, the window and the pages of the lab use; `ctrlc` is for systems without signals.
+const OF_FEATURES: [&str; 13] = [
+    "clap",
+    "clap_complete",
+    "clap_mangen",
+    "csv",
+    "egui",
+    "flip-rs",
+    "indicatif",
+    "maud",
+    "plotters",
+    "signal-hook",
+    "tev_client",
+    "toml",
+    "winit",
+];
+
+#[test]
+fn the_library_alone_needs_few_crates() {
+    let of_features = |crates: &BTreeSet<(usize, String)>| -> Vec<&str> {
+        OF_FEATURES.into_iter().filter(|of| crates.iter().any(|(_, name)| name == of || name.starts_with(&format!("{of}-")))).collect()
+    };
+    assert_eq!(of_features(&crates(&[])), OF_FEATURES);
+    let alone = crates(&["--no-default-features"]);
+    assert_eq!(of_features(&alone), Vec::<&str>::new());
+    let direct: Vec<&String> = alone.iter().filter(|(distance, _)| *distance == 1).map(|(_, name)| name).collect();
+    assert!((1..=36).contains(&direct.len()), "{} crates: {direct:?}", direct.len());
 }
