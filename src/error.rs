@@ -43,7 +43,7 @@ pub enum Error {
     Picture { path: PathBuf, reason: String },
 
     /// Two pictures differ by more than the user allows.
-    #[error("--fail-above {allowed}: the RMSE of {} is {found}", echo(path.display()))]
+    #[error("`fail_above` {allowed}: the RMSE of {} is {found}", echo(path.display()))]
     PictureAbove { allowed: String, path: PathBuf, found: String },
 
     /// A picture that was run again has other values.
@@ -55,18 +55,18 @@ pub enum Error {
     NoVulkan { reason: String },
 
     /// `--device` names a device that is not there, or several.
-    #[error("--device {}: must match exactly one Vulkan device; available: {present}", echo(wanted))]
+    #[error("`device` {}: must match exactly one Vulkan device; available: {present}", echo(wanted))]
     DeviceAbsent { wanted: String, present: String },
 
     /// A device lacks something that every kernel needs.
     #[error(
-        "{device}: does not support {what}, which photonmill needs; choose another device with --device, or trace the paper's box with --variant cpu"
+        "{device}: does not support {what}, which photonmill needs; choose another device with `device`, or trace the paper's box with `variant` cpu"
     )]
     DeviceLacks { device: String, what: String },
 
     /// A device fails the start-up check.
     #[error(
-        "{device}: failed the start-up check, so its results cannot be trusted: {what}; update its driver, or choose another device with --device"
+        "{device}: failed the start-up check, so its results cannot be trusted: {what}; update its driver, or choose another device with `device`"
     )]
     DeviceWrong { device: String, what: String },
 
@@ -76,7 +76,7 @@ pub enum Error {
 
     /// A measurement of a device's limits came out wrong.
     #[error(
-        "{device}: computes {what} wrongly, so its measurements are not valid; update its driver, or choose another device with --device"
+        "{device}: computes {what} wrongly, so its measurements are not valid; update its driver, or choose another device with `device`"
     )]
     Miscalculated { device: String, what: String },
 
@@ -85,22 +85,22 @@ pub enum Error {
     Device { call: &'static str, reason: String },
 
     /// The device is gone, or its driver has reset it.
-    #[error("{}; the system's log says why; a run with --checkpoint can go on from its file with --resume", self.what())]
+    #[error("{}; the system's log says why; a run with `checkpoint` can go on from its file with `resume`", self.what())]
     DeviceLost { call: &'static str },
 
     /// Memory of the device or of the host ran out.
-    #[error("{}; ask for a smaller picture or fewer photons, or choose another device with --device", self.what())]
+    #[error("{}; ask for a smaller picture or fewer photons, or choose another device with `device`", self.what())]
     OutOfMemory { call: &'static str, what: String },
 
     /// The device lost photons or counted them twice.
     #[error(
-        "the photon ledger does not close: {ledger}; the device or its driver loses work: update the driver, or choose another device with --device"
+        "the photon ledger does not close: {ledger}; the device or its driver loses work: update the driver, or choose another device with `device`"
     )]
     LedgerOpen { ledger: Ledger },
 
     /// Results differ from closed forms.
     #[error(
-        "{device}: {failed} of {of} checks failed, the first: {first}; its results cannot be trusted: update its driver, or choose another device with --device"
+        "{device}: {failed} of {of} checks failed, the first: {first}; its results cannot be trusted: update its driver, or choose another device with `device`"
     )]
     SelfcheckFailed { device: String, failed: usize, of: usize, first: String },
 
@@ -109,15 +109,15 @@ pub enum Error {
     Interrupted,
 
     /// The denoiser was asked for and cannot be had.
-    #[error("--denoise: Open Image Denoise {reason}")]
+    #[error("`denoise`: Open Image Denoise {reason}")]
     Denoiser { reason: String },
 
     /// The validation layer was asked for and is not installed.
-    #[error("--validate: the layer VK_LAYER_KHRONOS_validation is not installed; install the Vulkan validation layers, or omit --validate")]
+    #[error("`validate`: the layer VK_LAYER_KHRONOS_validation is not installed; install the Vulkan validation layers, or omit `validate`")]
     NoValidationLayer,
 
     /// The validation layer reported errors.
-    #[error("--validate: {} from the validation layer, the first: {first}", counted(count, "message"))]
+    #[error("`validate`: {} from the validation layer, the first: {first}", counted(count, "message"))]
     Validation { count: usize, first: String },
 }
 

@@ -58,7 +58,7 @@ impl Denoiser {
     /// Fails where the library is not installed.
     pub fn open() -> Result<Denoiser> {
         let absent = |reason: &str| {
-            let remedy = "install Open Image Denoise (package oidn or libopenimagedenoise of many systems, or its release from openimagedenoise.org with its lib folder in LD_LIBRARY_PATH), or omit --denoise";
+            let remedy = "install Open Image Denoise (package oidn or libopenimagedenoise of many systems, or its release from openimagedenoise.org with its lib folder in LD_LIBRARY_PATH), or omit `denoise`";
             Error::Denoiser { reason: format!("{reason}; {remedy}") }
         };
         // SAFETY: the library is what the system has under this name; its initialisers are trusted.

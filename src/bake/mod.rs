@@ -184,7 +184,7 @@ impl Layout {
     /// The same for a scene from a file, which may have more sets of coordinates than a scene. No side of a map is longer than
     /// `max_side`.
     pub fn of_file(scene: &Scene, file: Option<&File>, texels_per_metre: f64, max_side: u32) -> Result<Layout> {
-        const OPTION: &str = "--texels-per-metre";
+        const OPTION: &str = "texels_per_metre";
         if !(texels_per_metre.is_finite() && texels_per_metre > 0.0) {
             return Err(Error::setting(OPTION, texels_per_metre, "must be above 0"));
         }

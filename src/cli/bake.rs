@@ -9,7 +9,7 @@ use super::options::{DevicesOfRunArgs, ReportArgs};
 use super::progress::{MessageArgs, ProgressReporter};
 use super::request::{BAKE, RequestArgs};
 use super::values::{parse_number, parse_stops};
-use super::{End, say_beside, spell};
+use super::{End, say_beside};
 use crate::bake::pages::{Atlas, MIN_PAGE};
 use crate::bake::{MAX_SIDE, Written};
 use crate::error::{Error, Result};
@@ -80,7 +80,7 @@ pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
     let (lightmaps, written) = scene.bake_on(devices, &bake, inputs, &mut checkpoints, &report_files, &observer)?;
     let run = &lightmaps.run.result;
     let name = &scene.scene.name;
-    let text = spell(&scene_report::text(name, run, "texel", args.messages.explains()));
+    let text = scene_report::text(name, run, "texel", args.messages.explains());
     reporter.finish();
     let written = written.and_then(|files| write_all(reports.files(run, || scene_report::json(name, run))).map(|()| files));
     let files = match written {

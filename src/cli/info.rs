@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::values::parse_number;
-use super::{JsonOrStdoutArg, help, optional_file, say};
+use super::{JsonOrStdoutArg, help, optional_file, say, spell};
 use crate::error::Result;
 use crate::output::destination::write_all;
 use crate::render::scene::stages;
@@ -88,7 +88,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<()> {
     let contents = Contents::of(&scene);
     if let Some(json) = json {
         let text = serde_json::to_string_pretty(&contents).expect("contents are plain data");
-        return write_all([(json, (text + "\n").into_bytes())]);
+        return write_all([(json, (spell(&text) + "\n").into_bytes())]);
     }
     say(contents.text().trim_end())
 }

@@ -9,7 +9,7 @@ use super::options::TimedDeviceArgs;
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::request::{MAP, RequestArgs};
 use super::values::{parse_integer, value_enum};
-use super::{End, JsonOrStdoutArg, optional_file, say, spell};
+use super::{End, JsonOrStdoutArg, optional_file, say};
 use crate::engine::scene::map_file::MapFile;
 use crate::error::{Error, Result, require};
 use crate::output::destination::{Destination, check_not_read, write_all};
@@ -137,7 +137,7 @@ fn make(args: &MakeArgs, cancelled: &AtomicBool) -> Result<End> {
     let mut gpu = args.device.open(&reporter)?;
     let WrittenMap { header, filled, failed } = prepared.write_map(&mut gpu, &output, &observer)?;
     reporter.finish();
-    let found = filled.nonfinite_values.map_or_else(String::new, |values| spell(&values.text()) + "\n");
+    let found = filled.nonfinite_values.map_or_else(String::new, |values| values.text() + "\n");
     say(&format!("{found}{}\nwrote {}", photon_map::text(&header).trim_end(), args.output.display()))?;
     failed.map_or(Ok(if filled.is_cancelled { End::Cancelled } else { End::Finished }), Err)
 }

@@ -31,13 +31,13 @@ pub(super) fn spell(text: &str) -> String {
 /// One line on stderr. Where nobody can read it there still is the exit code.
 pub(super) fn complain(line: &str) {
     // Names of files and of things in them may hold anything; a complaint stays one line.
-    let line: String = line.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect();
+    let line: String = spell(line).chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect();
     print_line(&format!("photonmill: {line}"));
 }
 
 /// Text on stdout; a reader that has gone away, as `head` does, has seen enough.
 pub(super) fn say(text: &str) -> Result<()> {
-    match writeln!(std::io::stdout(), "{text}") {
+    match writeln!(std::io::stdout(), "{}", spell(text)) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {
             Err(Error::Output { option: "standard output", path: PathBuf::from("(stdout)"), reason: error.kind().to_string() })
         }
@@ -48,7 +48,7 @@ pub(super) fn say(text: &str) -> Result<()> {
 /// A report for people: on stdout, unless one of the files goes there.
 pub(super) fn say_beside<'a>(files: impl IntoIterator<Item = &'a Destination>, text: &str) -> Result<()> {
     if files.into_iter().any(Destination::is_standard_output) {
-        print_line(text);
+        print_line(&spell(text));
         return Ok(());
     }
     say(text)

@@ -147,7 +147,7 @@ impl DeviceArgs {
         match Gpu::open(options) {
             Ok(gpu) => Ok(Some(gpu)),
             Err(error @ (Error::NoVulkan { .. } | Error::DeviceLacks { .. })) if self.device.is_none() => {
-                complain(&spell(&format!("{error}; running the CPU builder instead")));
+                complain(&format!("{error}; running the CPU builder instead"));
                 Ok(None)
             }
             Err(error) => Err(error),
@@ -284,7 +284,7 @@ fn print_config(command: &clap::Command, matches: &ArgMatches) -> u8 {
 fn printed(result: Result<()>) -> u8 {
     result.map_or_else(
         |error| {
-            complain(&spell(&error.to_string()));
+            complain(&error.to_string());
             error.exit_code()
         },
         |()| 0,

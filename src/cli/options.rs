@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::progress::ProgressReporter;
-use super::{DeviceArgs, JsonArg, TimingArgs, optional_file};
+use super::{DeviceArgs, JsonArg, TimingArgs, optional_file, spell};
 use crate::engine::run::RunResult;
 use crate::error::{Result, require};
 use crate::gpu::{DeviceFacts, Gpu, Options};
@@ -45,7 +45,7 @@ impl Reports {
         run: &RunResult<Plan, Film>,
         json: impl FnOnce() -> Vec<u8>,
     ) -> impl Iterator<Item = (Destination, Vec<u8>)> {
-        let json = self.json.map(|file| (file, json()));
+        let json = self.json.map(|file| (file, spell(&String::from_utf8_lossy(&json())).into_bytes()));
         let trace = self.trace.map(|file| (file, trace_file::chrome_trace(&run.timings, run.device_name())));
         json.into_iter().chain(trace)
     }

@@ -44,9 +44,9 @@ pub(super) fn run(args: &PlanArgs) -> Result<()> {
     let geometry = &prepared.geometry;
     reporter.finish();
     if let Some(json) = json {
-        return write_all([(json, [scene_report::plan_json(&plan), b"\n".to_vec()].concat())]);
+        return write_all([(json, (spell(&String::from_utf8_lossy(&scene_report::plan_json(&plan))) + "\n").into_bytes())]);
     }
-    let mut text = spell(&scene_report::plan_table(&plan, None));
+    let mut text = scene_report::plan_table(&plan, None);
     if let Some(line) = scene_report::missing(&plan) {
         text.push_str(&line);
         text.push('\n');

@@ -10,7 +10,7 @@ use glam::DVec3;
 use super::options::{DevicesOfRunArgs, ReportArgs};
 use super::progress::{MessageArgs, ProgressReporter};
 use super::request::{PROBE, RequestArgs};
-use super::{End, say_beside, spell};
+use super::{End, say_beside};
 use crate::engine::scene::RunResult;
 use crate::error::{Error, Result};
 use crate::output::destination::{Destination, check_distinct, write_all};
@@ -59,7 +59,7 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
     reporter.finish();
 
     let scene = &prepared.scene.name;
-    let text = spell(&scene_report::text(scene, &run, prepared.point, args.messages.explains()));
+    let text = scene_report::text(scene, &run, prepared.point, args.messages.explains());
     let wrote = if output.is_standard_output() { String::new() } else { format!("\nwrote {}", args.output.display()) };
     let mut files = vec![(output, table(&run))];
     files.extend(reports.files(&run, || scene_report::json(scene, &run)));

@@ -152,8 +152,8 @@ impl ProgressReporter {
     /// Prints what a run says of itself.
     pub(super) fn event(&self, event: Event) {
         match event {
-            Event::Warning(text) => complain(&format!("warning: {}", spell(text))),
-            Event::Remark(text) => complain(&spell(text)),
+            Event::Warning(text) => complain(&format!("warning: {text}")),
+            Event::Remark(text) => complain(text),
             Event::Note(text) => self.note(&spell(text)),
             Event::Status(text) => self.status(&spell(text)),
             Event::Step(text) => self.step(&spell(text)),

@@ -12,7 +12,7 @@ use super::options::{DevicesOfRunArgs, ReportArgs};
 use super::progress::{MessageArgs, ProgressReporter};
 use super::request::{RENDER, RequestArgs};
 use super::values::{parse_integer, parse_photon_name, parse_seconds};
-use super::{End, complain, optional_file, say, say_beside, spell};
+use super::{End, complain, optional_file, say, say_beside};
 use crate::engine;
 use crate::engine::replay::PhotonName;
 use crate::engine::saved::{SavedFilm, SavedRun};
@@ -138,14 +138,14 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
         );
     }
     let scene = &image.scene.name;
-    let text = spell(&scene_report::text(scene, run, prepared.point, args.messages.explains()));
+    let text = scene_report::text(scene, run, prepared.point, args.messages.explains());
     let mut files = Vec::new();
     let mut shown = String::new();
     if let (Some(picture), Some(format), Some(output)) = (&picture, format, output) {
         let asked = &prepared.inputs.settings;
         if let Some(reason) = image.missing_parts(asked).filter(|_| shows_parts) {
             let layers = "has no layers of the parts of its light, which this run does not keep apart";
-            complain(&format!("warning: -o {}: {layers}: {}", output.display(), spell(reason)));
+            complain(&format!("warning: -o {}: {layers}: {reason}", output.display()));
         }
         let (bytes, how) = image.file(request, format, &observer);
         files.push((picture.clone(), bytes));

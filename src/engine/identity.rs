@@ -65,7 +65,7 @@ impl Identity {
         }
         if self.device != other.device {
             let name = |identity: &Identity| one_line(&identity.device.clone().unwrap_or_default());
-            let remedy = "devices of different makes need --math strict in all parts of a run";
+            let remedy = "devices of different makes need `math` strict in all parts of a run";
             return Some(format!("is of {}, not of {}; {remedy}", name(other), name(self)));
         }
         let otherwise = "was planned otherwise, as another version or driver does, or more than 65536 rounds; begin the run anew";

@@ -81,13 +81,13 @@ impl NonfiniteValues {
     /// One line of the report.
     pub fn text(&self) -> String {
         let Some(first) = self.first.first() else {
-            return "nonfinite values: none; --paranoid checked all positions, directions, flux and radiance".to_owned();
+            return "nonfinite values: none; `paranoid` checked all positions, directions, flux and radiance".to_owned();
         };
         let NonfiniteValue { round, item, .. } = first;
         let whose = match first.what {
-            What::Photon => format!("photon {item} of round {round}; trace it alone with --replay {round}:{item} (render or the main job)"),
+            What::Photon => format!("photon {item} of round {round}; trace it alone with `replay` {round}:{item} (render or the main job)"),
             What::CausticPhoton => {
-                format!("caustic photon {item} of round {round}; trace it alone with render --replay {round}:{item}:caustic")
+                format!("caustic photon {item} of round {round}; trace it alone with render `replay` {round}:{item}:caustic")
             }
             What::SeenLight => format!("directly sampled light at pixel, texel or point {item} in round {round}"),
             What::Estimate => format!("the density estimate at pixel, texel or point {item} in round {round}"),

@@ -33,7 +33,7 @@ pub struct Replayed<Start, Vertex> {
 impl PhotonName {
     /// Refuses what `--replay` cannot trace.
     pub fn refused(self, allowed: impl Into<String>) -> Error {
-        Error::setting("--replay", self, allowed.into())
+        Error::setting("replay", self, allowed.into())
     }
 
     pub fn check_round(self, rounds: u32) -> Result<()> {

@@ -334,10 +334,10 @@ impl<'a> RunState<'a> {
         };
         if share.count(state.wanted()) == 0 {
             let allowed = format!(
-                "has nothing to do: the run has {} in all; ask for more --rounds, or for fewer shards",
+                "has nothing to do: the run has {} in all; ask for more `rounds`, or for fewer shards",
                 counted(state.wanted(), "block")
             );
-            return Err(Error::setting("--shard", share, allowed));
+            return Err(Error::setting("shard", share, allowed));
         }
         if let Some((_, saved)) = control.keep.resume.take() {
             state.emitted = saved.fates.iter().map(|fates| fates.emitted).sum();

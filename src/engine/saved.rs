@@ -292,7 +292,7 @@ impl SavedRun {
 
     /// Fails with what is wrong with the file.
     pub fn from_bytes(bytes: &[u8]) -> Result<SavedRun, String> {
-        let rest = bytes.strip_prefix(MAGIC).ok_or("is no saved run of photonmill; give a file that --checkpoint wrote")?;
+        let rest = bytes.strip_prefix(MAGIC).ok_or("is no saved run of photonmill; give a file that `checkpoint` wrote")?;
         let damaged = || "is cut off or was changed, as its checksum shows; use an older copy, or begin the run anew".to_owned();
         let (content, checksum) = bytes.split_at_checked(bytes.len().saturating_sub(CHECKSUM_BYTES)).ok_or_else(damaged)?;
         if content.len() < MAGIC.len() + 8 || Sha256::digest(content).as_slice() != checksum {

@@ -340,7 +340,7 @@ impl<Plan, Film> Attempt<'_, Plan, Film> {
                 let difference = known.iter().find_map(|other| known[0].differs_from(other));
                 if let Some(difference) = difference {
                     self.refused =
-                        Some(Error::setting("--devices", self.numbers[device], format!("cannot take part: what it computes {difference}")));
+                        Some(Error::setting("devices", self.numbers[device], format!("cannot take part: what it computes {difference}")));
                 }
             }
             Event::Ended(result) => {

@@ -65,7 +65,7 @@ impl OffSurfaces {
         let numbers: Vec<String> = self.first.iter().map(u64::to_string).collect();
         let others = if self.points > self.first.len() as u64 { " and others" } else { "" };
         format!(
-            "unknown: {} of {} ({}{others}) lie on no surface, where {} cannot be found, so their error is unknown and no bound includes them; leave out --map and --without alpha or layers, or put them on a surface\n",
+            "unknown: {} of {} ({}{others}) lie on no surface, where {} cannot be found, so their error is unknown and no bound includes them; leave out `map` and `without` alpha or layers, or put them on a surface\n",
             self.points,
             counted(self.of, point),
             numbers.join(", "),

@@ -104,10 +104,10 @@ impl Keep<'_> {
         }
         if let Some((path, saved)) = &self.resume {
             if let Some(difference) = identity.differs_from(&saved.identity) {
-                return Err(Error::setting("--resume", path.display(), difference));
+                return Err(Error::setting("resume", path.display(), difference));
             }
             let other = format!("is shard {} of its run, and this is {}; give the shard's own file", saved.share, self.share);
-            require(saved.share == self.share, "--resume", path.display(), other)?;
+            require(saved.share == self.share, "resume", path.display(), other)?;
         }
         Ok(Some(identity))
     }
@@ -116,7 +116,7 @@ impl Keep<'_> {
     pub fn check_resumed(&self, holds: impl FnOnce(&SavedRun) -> bool) -> Result<()> {
         let Some((path, saved)) = &self.resume else { return Ok(()) };
         let allowed = "contradicts itself: its settings ask for other values than it holds; begin anew without it";
-        require(holds(saved), "--resume", path.display(), allowed)
+        require(holds(saved), "resume", path.display(), allowed)
     }
 }
 
@@ -261,7 +261,7 @@ impl Watch {
             return Ok(());
         }
         let (Some(wanted), Some(look)) = (self.stop.error, self.seen) else { return Ok(()) };
-        let refused = |allowed: String| Err(Error::setting("--error", format!("{}%", 100.0 * wanted), allowed));
+        let refused = |allowed: String| Err(Error::setting("error", format!("{}%", 100.0 * wanted), allowed));
         if look.is_off_surfaces {
             return refused("cannot be reached, because no point lies on a surface, and some light of this scene is only found there; move the points onto surfaces".to_owned());
         }
@@ -269,10 +269,10 @@ impl Watch {
             let percent = 100.0 * look.lost;
             return refused(match look.is_lost_by_bounces {
                 true => format!(
-                    "cannot be reached, because photons are cut off after {bounces} bounces, and what they carry may add up to {percent:.2} % of the result; allow more --bounces"
+                    "cannot be reached, because photons are cut off after {bounces} bounces, and what they carry may add up to {percent:.2} % of the result; allow more `bounces`"
                 ),
                 false => format!(
-                    "cannot be reached, because limits of shading normals, of paths between mirrors and of large values keep light from the result that may add up to {percent:.2} % of it; ask for a larger error, or run without --error to see how much each keeps"
+                    "cannot be reached, because limits of shading normals, of paths between mirrors and of large values keep light from the result that may add up to {percent:.2} % of it; ask for a larger error, or run without `error` to see how much each keeps"
                 ),
             });
         }
@@ -281,7 +281,7 @@ impl Watch {
             && lower > wanted
         {
             return refused(format!(
-                "cannot be reached: the bias of the radius alone is {:.2} % to {:.2} %, and the radius never shrinks; use a smaller --radius",
+                "cannot be reached: the bias of the radius alone is {:.2} % to {:.2} %, and the radius never shrinks; use a smaller `radius`",
                 100.0 * lower,
                 100.0 * upper
             ));

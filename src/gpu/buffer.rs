@@ -116,7 +116,7 @@ impl Gpu {
         if let Some(most) = self.options.memory.filter(|_| memory == Memory::Device) {
             let held = self.held_memory().device_bytes;
             if held + size_bytes > most {
-                return Err(full(name, size_bytes, format!("{held} of the {most} bytes of --memory are in use")));
+                return Err(full(name, size_bytes, format!("{held} of the {most} bytes of `memory` are in use")));
             }
         }
         let device = &self.context.device;

@@ -102,7 +102,7 @@ pub fn strict_math(gpu: &Gpu) -> Result<()> {
         (found.map(f32::to_bits) != expected.map(f32::to_bits))
             .then(|| format!("conversion, product plus sum, quotient and root of {a:e} and {b:e} gave {found:?} instead of {expected:?}"))
     });
-    wrong.map_or(Ok(()), |what| Err(Error::DeviceWrong { device: gpu.facts.name.clone(), what: format!("{what}; use --math fast") }))
+    wrong.map_or(Ok(()), |what| Err(Error::DeviceWrong { device: gpu.facts.name.clone(), what: format!("{what}; use `math` fast") }))
 }
 
 const STRICT_SAMPLES: u32 = 4096;

@@ -153,7 +153,7 @@ pub(super) fn errors(error: &FilmError, lost: f64, (measure, confidence): (Measu
         None if error.blocks < LEAST_BLOCKS => {
             writeln!(
                 text,
-                "noise: unknown, as fewer than {LEAST_BLOCKS} blocks of rounds are whole; use more --rounds or a smaller --block"
+                "noise: unknown, as fewer than {LEAST_BLOCKS} blocks of rounds are whole; use more `rounds` or a smaller `block`"
             )
             .unwrap();
         }

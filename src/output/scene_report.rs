@@ -214,9 +214,9 @@ pub fn radius_warning(plan: &ScenePlan, geometry: &Geometry, point: &str) -> Opt
     let trial = plan.trial.as_ref().filter(|_| plan.radius_is_too_wide())?;
     let widest = plan.maps().filter(|map| map.radius_from == RadiusFrom::Trial).max_by(|a, b| a.radius.total_cmp(&b.radius))?;
     let remedy = match widest.caustic_only {
-        _ if plan.bias_is_unknown() => "the scene is too wide for a smaller radius: use --final-gather, or leave out what makes it so wide",
-        true => "for a sharper result use more --photons or a smaller --caustic-radius",
-        false => "for a sharper result use more --photons or a smaller --radius",
+        _ if plan.bias_is_unknown() => "the scene is too wide for a smaller radius: use `final_gather`, or leave out what makes it so wide",
+        true => "for a sharper result use more `photons` or a smaller `caustic_radius`",
+        false => "for a sharper result use more `photons` or a smaller `radius`",
     };
     Some(format!(
         "at {:.0} % of the {point}s the next wall or edge is nearer than the search radius of the {} map, {:.3} m, so the light there will be blurred; {remedy}",
@@ -329,7 +329,7 @@ pub fn text(scene: &str, lit: &RunResult, point: &str, explain: bool) -> String 
         if traced < planned {
             writeln!(
                 text,
-                "time was up in the first round, after {traced} of {planned} photons, so the result is noisy and its error unknown; use fewer --photons, so that several rounds fit into --time"
+                "time was up in the first round, after {traced} of {planned} photons, so the result is noisy and its error unknown; use fewer `photons`, so that several rounds fit into `time`"
             )
             .unwrap();
         }
@@ -359,7 +359,7 @@ pub fn text(scene: &str, lit: &RunResult, point: &str, explain: bool) -> String 
     }
     if lit.film.anomalies[2] > 0 {
         let count = counted(lit.film.anomalies[2], "estimate");
-        writeln!(text, "warning: no edge correction for {count} over too many triangles; a smaller --radius mends it").unwrap();
+        writeln!(text, "warning: no edge correction for {count} over too many triangles; a smaller `radius` mends it").unwrap();
     }
     let unit = match lit.plan.sensor {
         Sensor::Picture { .. } => "W/m2/sr",

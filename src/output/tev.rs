@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 
 /// Where tev listens unless it is started with another `--hostname`.
 pub const PORT: u16 = 14_158;
-const OPTION: &str = "--display";
+const OPTION: &str = "display";
 /// Until a machine that does not answer counts as absent, and a viewer that takes nothing as gone.
 const PATIENCE: Duration = Duration::from_secs(5);
 /// Of a packet, whose bytes are counted in 32 bits.

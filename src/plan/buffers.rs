@@ -55,7 +55,7 @@ pub const NONFINITE_KIND_WORDS: usize = 1 + 3 * MAX_NONFINITE_VALUES as usize;
 
 fn nonfinite_values() -> PlannedBuffer {
     let kinds = NONFINITE_ESTIMATE as u64 + 1;
-    buffer::<u32>("nonfinite values", kinds * NONFINITE_KIND_WORDS as u64, "the nonfinite values that --paranoid found")
+    buffer::<u32>("nonfinite values", kinds * NONFINITE_KIND_WORDS as u64, "the nonfinite values that `paranoid` found")
 }
 
 /// Words that kernels count clamped values, lost camera paths, samples of surfaces and what these

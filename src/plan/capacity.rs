@@ -53,7 +53,7 @@ impl Limits {
     /// Refuses a builder that the device cannot run.
     pub fn check_builder(&self, builder: Builder) -> Result<()> {
         let why = "needs the lanes of a subgroup to vote together in a loop, which this device's start-up check found wrong; choose another builder, or auto";
-        require(builder != Builder::Persistent || self.votes_in_loops, "--variant", builder.name(), why)
+        require(builder != Builder::Persistent || self.votes_in_loops, "variant", builder.name(), why)
     }
 
     /// What a device of a kind is good for; its buffers are as the host's, until the device is asked.
@@ -236,9 +236,9 @@ pub fn chunk_photons(settings: &RoomSettings, limits: &Limits, work: &Work) -> R
     let spare = 2 + if has_gaps { u64::from(settings.group_size) } else { 0 };
     let too_many =
         format!("the hits of two photons exceed the device's largest buffer, {} bytes; ask for fewer bounces", limits.buffer_bytes);
-    require(fits >= 2 + spare, "--bounces", settings.bounces, too_many)?;
+    require(fits >= 2 + spare, "bounces", settings.bounces, too_many)?;
     let most = format!("must be at most {} on this device", limits.group_size);
-    require(settings.group_size <= limits.group_size, "--group-size", settings.group_size, most)?;
+    require(settings.group_size <= limits.group_size, "group_size", settings.group_size, most)?;
     // A point's tests are not split further than by work group, nor a chunk by Ctrl-C; who asks for
     // larger chunks gets them.
     let budget = limits.pair_tests_per_submission as f64;
@@ -252,7 +252,7 @@ pub fn chunk_photons(settings: &RoomSettings, limits: &Limits, work: &Work) -> R
         let most = format!(
             "searches the {photons} photons of a round at once, but the device holds at most {room}; ask for fewer photons and more rounds"
         );
-        require(photons <= room, "--nearest", nearest, most)?;
+        require(photons <= room, "nearest", nearest, most)?;
         return Ok(settings.photons);
     }
     let wanted = settings.chunk.map_or(by_time, u64::from);

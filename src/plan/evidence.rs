@@ -97,8 +97,8 @@ impl<'a> Facts<'a> {
         let (needed, evidence) = self.evidence(effect);
         let kept = (needed || settings.forces(effect)) && !settings.leaves_out(effect);
         let evidence = match (needed, kept) {
-            (true, false) => format!("left out by --without, although the scene needs it: {evidence}"),
-            (false, true) => format!("forced by --with: {evidence}"),
+            (true, false) => format!("left out by `without`, although the scene needs it: {evidence}"),
+            (false, true) => format!("forced by `with`: {evidence}"),
             _ => evidence,
         };
         EffectDecision { effect, kept, needed, evidence, photons: 0, bytes: 0 }

@@ -31,9 +31,9 @@ impl ExtraSamples {
         let words = 2 * u64::from(width) * u64::from(height) + 2 + listed;
         if words * size_of::<u32>() as u64 > buffer_bytes {
             let allowed = format!(
-                "gives pixels {listed} samples more than all have, and a buffer of the device holds {buffer_bytes} bytes, 4 a sample; set fewer --samples"
+                "gives pixels {listed} samples more than all have, and a buffer of the device holds {buffer_bytes} bytes, 4 a sample; set fewer `samples`"
             );
-            return Err(Error::setting("--settings", "tiles", allowed));
+            return Err(Error::setting("settings", "tiles", allowed));
         }
         let mut pixels = Vec::with_capacity(listed as usize);
         let mut table = vec![0; 2 * (width * height) as usize];

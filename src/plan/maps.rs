@@ -80,10 +80,10 @@ fn map(
     landings: &Landings,
 ) -> Result<MapPlan> {
     let (name, domain, photons, neighbours, radius) = if caustic_only {
-        let radius = ("--caustic-radius", settings.caustic_radius);
+        let radius = ("caustic_radius", settings.caustic_radius);
         ("caustic", DOMAIN_CAUSTIC_PHOTONS, settings.caustic_photons, settings.caustic_neighbours, radius)
     } else {
-        ("global", DOMAIN_PHOTONS, settings.photons, settings.neighbours, ("--radius", settings.radius))
+        ("global", DOMAIN_PHOTONS, settings.photons, settings.neighbours, ("radius", settings.radius))
     };
     let FirstRadius { radius, from, expected, classes } = FirstRadius::new(geometry, (photons, neighbours), caustic_only, radius, trial)?;
     // Photons of a round land once at every bounce at most; a caustic's only once, but for what they pass.
@@ -189,6 +189,6 @@ fn chunk_photons(photons: u32, landings: u64, settings: &SceneSettings, limits: 
     let fits = by_buffer.min(by_memory).min(u64::from(u32::MAX) / landings);
     let too_many =
         format!("the hits of one photon exceed the device's largest buffer, {} bytes; ask for fewer bounces", limits.buffer_bytes);
-    require(fits > 0, "--bounces", settings.bounces, too_many)?;
+    require(fits > 0, "bounces", settings.bounces, too_many)?;
     Ok(fits.min(settings.chunk.map_or(u64::MAX, u64::from)).min(u64::from(photons)) as u32)
 }

@@ -81,10 +81,10 @@ impl ScenePlan {
                 let in_pieces = SceneSettings { chunk: Some(LEAST_CHUNK.min(settings.chunk.unwrap_or(LEAST_CHUNK))), ..settings.clone() };
                 let all = ScenePlan::with_maps_within(scene, geometry, &in_pieces, sensor, limits, &boundless, trial)?.bytes;
                 let needed = format!(
-                    "is less than the {} MiB of device memory that the run needs even in small pieces; ask for a smaller picture, or choose another --device",
+                    "is less than the {} MiB of device memory that the run needs even in small pieces; ask for a smaller picture, or choose another `device`",
                     all.max(plan.bytes).div_ceil(1 << 20)
                 );
-                return Err(Error::setting("--memory", format!("{}M", limits.memory_bytes >> 20), needed));
+                return Err(Error::setting("memory", format!("{}M", limits.memory_bytes >> 20), needed));
             }
             for_maps.memory_bytes = for_maps.memory_bytes.min(4 * plan.bytes) / 2;
         }
@@ -103,10 +103,10 @@ impl ScenePlan {
         settings.validate()?;
         let count = geometry.triangles.len();
         let few = format!("is for scenes of {MAX_LIST_TRIANGLES} triangles at most, and this one has {count}");
-        require(!settings.leaves_out(Effect::Bvh) || count <= MAX_LIST_TRIANGLES, "--without", "bvh", few)?;
+        require(!settings.leaves_out(Effect::Bvh) || count <= MAX_LIST_TRIANGLES, "without", "bvh", few)?;
         let block = settings.rounds_per_block(matches!(sensor, Sensor::Picture { .. }));
-        let whole = format!("must be whole blocks of {block} rounds (--block), or fewer than one has");
-        require(settings.rounds < block || settings.rounds.is_multiple_of(block), "--rounds", settings.rounds, whole)?;
+        let whole = format!("must be whole blocks of {block} rounds (`block`), or fewer than one has");
+        require(settings.rounds < block || settings.rounds.is_multiple_of(block), "rounds", settings.rounds, whole)?;
         let facts = Facts::new(scene, geometry, settings, sensor);
         let decisions: Vec<EffectDecision> = Effect::ALL.iter().map(|effect| facts.decide(*effect, settings)).collect();
         let keeps = |effect: Effect| decisions.iter().any(|decision| decision.effect == effect && decision.kept);
@@ -132,8 +132,8 @@ impl ScenePlan {
         let Maps { global, caustic, caustic_surfaces, targets, arrivals } = maps;
         let tiles = settings.tiles.as_ref().filter(|_| is_picture);
         tiles.map_or(Ok(()), |tiles| tiles.check(samples, sensor.size()))?;
-        let of_tiles = "cannot name the pixels of tiles with more samples, as a pilot or --settings gives them; set --samples too";
-        require(!settings.paranoid || tiles.is_none(), "--paranoid", "on", of_tiles)?;
+        let of_tiles = "cannot name the pixels of tiles with more samples, as a pilot or `settings` gives them; set `samples` too";
+        require(!settings.paranoid || tiles.is_none(), "paranoid", "on", of_tiles)?;
         let extra_samples = ExtraSamples::new(tiles, samples, sensor.size(), limits.buffer_bytes)?;
         let most_samples = extra_samples.most;
         let points_per_path = if gather_rays == GATHER_NONE { 1 } else { 2 };
@@ -228,7 +228,7 @@ impl ScenePlan {
     fn check_sizes(&mut self, geometry: &Geometry, limits: &Limits) -> Result<()> {
         if let Some(too_large) = self.scene_buffers(geometry).iter().find(|buffer| buffer.bytes() > limits.buffer_bytes) {
             let allowed = format!(
-                "{} take {} bytes, but a buffer on this device holds at most {}; choose another --device",
+                "{} take {} bytes, but a buffer on this device holds at most {}; choose another `device`",
                 too_large.why,
                 too_large.bytes(),
                 limits.buffer_bytes
@@ -241,17 +241,17 @@ impl ScenePlan {
             let most = limits.buffer_bytes / (largest / pixels);
             return Err(match self.sensor {
                 Sensor::Picture { width, height } => Error::setting(
-                    "--size",
+                    "size",
                     format!("{width}x{height}"),
                     match self.samples() {
                         1 => format!("has {pixels} pixels, but the device's buffers hold at most {most}; ask for a smaller picture"),
                         samples => format!(
-                            "has {pixels} pixels, but the device's buffers hold at most {most} with --samples {samples}; ask for fewer samples or a smaller picture"
+                            "has {pixels} pixels, but the device's buffers hold at most {most} with `samples` {samples}; ask for fewer samples or a smaller picture"
                         ),
                     },
                 ),
                 Sensor::Receivers { count } => {
-                    Error::setting("--points", count, format!("exceed the device's buffers, which hold at most {most}; ask for fewer"))
+                    Error::setting("points", count, format!("exceed the device's buffers, which hold at most {most}; ask for fewer"))
                 }
             });
         }

@@ -137,7 +137,7 @@ impl RoomPlan {
         let [floor, left] = settings.light_power;
         let allowed =
             "differ too much for the film's integer sums over so many photons; choose closer values, or ask for fewer photons * bounces";
-        require(is_seen, "--light-power", format!("{floor},{left}"), allowed)?;
+        require(is_seen, "light_power", format!("{floor},{left}"), allowed)?;
 
         let points: Vec<Point> = scene
             .walls()

@@ -186,11 +186,11 @@ impl Image {
         if !self.is_of_request {
             Some("is of a scene or a camera that a call of the library made; repeat the call")
         } else if self.request.shard.is_some() {
-            Some("holds a shard of a run; repeat the picture of all shards, from the run without --shard")
+            Some("holds a shard of a run; repeat the picture of all shards, from the run without `shard`")
         } else if run.film.rounds == 1 && is_early && run.ledger().emitted < per_round {
-            Some("was cut short within its first round, at a moment that no other run meets; render it with --rounds instead")
+            Some("was cut short within its first round, at a moment that no other run meets; render it with `rounds` instead")
         } else if self.blocks_with_gaps > run.film.blocks || (is_early && !run.more_devices.is_empty()) {
-            Some("may hold blocks of rounds with others missing between them; render it with --rounds instead")
+            Some("may hold blocks of rounds with others missing between them; render it with `rounds` instead")
         } else {
             None
         }

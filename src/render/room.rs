@@ -266,7 +266,7 @@ pub fn metadata(request: &RenderRequest, outcome: &RunResult, error: &FilmError,
             },
             // A round may be cut short then.
             End::Time | End::Cancelled => {
-                Repeat::Not("was ended early, at a moment that no other run meets; run it with --rounds instead".to_owned())
+                Repeat::Not("was ended early, at a moment that no other run meets; run it with `rounds` instead".to_owned())
             }
         },
     }

@@ -66,12 +66,12 @@ impl TunedSettings {
     }
 
     pub fn open(path: &Path) -> Result<TunedSettings> {
-        let refused = |reason: String| Error::setting("--settings", path.display(), reason);
-        let unreadable = |error: std::io::Error| refused(format!("cannot be read ({}); name a file of --save-settings", refusal(&error)));
+        let refused = |reason: String| Error::setting("settings", path.display(), reason);
+        let unreadable = |error: std::io::Error| refused(format!("cannot be read ({}); name a file of `save_settings`", refusal(&error)));
         let is_long = std::fs::metadata(path).map_err(unreadable)?.len() > MOST_BYTES;
         let text = if is_long { Vec::new() } else { std::fs::read(path).map_err(unreadable)? };
         let other =
-            |reason: &dyn std::fmt::Display| refused(format!("is no file of --save-settings of this version ({reason}); make a new one"));
+            |reason: &dyn std::fmt::Display| refused(format!("is no file of `save_settings` of this version ({reason}); make a new one"));
         let tuned: TunedSettings = serde_json::from_slice(&text).map_err(|error| other(&error))?;
         if tuned.format != FORMAT {
             return Err(other(&format!("its format is not '{FORMAT}'")));

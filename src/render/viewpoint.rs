@@ -20,19 +20,19 @@ impl RenderRequest {
     /// Before a scene is read, which may take long.
     pub fn check_camera(&self) -> Result<()> {
         if let Some(aperture) = self.aperture {
-            require((0.0..=MOST_APERTURE).contains(&aperture), "--aperture", aperture, format!("must be 0 to {MOST_APERTURE:e} metres"))?;
+            require((0.0..=MOST_APERTURE).contains(&aperture), "aperture", aperture, format!("must be 0 to {MOST_APERTURE:e} metres"))?;
         }
         if let Some(focus) = self.focus {
             let allowed = || format!("must be above 0 and at most {MOST_FOCUS:e} metres, which is as good as infinity");
-            require(focus > 0.0 && focus <= MOST_FOCUS, "--focus", focus, allowed())?;
+            require(focus > 0.0 && focus <= MOST_FOCUS, "focus", focus, allowed())?;
         }
         if let Some(fov) = self.fov {
-            require(fov > 0.0 && fov <= MOST_FOV, "--fov", fov, format!("must be above 0 and at most {MOST_FOV} degrees"))?;
+            require(fov > 0.0 && fov <= MOST_FOV, "fov", fov, format!("must be above 0 and at most {MOST_FOV} degrees"))?;
         }
         if let Some(height) = self.orthographic {
             require(
                 height > 0.0 && height <= MAX_COORDINATE,
-                "--orthographic",
+                "orthographic",
                 height,
                 format!("must be above 0 and at most {MAX_COORDINATE:e} metres"),
             )?;
@@ -45,10 +45,10 @@ impl RenderRequest {
         }
         let is_direction = |point: DVec3| point.length() > 0.0;
         if let Some(up) = self.up {
-            require(is_direction(up), "--up", text(up), "must be a direction, not 0,0,0")?;
+            require(is_direction(up), "up", text(up), "must be a direction, not 0,0,0")?;
         }
         if let (Some(eye), Some(look_at)) = (self.eye, self.look_at) {
-            require(is_direction(look_at - eye), "--look-at", text(look_at), "must not be where --eye is")?;
+            require(is_direction(look_at - eye), "look_at", text(look_at), "must not be where `eye` is")?;
         }
         Ok(())
     }
@@ -69,7 +69,7 @@ impl RenderRequest {
     fn placed(&self, own: Camera) -> Result<Camera> {
         let eye = self.eye.unwrap_or(own.eye);
         let target = self.look_at.unwrap_or(eye + own.forward);
-        require((target - eye).length() > 0.0, "--look-at", text(target), "must not be where the camera stands; give --eye")?;
+        require((target - eye).length() > 0.0, "look_at", text(target), "must not be where the camera stands; give `eye`")?;
         // Without a new direction the camera keeps its own roll.
         let up = self.up.unwrap_or(if self.look_at.is_some() { DVec3::Y } else { own.up });
         let turned = Camera::looking_at(&own.name, eye, target, up, 1.0);
@@ -87,7 +87,7 @@ impl RenderRequest {
         let in_the_middle = || {
             let (origin, direction) = camera.ray(0.0, 0.0, 1.0, DVec2::ZERO);
             let focus = scene.distance_along(origin, direction).ok_or_else(|| {
-                Error::setting("--aperture", aperture, "needs --focus: the middle of the picture shows nothing to focus on")
+                Error::setting("aperture", aperture, "needs `focus`: the middle of the picture shows nothing to focus on")
             })?;
             observer.tell(Event::Status(&format!("focus at {focus:.4} m, on what the middle of the picture shows")));
             Ok(focus)

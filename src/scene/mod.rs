@@ -93,7 +93,7 @@ impl Scene {
     pub fn open_with(name: &str, reading: Reading, progress: Progress) -> Result<Scene> {
         if let Some(scene) = built_in::by_name(name) {
             if let Some(time) = reading.at {
-                return Err(Error::setting("--at", time, "is a time of a file's animation; built-in scenes have none"));
+                return Err(Error::setting("at", time, "is a time of a file's animation; built-in scenes have none"));
             }
             return Ok(scene);
         }
@@ -164,11 +164,11 @@ impl Scene {
         self.cameras.iter().find(|camera| camera.name == name).cloned().ok_or_else(|| {
             let names: Vec<&str> = self.cameras.iter().map(|camera| camera.name.as_str()).collect();
             let there = if names.is_empty() {
-                "no such camera: the scene has none; leave --camera out".to_owned()
+                "no such camera: the scene has none; leave `camera` out".to_owned()
             } else {
                 format!("must be one of {}", names.join(", "))
             };
-            Error::setting("--camera", name, there)
+            Error::setting("camera", name, there)
         })
     }
 

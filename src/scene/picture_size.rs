@@ -55,7 +55,7 @@ impl PictureSize {
                     let allowed = format!(
                         "gives {width}x{height} pixels by the camera's aspect ratio {aspect:.4}, which is too large; give WIDTHxHEIGHT"
                     );
-                    return Err(Error::setting("--size", width, allowed));
+                    return Err(Error::setting("size", width, allowed));
                 }
                 Ok((width, height, None))
             }
@@ -66,7 +66,7 @@ impl PictureSize {
                 let change = if f64::from(width) > by_aspect { "wider" } else { "narrower" };
                 let remark = (camera.aspect.is_some() && !is_same).then(|| {
                     format!(
-                        "--size {width}x{height} is {change} than the camera's aspect ratio {aspect:.4}: the vertical field of view is kept, so the picture shows {} at the sides",
+                        "`size` {width}x{height} is {change} than the camera's aspect ratio {aspect:.4}: the vertical field of view is kept, so the picture shows {} at the sides",
                         if change == "wider" { "more" } else { "less" }
                     )
                 });

@@ -31,7 +31,7 @@ pub enum Environment {
     Picture(PathBuf),
 }
 
-const ENVIRONMENT: &str = "--environment";
+const ENVIRONMENT: &str = "environment";
 /// W/m2/sr. The power of a large scene under more is no number.
 const MOST_RADIANCE: f32 = 1e30;
 
@@ -39,10 +39,10 @@ impl Surroundings {
     /// Refuses numbers that are not allowed, before a scene is read, which may take long.
     pub fn validate(&self) -> Result<()> {
         if let Some(degrees) = self.rotate {
-            require(degrees.is_finite(), "--environment-rotate", degrees, "must be finite")?;
+            require(degrees.is_finite(), "environment_rotate", degrees, "must be finite")?;
         }
         if let Some(factor) = self.strength {
-            require((0.0..=1e9).contains(&factor), "--environment-strength", factor, "must be 0 to 1e9")?;
+            require((0.0..=1e9).contains(&factor), "environment_strength", factor, "must be 0 to 1e9")?;
         }
         Ok(())
     }
@@ -68,11 +68,11 @@ impl Surroundings {
         let is_of_sun = self.sun.is_some() && self.environment.is_none();
         let mut environment = scene.lights.iter_mut().map(|light| &mut light.kind).find(|kind| kind.is_environment());
         if let Some(degrees) = self.rotate {
-            let reason = "turns a picture, and not the sky of --sun; change the azimuth of --sun";
-            require(!is_of_sun, "--environment-rotate", degrees, reason)?;
+            let reason = "turns a picture, and not the sky of `sun`; change the azimuth of `sun`";
+            require(!is_of_sun, "environment_rotate", degrees, reason)?;
             let Some(LightKind::Sky(sky)) = &mut environment else {
-                let reason = "turns a picture, and the environment is none; give --environment FILE";
-                return Err(Error::setting("--environment-rotate", degrees, reason));
+                let reason = "turns a picture, and the environment is none; give `environment` FILE";
+                return Err(Error::setting("environment_rotate", degrees, reason));
             };
             *sky = Arc::new(Sky::clone(sky).turned(degrees));
         }
@@ -81,8 +81,8 @@ impl Surroundings {
                 Some(LightKind::Environment { radiance }) => *radiance *= factor,
                 Some(LightKind::Sky(sky)) => Arc::make_mut(sky).strength *= factor,
                 _ => {
-                    let reason = "multiplies an environment, and there is none; give --environment";
-                    return Err(Error::setting("--environment-strength", factor, reason));
+                    let reason = "multiplies an environment, and there is none; give `environment`";
+                    return Err(Error::setting("environment_strength", factor, reason));
                 }
             }
         }
@@ -97,8 +97,8 @@ impl Surroundings {
             if let (true, Some(factor), LightKind::Directional { irradiance, .. }) = (is_of_sun, self.strength, &mut kind) {
                 *irradiance *= factor;
             }
-            scene.lights.push(Light { name: "--sun".into(), kind });
+            scene.lights.push(Light { name: "sun".into(), kind });
         }
-        Ok((!is_lit).then_some("nothing in this scene emits light; a sky of 1 W/m2/sr lights it (--environment 0 for black)"))
+        Ok((!is_lit).then_some("nothing in this scene emits light; a sky of 1 W/m2/sr lights it (`environment` 0 for black)"))
     }
 }

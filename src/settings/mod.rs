@@ -233,66 +233,66 @@ impl RoomSettings {
     /// Refuses settings that no run can satisfy; each error names the option, its value and the remedy.
     pub fn validate(&self) -> Result<()> {
         let width = 2.0 * HALF_WIDTH;
-        within("--photons", self.photons, 2..=MAX_PHOTONS, "photons per round, at least one for each of the two lights")?;
+        within("photons", self.photons, 2..=MAX_PHOTONS, "photons per round, at least one for each of the two lights")?;
         let most_bounces = if self.builder == Builder::Persistent { MAX_PERSISTENT_BOUNCES } else { MAX_BOUNCES };
-        let of_builder = if self.builder == Builder::Persistent { " with --variant persistent" } else { "" };
-        within("--bounces", self.bounces, 1..=most_bounces, &format!("bounces{of_builder}"))?;
+        let of_builder = if self.builder == Builder::Persistent { " with `variant` persistent" } else { "" };
+        within("bounces", self.bounces, 1..=most_bounces, &format!("bounces{of_builder}"))?;
         check_common((self.rounds, u32::MAX), self.group_size, &self.stop)?;
-        within("--mesh", self.mesh, 1..=MAX_MESH, "texels along a wall")?;
+        within("mesh", self.mesh, 1..=MAX_MESH, "texels along a wall")?;
         let in_box = format!("must be from {MIN_RADIUS:e} to {width} metres (the box's width)");
-        require((MIN_RADIUS..=width).contains(&self.radius), "--radius", self.radius, in_box)?;
+        require((MIN_RADIUS..=width).contains(&self.radius), "radius", self.radius, in_box)?;
         let quantity = |option, value: f64, unit: &str| {
             let (least, most) = (1.0 / MAX_QUANTITY, MAX_QUANTITY);
             require((least..=most).contains(&value), option, value, format!("must be from {least:e} to {most:e} {unit}"))
         };
-        quantity("--full-light", self.full_light, "(photons within the radius)")?;
+        quantity("full_light", self.full_light, "(photons within the radius)")?;
         let [floor, left] = self.light_power;
-        quantity("--light-power", floor, "watts (floor light)")?;
-        quantity("--light-power", left, "watts (left light)")?;
+        quantity("light_power", floor, "watts (floor light)")?;
+        quantity("light_power", left, "watts (left light)")?;
         let few = "the weaker light must have at least a millionth of the total power";
-        require(floor.min(left) / (floor + left) >= 1e-6, "--light-power", format!("{floor},{left}"), few)?;
+        require(floor.min(left) / (floor + left) >= 1e-6, "light_power", format!("{floor},{left}"), few)?;
         let fits = format!("must be above 0 and at most {HALF_WIDTH} metres, so that the disc fits its wall");
-        require(self.light_radius > 0.0 && self.light_radius <= HALF_WIDTH, "--light-radius", self.light_radius, fits)?;
-        require((0.0..=1.0).contains(&self.reflectance), "--reflectance", self.reflectance, "must be from 0 to 1")?;
+        require(self.light_radius > 0.0 && self.light_radius <= HALF_WIDTH, "light_radius", self.light_radius, fits)?;
+        require((0.0..=1.0).contains(&self.reflectance), "reflectance", self.reflectance, "must be from 0 to 1")?;
         for shininess in self.shininess.iter().flatten() {
             let is_exponent = shininess.is_finite() && *shininess >= 0.0;
-            require(is_exponent, "--shininess", shininess, "must be 0 or more; omit it for Lambertian walls")?;
+            require(is_exponent, "shininess", shininess, "must be 0 or more; omit it for Lambertian walls")?;
         }
         let [x, y, z] = self.eye;
         let is_near = self.eye.iter().all(|coordinate| coordinate.abs() <= MAX_EYE);
-        require(is_near, "--eye", format!("{x},{y},{z}"), format!("must be three numbers from -{MAX_EYE:e} to {MAX_EYE:e}"))?;
-        within("--threads", self.threads as u64, 1..=1024, "threads")?;
+        require(is_near, "eye", format!("{x},{y},{z}"), format!("must be three numbers from -{MAX_EYE:e} to {MAX_EYE:e}"))?;
+        within("threads", self.threads as u64, 1..=1024, "threads")?;
         if let Some(counters) = self.counters {
             let is_allowed = counters.is_power_of_two() && counters <= MAX_COUNTERS;
-            require(is_allowed, "--counters", counters, format!("must be a power of two up to {MAX_COUNTERS}"))?;
+            require(is_allowed, "counters", counters, format!("must be a power of two up to {MAX_COUNTERS}"))?;
         }
         if let Some(chunk) = self.chunk {
-            within("--chunk", chunk, 2..=MAX_PHOTONS, "photons traced at once, at least one for each of the two lights")?;
+            within("chunk", chunk, 2..=MAX_PHOTONS, "photons traced at once, at least one for each of the two lights")?;
         }
         self.validate_nearest()?;
         if let Some(error) = self.stop.error {
-            let needs = "needs --sums integer, because float sums have no error estimate";
-            require(self.sums == Sums::Integer, "--error", error, needs)?;
+            let needs = "needs `sums` integer, because float sums have no error estimate";
+            require(self.sums == Sums::Integer, "error", error, needs)?;
         }
         self.validate_random_numbers()?;
         let events = self.total_photons().saturating_mul(u64::from(self.bounces));
         let most = format!("photons * rounds * bounces is {events}, but the film's 64-bit sums hold at most {MAX_EVENTS}; ask for fewer");
-        require(events <= MAX_EVENTS, "--rounds", self.rounds, most)
+        require(events <= MAX_EVENTS, "rounds", self.rounds, most)
     }
 
     fn validate_nearest(&self) -> Result<()> {
         let Some(nearest) = self.nearest else { return Ok(()) };
-        within("--nearest", nearest, 2..=constants::MAX_NEAREST, "photons; the farthest of them sets the radius of the disc")?;
+        within("nearest", nearest, 2..=constants::MAX_NEAREST, "photons; the farthest of them sets the radius of the disc")?;
         let by_tree = self.gather == Gather::KdTree;
-        require(by_tree, "--nearest", nearest, "needs --gather kdtree, which finds the nearest photons")?;
-        require(self.sums == Sums::Integer, "--nearest", nearest, "always uses integer sums; omit --sums")?;
+        require(by_tree, "nearest", nearest, "needs `gather` kdtree, which finds the nearest photons")?;
+        require(self.sums == Sums::Integer, "nearest", nearest, "always uses integer sums; omit `sums`")?;
         let (photons, chunk) = (self.photons, self.chunk.unwrap_or(self.photons));
-        let whole = format!("must be --photons {photons} or more with --nearest, which searches all photons of a round at once");
-        require(chunk >= photons, "--chunk", chunk, whole)?;
+        let whole = format!("must be `photons` {photons} or more with `nearest`, which searches all photons of a round at once");
+        require(chunk >= photons, "chunk", chunk, whole)?;
         let wanted = u64::from(self.rounds) * u64::from(nearest);
         let most =
             format!("rounds * nearest is {wanted}, but the film's 64-bit sums hold at most {MAX_NEAREST_SUMMED}; ask for fewer rounds");
-        require(wanted <= MAX_NEAREST_SUMMED, "--rounds", self.rounds, most)
+        require(wanted <= MAX_NEAREST_SUMMED, "rounds", self.rounds, most)
     }
 
     /// Rounds of a run that ends by itself: as many as its photons take, or as film and random numbers allow, and no
@@ -316,20 +316,20 @@ impl RoomSettings {
         match self.rng {
             Rng::Philox => Ok(()),
             Rng::Rand48 => {
-                within("--seed", self.seed, 0..=u64::from(u32::MAX), "with --rng rand48, whose seed has 32 bits")?;
+                within("seed", self.seed, 0..=u64::from(u32::MAX), "with `rng` rand48, whose seed has 32 bits")?;
                 let draws = u128::from(self.total_photons()) * u128::from(self.draws_per_photon());
                 let period = format!(
-                    "the run draws {draws} numbers, but the generator has a period of 2^48, so its streams would overlap; use --rng philox"
+                    "the run draws {draws} numbers, but the generator has a period of 2^48, so its streams would overlap; use `rng` philox"
                 );
-                require(draws <= 1 << 48, "--rng", "rand48", period)
+                require(draws <= 1 << 48, "rng", "rand48", period)
             }
             Rng::Mt => {
                 let most = rng::MT_MAX_BOUNCES;
-                let short = format!("must be at most {most} with --rng mt, whose streams hold 227 numbers; use --rng philox");
-                require(self.bounces <= most, "--bounces", self.bounces, short)?;
-                require(few, "--rng", "mt", "has 2^32 streams, but the run has more photons; use --rng philox")
+                let short = format!("must be at most {most} with `rng` mt, whose streams hold 227 numbers; use `rng` philox");
+                require(self.bounces <= most, "bounces", self.bounces, short)?;
+                require(few, "rng", "mt", "has 2^32 streams, but the run has more photons; use `rng` philox")
             }
-            Rng::Sobol => require(few, "--rng", "sobol", "has 2^32 points, but the run has more photons; use --rng philox"),
+            Rng::Sobol => require(few, "rng", "sobol", "has 2^32 points, but the run has more photons; use `rng` philox"),
         }
     }
 
@@ -338,7 +338,7 @@ impl RoomSettings {
         let twos = self.photons.trailing_zeros();
         (self.rng == Rng::Rand48 && twos >= 10).then(|| {
             format!(
-                "rand48 gives correlated streams for {} = {} * 2^{twos} photons per round, a multiple of a large power of two; use an odd --photons or --rng philox",
+                "rand48 gives correlated streams for {} = {} * 2^{twos} photons per round, a multiple of a large power of two; use an odd `photons` or `rng` philox",
                 self.photons,
                 self.photons >> twos
             )
@@ -375,8 +375,8 @@ pub const MAX_NEAREST_SUMMED: u64 = 1 << 31;
 
 /// Checks what both worlds have and allow alike, but for the most rounds.
 fn check_common((rounds, most_rounds): (u32, u32), group_size: u32, stop: &Stop) -> Result<()> {
-    within("--rounds", rounds, 1..=most_rounds, "rounds")?;
+    within("rounds", rounds, 1..=most_rounds, "rounds")?;
     let is_allowed = group_size.is_power_of_two() && (32..=1024).contains(&group_size);
-    require(is_allowed, "--group-size", group_size, "must be a power of two from 32 to 1024")?;
+    require(is_allowed, "group_size", group_size, "must be a power of two from 32 to 1024")?;
     stop.validate()
 }

@@ -218,37 +218,37 @@ const MAX_SHADOW_RAYS: u32 = 64;
 
 impl SceneSettings {
     pub fn validate(&self) -> Result<()> {
-        within("--photons", self.photons, 1..=MAX_PHOTONS, "photons of the global map, each round")?;
-        within("--caustic-photons", self.caustic_photons, 1..=MAX_PHOTONS, "photons of the caustic map, each round")?;
-        within("--bounces", self.bounces, 1..=MAX_BOUNCES, "bounces")?;
+        within("photons", self.photons, 1..=MAX_PHOTONS, "photons of the global map, each round")?;
+        within("caustic_photons", self.caustic_photons, 1..=MAX_PHOTONS, "photons of the caustic map, each round")?;
+        within("bounces", self.bounces, 1..=MAX_BOUNCES, "bounces")?;
         check_common((self.rounds, MAX_ROUNDS), self.group_size, &self.stop)?;
         if let Some(builder) = self.builder {
             let known = Builder::ON_GPU.map(Builder::name).join(", ");
             let allowed = format!("traces the paper's box only; for a scene choose one of {known}");
-            require(Builder::ON_GPU.contains(&builder), "--variant", builder.name(), allowed)?;
+            require(Builder::ON_GPU.contains(&builder), "variant", builder.name(), allowed)?;
         }
-        for (option, neighbours) in [("--neighbours", self.neighbours), ("--caustic-neighbours", self.caustic_neighbours)] {
+        for (option, neighbours) in [("neighbours", self.neighbours), ("caustic_neighbours", self.caustic_neighbours)] {
             within(option, neighbours, 1..=MAX_NEIGHBOURS, "photons of a round within the first radius")?;
         }
-        within("--shadow-rays", self.shadow_rays, 1..=MAX_SHADOW_RAYS, "shadow rays from each visible point, each round")?;
+        within("shadow_rays", self.shadow_rays, 1..=MAX_SHADOW_RAYS, "shadow rays from each visible point, each round")?;
         if let Some(block) = self.block {
             let is_allowed = block.is_power_of_two() && block <= MAX_BLOCK;
-            require(is_allowed, "--block", block, format!("must be a power of two up to {MAX_BLOCK}"))?;
+            require(is_allowed, "block", block, format!("must be a power of two up to {MAX_BLOCK}"))?;
         }
         let is_share = self.samples.is_power_of_two() && self.samples <= MAX_SAMPLES;
-        require(is_share, "--samples", self.samples, format!("must be a power of two up to {MAX_SAMPLES}"))?;
-        for (option, radius) in [("--radius", self.radius), ("--caustic-radius", self.caustic_radius)] {
+        require(is_share, "samples", self.samples, format!("must be a power of two up to {MAX_SAMPLES}"))?;
+        for (option, radius) in [("radius", self.radius), ("caustic_radius", self.caustic_radius)] {
             if let Some(radius) = radius {
                 require(radius.is_finite() && radius > 0.0, option, radius, "must be a number of metres above 0")?;
             }
         }
         let is_rate = self.alpha > 0.0 && self.alpha <= 1.0;
-        require(is_rate, "--alpha", self.alpha, "must be above 0 and at most 1 (1 keeps the radius fixed)")?;
+        require(is_rate, "alpha", self.alpha, "must be above 0 and at most 1 (1 keeps the radius fixed)")?;
         if let Some(chunk) = self.chunk {
-            within("--chunk", chunk, 1..=MAX_PHOTONS, "photons traced at once")?;
+            within("chunk", chunk, 1..=MAX_PHOTONS, "photons traced at once")?;
         }
         match self.with.iter().find(|effect| self.without.contains(effect)) {
-            Some(both) => Err(Error::setting("--without", both.name(), "is also in --with; choose one of the two")),
+            Some(both) => Err(Error::setting("without", both.name(), "is also in `with`; choose one of the two")),
             None => Ok(()),
         }
     }

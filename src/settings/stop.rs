@@ -60,12 +60,12 @@ impl Stop {
 
     pub fn validate(&self) -> Result<()> {
         if let Some(error) = self.error {
-            require((1e-6..=1.0).contains(&error), "--error", error, "must be from 0.0001 % to 100 %")?;
+            require((1e-6..=1.0).contains(&error), "error", error, "must be from 0.0001 % to 100 %")?;
         }
-        require(CONFIDENCES.contains(&self.confidence), "--confidence", self.confidence, "must be from 50 % to 99.99 %")?;
+        require(CONFIDENCES.contains(&self.confidence), "confidence", self.confidence, "must be from 50 % to 99.99 %")?;
         if let Some(seconds) = self.seconds {
-            require((1e-3..=1e6).contains(&seconds), "--time", seconds, "must be from 1ms to 1000000s")?;
+            require((1e-3..=1e6).contains(&seconds), "time", seconds, "must be from 1ms to 1000000s")?;
         }
-        require(self.photons != Some(0), "--total-photons", 0, "must be 1 or more")
+        require(self.photons != Some(0), "total_photons", 0, "must be 1 or more")
     }
 }

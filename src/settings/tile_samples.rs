@@ -47,11 +47,11 @@ impl TileSamples {
         let is_row = |row: &String| row.len() == columns && row.bytes().all(|digit| digit.is_ascii_digit());
         if self.rows.len() != rows || !self.rows.iter().all(is_row) {
             let allowed = format!("holds tiles of another picture than one of {width} x {height} pixels; leave it out, or make a new one");
-            return Err(Error::setting("--settings", "tiles", allowed));
+            return Err(Error::setting("settings", "tiles", allowed));
         }
         if u64::from(samples) << self.most() > u64::from(MAX_SAMPLES) {
             let allowed = format!("gives a pixel more than {MAX_SAMPLES} samples; make a new one");
-            return Err(Error::setting("--settings", "tiles", allowed));
+            return Err(Error::setting("settings", "tiles", allowed));
         }
         Ok(())
     }

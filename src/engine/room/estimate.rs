@@ -16,8 +16,8 @@ use crate::settings::Sums;
 /// Refuses sums that a device cannot make.
 pub fn check_sums(plan: &RoomPlan, facts: &DeviceFacts) -> Result<()> {
     let can_add = plan.settings.sums != Sums::Compensated || facts.int64_atomics;
-    let why = format!("needs 64-bit atomics, which {} lacks; use --sums integer or f32", facts.name);
-    require(can_add, "--sums", "compensated", why)
+    let why = format!("needs 64-bit atomics, which {} lacks; use `sums` integer or f32", facts.name);
+    require(can_add, "sums", "compensated", why)
 }
 
 /// Whether kernels see a film sum as one 64-bit word: a float has a 32-bit word of its own.

@@ -79,8 +79,8 @@ fn identity(keep: &mut Keep, scene: &RoomScene, plan: &RoomPlan, device: Option<
         Identity::new(name, content, settings, found, device, settings.math)
     })?;
     let is_kept = identity.is_some() || keep.share.of > 1;
-    let allowed = "must be integer with --checkpoint, --resume and --shard, whose sums are the same to the bit in any order";
-    require(!is_kept || settings.sums == Sums::Integer, "--sums", format!("{:?}", settings.sums).to_lowercase(), allowed)?;
+    let allowed = "must be integer with `checkpoint`, `resume` and `shard`, whose sums are the same to the bit in any order";
+    require(!is_kept || settings.sums == Sums::Integer, "sums", format!("{:?}", settings.sums).to_lowercase(), allowed)?;
     let (places, channels) = (plan.points.len(), plan.channel_count);
     keep.check_resumed(|saved| {
         matches!(&saved.film, SavedFilm::Room(film) if film.channel_count == channels)

@@ -173,7 +173,7 @@ pub(super) fn thread_pool(settings: &RoomSettings) -> Result<ThreadPool> {
     ThreadPoolBuilder::new()
         .num_threads(threads)
         .build()
-        .map_err(|error| Error::setting("--threads", threads, format!("cannot be started ({error}); ask for fewer")))
+        .map_err(|error| Error::setting("threads", threads, format!("cannot be started ({error}); ask for fewer")))
 }
 
 /// Fates bounce by bounce. What `--paranoid` found is noted.

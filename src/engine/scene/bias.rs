@@ -22,10 +22,10 @@ pub fn check(stop: &Stop, bias: BiasPlan) -> Result<()> {
     let ends_otherwise = stop.seconds.is_some() || stop.photons.is_some();
     let Some(wanted) = stop.error.filter(|_| bias == BiasPlan::Nothing && !ends_otherwise) else { return Ok(()) };
     let allowed = format!(
-        "cannot be reached: the bias is unknown, because {}; leave out what makes the scene so wide, give a --radius, or add --time",
+        "cannot be reached: the bias is unknown, because {}; leave out what makes the scene so wide, give a `radius`, or add `time`",
         Bias::UNKNOWN
     );
-    Err(Error::setting("--error", format!("{}%", 100.0 * wanted), allowed))
+    Err(Error::setting("error", format!("{}%", 100.0 * wanted), allowed))
 }
 
 /// The bias of all light at the plan's radii of the first round times `factor`, kept through so many rounds a batch;

@@ -296,7 +296,7 @@ impl SceneFilm {
         let lost = match self.plan.lost_off_surfaces {
             LostOffSurfaces::Nothing => "",
             LostOffSurfaces::Caustics => "light that point, spot, directional and disc lights send over mirrors and glass",
-            LostOffSurfaces::Lamps => "all light of lamps but the direct light of emissive meshes (--illumination photons)",
+            LostOffSurfaces::Lamps => "all light of lamps but the direct light of emissive meshes (`illumination` photons)",
         };
         OffSurfaces {
             points: numbers().count() as u64,

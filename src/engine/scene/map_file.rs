@@ -340,7 +340,7 @@ impl MapFile {
             let own = self.header.maps.iter().find(|own| own.name == map.name);
             let wanted = if map.caustic_only { surfaces } else { 0 };
             let Some(own) = own.filter(|own| (own.stored, own.caustic_surfaces) == (map.stored, wanted)) else {
-                let other = "make it again with the same --with and --without";
+                let other = "make it again with the same `with` and `without`";
                 return Err(self.refuse(format!("holds no {} map of the light that this run wants; {other}", map.name)));
             };
             (map.photons, map.flux_scale, map.flux_gain) = (own.photons, own.flux_scale, own.flux_gain);

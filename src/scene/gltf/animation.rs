@@ -89,7 +89,7 @@ impl Loader {
     /// Poses of the nodes that the first animation moves, by their numbers.
     pub(super) fn read_poses(&self, document: &Document, time: f64) -> Result<HashMap<usize, Pose>> {
         let Some(animation) = document.animations().next() else {
-            return Err(Error::setting("--at", time, "is a time of an animation, and the file has none; leave --at out"));
+            return Err(Error::setting("at", time, "is a time of an animation, and the file has none; leave `at` out"));
         };
         let name = called("animation", animation.name(), animation.index());
         let mut poses: HashMap<usize, Pose> = HashMap::new();

@@ -123,7 +123,7 @@ fn take_animations(root: &mut Value, is_posed: bool, nodes: &BTreeSet<usize>, le
     let animations = root.as_object_mut().and_then(|root| root.remove("animations"));
     let Some(Value::Array(mut animations)) = animations.filter(|animations| items(animations).next().is_some()) else { return };
     if !is_posed {
-        left_out.add("animations (--at SECONDS takes a pose of the first)", "");
+        left_out.add("animations (`at` SECONDS takes a pose of the first)", "");
         return;
     }
     if animations.len() > 1 {

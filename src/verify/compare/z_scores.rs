@@ -66,14 +66,14 @@ pub fn check(errors: &Picture, pair: &Pair) -> Result<(), String> {
         return Err(format!("is for linear pictures, and {} has display values; compare .exr pictures", pair.a.path.display()));
     }
     if errors.values == Values::Display {
-        return Err("has display values; name the .exr that render --error-image writes".into());
+        return Err("has display values; name the .exr that render `error_image` writes".into());
     }
     if (errors.width, errors.height) != (pair.a.width, pair.a.height) {
         return Err(format!("is {} and the pictures are {} pixels; name the errors of the same render", errors.size(), pair.a.size()));
     }
     if let Some(pixel) = errors.pixels.iter().position(|error| error.min_element() < 0.0) {
         let [x, y] = errors.place(pixel);
-        return Err(format!("is negative at column {x}, row {y}, as no standard error is; name the .exr that render --error-image writes"));
+        return Err(format!("is negative at column {x}, row {y}, as no standard error is; name the .exr that render `error_image` writes"));
     }
     Ok(())
 }
