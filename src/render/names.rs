@@ -15,6 +15,7 @@ const OTHERS: &[&str] = &[
     "judge",
     "memory",
     "only",
+    "output",
     "partial",
     "points",
     "preview",

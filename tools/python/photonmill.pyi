@@ -54,16 +54,48 @@ class Settings(TypedDict, total=False):
     45 s on a CPU, 1 s on a discrete GPU and 10 s on another.
     """
 
-    error: float | None
-    """End once noise and bias together are at most this share of the mean: 0.02 is 2 %."""
+    error: float | str | None
+    """End once noise and bias together are at most this share of the mean: 0.02, or "2%". More than 0.5 is refused as more likely per cent."""
     measure: Literal["rmse", "relmse"] | None
     """What the error is: the RMSE over the mean, or the root of relMSE."""
-    confidence: float | None
-    """Of bounds of errors; 0.95."""
-    time: float | None
-    """End after rounds of so many seconds; a pilot comes on top."""
+    confidence: float | str | None
+    """Of bounds of errors; 0.95, or "95%"."""
+    time: float | str | None
+    """End after rounds of so many seconds, or "2m"; does not include the pilot."""
     total_photons: int | None
     """End once so many photons were traced, in all rounds and maps."""
+    bias: bool | None
+    """Measure the bias in extra runs where measure is relmse; else it is estimated from the run's own blocks."""
+    checkpoint: str | PathLike[str] | None
+    """Write all sums into this file from time to time and at the end, so that resume can go on with them."""
+    every: float | str | None
+    """Seconds between two checkpoints, or "5m"; 30."""
+    resume: str | PathLike[str] | None
+    """Go on with the blocks of rounds that a checkpoint holds; the result is that of a run without a break, to the bit."""
+    shard: str | None
+    """Do every N-th block of rounds, from the K-th on: "K/N". `photonmill merge` adds the checkpoints of all of them."""
+    map: str | PathLike[str] | None
+    """Take the photons from a file of `photonmill map` instead of tracing them."""
+    settings: str | PathLike[str] | None
+    """Take what a pilot has chosen from a file of save_settings, and run no pilot."""
+    save_settings: str | PathLike[str] | None
+    """Write what the pilot has chosen for settings. Of pictures only."""
+    denoise: bool | None
+    """Remove noise from direct light in files of the picture with Open Image Denoise. Of pictures only."""
+    eye: Sequence[float] | None
+    """Where the camera stands, metres, in place of where the scene has it. This and the next six are of pictures only."""
+    look_at: Sequence[float] | None
+    """What it looks at, metres."""
+    up: Sequence[float] | None
+    """What is up in its picture, as a direction."""
+    fov: float | None
+    """Angle between the picture's lower and upper edge, degrees."""
+    orthographic: float | None
+    """Height of what the picture shows by parallel rays, metres."""
+    aperture: float | None
+    """Diameter of the camera's lens, metres; 0, a pinhole."""
+    focus: float | None
+    """Distance of the plane in focus, metres; that of what the middle of the picture shows."""
     rounds: int | None
     """Independent rounds, of which the result is the mean; 16 of points and texels without a goal."""
     block: int | None
@@ -77,7 +109,7 @@ class Settings(TypedDict, total=False):
     seed: int | None
     """Of the random numbers; 1. The same seed gives the same bits on one device."""
     neighbours: int | None
-    """Photons of a round that the first radius of the global map is to hold; 24."""
+    """Photons of a round within the first radius of the global map; 24."""
     caustic_neighbours: int | None
     """The same for the caustic map; 6, or a quarter of neighbours."""
     radius: float | None
@@ -86,6 +118,8 @@ class Settings(TypedDict, total=False):
     """The same for the caustic map."""
     alpha: float | None
     """How fast radii shrink, above 0 and at most 1, which keeps them (Knaus and Zwicker 2011); 2/3."""
+    fixed_radius: bool | None
+    """Keep the radius, as an alpha of 1 does."""
     kernel: Literal["box", "cone", "epanechnikov"] | None
     """Weight of a photon by its distance."""
     edge_correction: bool | None
@@ -112,6 +146,8 @@ class Settings(TypedDict, total=False):
     """Look for NaN and infinity; the report says where they come from."""
     chunk: int | None
     """Most photons traced at once; the same bits."""
+    group_size: int | None
+    """Invocations per work group, a power of two; 128. The same bits."""
     with_: str | Sequence[str] | None
     """Effects to simulate even if the scene does not need them, as `photonmill plan` names them."""
     without: str | Sequence[str] | None

@@ -84,7 +84,7 @@ impl Device {
     fn new(py: Python<'_>, name: Option<&Bound<'_, PyAny>>, memory: Option<u64>, validate: bool) -> PyResult<PyClassInitializer<Device>> {
         let device = name.map(name_of).transpose()?;
         if let Some(memory) = memory.filter(|memory| *memory < gpu::LEAST_MEMORY) {
-            return Err(error::argument(py, format!("memory {memory}: must be at least {} (bytes)", gpu::LEAST_MEMORY)));
+            return Err(error::argument(py, format!("memory={memory}: must be at least {} (bytes)", gpu::LEAST_MEMORY)));
         }
         open(py, Options { device, memory, validate, ..Options::default() })
     }

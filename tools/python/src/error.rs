@@ -2,6 +2,7 @@
 
 use photonmill::error::Error as Failure;
 use photonmill::render::names::spelled;
+use photonmill::text::echo;
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
@@ -44,7 +45,13 @@ pub fn argument(py: Python<'_>, message: impl Into<String>) -> PyErr {
 
 /// The exception for what the library says.
 pub fn of(py: Python<'_>, failure: &Failure) -> PyErr {
-    let message = in_python(&failure.to_string());
+    let message = match failure {
+        Failure::Setting { option, value, allowed } => format!("{}={}: {}", keyword(option), echo(value), in_python(allowed)),
+        Failure::DeviceAbsent { wanted, present } => {
+            format!("device={}: must match exactly one Vulkan device; available: {present}", echo(wanted))
+        }
+        other => in_python(&other.to_string()),
+    };
     match failure {
         Failure::Setting { .. } | Failure::DeviceAbsent { .. } => argument(py, message),
         _ => Error::new_err(message),

@@ -112,7 +112,7 @@ fn layers_of(py: Python<'_>, names: &[String]) -> PyResult<Vec<Layer>> {
 /// Stops of an exposure.
 fn stops_of(py: Python<'_>, exposure: Option<f32>) -> PyResult<Option<f32>> {
     match exposure.filter(|stops| !(-64.0..=64.0).contains(stops)) {
-        Some(stops) => Err(error::argument(py, format!("exposure {stops}: must be from -64 to 64 stops"))),
+        Some(stops) => Err(error::argument(py, format!("exposure={stops}: must be from -64 to 64 stops"))),
         None => Ok(exposure),
     }
 }

@@ -66,7 +66,7 @@ fn environment_of(value: &Bound<'_, PyAny>) -> PyResult<Environment> {
     let colour = value.extract::<f32>().map(|grey| [grey; 3]).or_else(|_| value.extract::<[f32; 3]>());
     match colour {
         Ok(colour) if colour.iter().all(|value| value.is_finite() && *value >= 0.0) => Ok(Environment::Colour(colour)),
-        Ok(_) => Err(error::argument(py, format!("environment {}: must be 0 or more and finite", value.repr()?))),
+        Ok(_) => Err(error::argument(py, format!("environment={}: must be 0 or more and finite", value.repr()?))),
         Err(_) => {
             let wrong = |_| PyTypeError::new_err("environment must be a number, three numbers, or the path of an .hdr or .exr");
             path_of(value, "environment").map(PathBuf::from).map(Environment::Picture).map_err(wrong)
@@ -82,7 +82,7 @@ fn size_of(value: &Bound<'_, PyAny>) -> PyResult<PictureSize> {
         (_, Ok([width, height])) => format!("{width}x{height}"),
         _ => return Err(PyTypeError::new_err("size must be a width or (width, height), whole numbers of pixels")),
     };
-    parse_size(&text).map_err(|allowed| error::argument(py, format!("size {text}: {allowed}")))
+    parse_size(&text).map_err(|allowed| error::argument(py, format!("size={text}: {allowed}")))
 }
 
 /// The points of a call: arrays of shape (n, 3).
@@ -134,7 +134,7 @@ impl Scene {
             sun.filter(|[azimuth, elevation]| !(azimuth.is_finite() && *elevation > 0.0 && *elevation <= 90.0))
         {
             let allowed = "must be azimuth and elevation in degrees; the elevation above 0 and at most 90";
-            return Err(error::argument(py, format!("sun ({azimuth}, {elevation}): {allowed}")));
+            return Err(error::argument(py, format!("sun=({azimuth}, {elevation}): {allowed}")));
         }
         let sun = sun.map(|[azimuth, elevation]| SunPosition { azimuth, elevation });
         let request = RenderRequest {
@@ -304,7 +304,7 @@ impl Scene {
 fn atlas_of(value: &Bound<'_, PyAny>) -> PyResult<Atlas> {
     let size = value.extract::<u32>().ok().filter(|size| (MIN_PAGE..=MAX_SIDE).contains(size)).map(Atlas::Size);
     let off = value.extract::<String>().ok().filter(|text| text == "off").map(|_| Atlas::Off);
-    let allowed = || format!("atlas {value}: must be a size in texels from {MIN_PAGE} to {MAX_SIDE}, or 'off'");
+    let allowed = || format!("atlas={value}: must be a size in texels from {MIN_PAGE} to {MAX_SIDE}, or 'off'");
     size.or(off).ok_or_else(|| error::argument(value.py(), allowed()))
 }
 

@@ -26,9 +26,14 @@ const ELSEWHERE: [&str; 11] = [
     "layers",
 ];
 
-/// The keyword that stands for a field: Python has words of its own.
+/// The keyword that stands for a field: Python has words and names of its own.
 pub fn keyword(field: &str) -> &str {
-    if field == "with" { "with_" } else { field }
+    match field {
+        "with" => "with_",
+        "output" => "path",
+        "SCENE" => "scene",
+        other => other,
+    }
 }
 
 /// The keyword arguments of a command's call.
