@@ -30,6 +30,13 @@ pub fn one_line(text: &str) -> String {
     echo(text.replace(|letter: char| letter.is_control(), " "))
 }
 
+/// A share, three significant digits.
+pub fn percent(share: f64) -> String {
+    let percent = 100.0 * share;
+    let decimals = if percent == 0.0 { 0 } else { (2 - percent.abs().log10().floor() as i32).clamp(0, 6) };
+    format!("{percent:.*} %", decimals as usize)
+}
+
 /// A length that is small, in the unit that suits it.
 pub fn in_metres(metres: f64) -> String {
     match metres {
@@ -68,6 +75,11 @@ mod tests {
     #[test]
     fn counts_have_the_right_number() {
         assert_eq!([0, 1, 2, 11].map(|count| counted(count, "round")), ["0 rounds", "1 round", "2 rounds", "11 rounds"]);
+    }
+
+    #[test]
+    fn shares_have_three_digits() {
+        assert_eq!([0.0, 0.001234, 0.05, 0.9996, 12.0].map(percent), ["0 %", "0.123 %", "5.00 %", "100.0 %", "1200 %"]);
     }
 
     #[test]

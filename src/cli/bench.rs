@@ -1,4 +1,4 @@
-//! `photonmill bench`: every pass beside the device's limits, and the targets.
+//! `photonmill bench`: every pass beside the device's limits.
 
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
@@ -15,7 +15,7 @@ use crate::measure::bench::experiment::Experiment;
 use crate::measure::bench::{self, Request, Size, table};
 use crate::output::destination::{Destination, Folder, check_distinct, write_all};
 use crate::render::Seconds;
-use crate::scene::{Scene, built_in};
+use crate::scene::Scene;
 
 #[derive(Args)]
 pub(super) struct BenchArgs {
@@ -27,17 +27,16 @@ pub(super) struct BenchArgs {
     /// Start no further experiment after this time: 90s, 10m
     #[arg(long, value_name = "TIME", value_parser = parse_seconds, allow_hyphen_values = true, default_value = "10m", help_heading = "When to stop")]
     time: Seconds,
-    /// Run only these experiments, separated by commas: open-box, builders, table-1, index, gather, cornell,
-    /// cornell-spheres, caustic-sphere, mesh, effects, compaction, tuning [default: all but tuning, which takes minutes a scene]
+    /// Run only these experiments, separated by commas: open-box, builders, table-1, index, gather, cornell, mesh,
+    /// compaction [default: all]
     #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = parse_experiment, help_heading = "Measurements")]
     only: Vec<Experiment>,
     /// Size of the experiments [default: full on a GPU, small on a CPU]
     #[arg(long, alias = "size", value_enum, value_name = "SIZE", help_heading = "Measurements")]
     workload: Option<WorkloadArg>,
-    /// Built-in scenes or glTF files, separated by commas: `compaction` compares the builders in the first, beside the paper's box, and
-    /// `tuning` settings in each, under a sky where nothing shines [default: cornell-spheres; of tuning all built-in scenes]
-    #[arg(long, value_name = "SCENE", value_delimiter = ',', help_heading = "Measurements")]
-    scene: Vec<String>,
+    /// Built-in scene or glTF file in which `compaction` compares the builders, beside the paper's box
+    #[arg(long, value_name = "SCENE", default_value = "cornell-spheres", help_heading = "Measurements")]
+    scene: String,
     /// Measure time and memory against the number of photons and of triangles instead
     #[arg(long, conflicts_with = "only", help_heading = "Measurements")]
     scale: bool,
@@ -51,13 +50,13 @@ pub(super) struct BenchArgs {
 enum WorkloadArg {
     /// Seconds in all
     Small,
-    /// That of the performance targets, which takes minutes
+    /// Minutes in all
     Full,
 }
 
 fn parse_experiment(name: &str) -> std::result::Result<Experiment, String> {
-    Experiment::all().find(|experiment| experiment.name() == name).ok_or_else(|| {
-        let names: Vec<&str> = Experiment::all().map(Experiment::name).collect();
+    Experiment::ALL.into_iter().find(|experiment| experiment.name() == name).ok_or_else(|| {
+        let names = Experiment::ALL.map(Experiment::name);
         format!("must be one of {}", names.join(", "))
     })
 }
@@ -69,17 +68,7 @@ pub(super) fn run(args: &BenchArgs, cancelled: &AtomicBool) -> Result<End> {
     let in_folder = folder.iter().map(|folder| folder.file("bench.json"));
     check_distinct(&json.iter().cloned().chain(in_folder).collect::<Vec<_>>())?;
     let reporter = ProgressReporter::new(&args.progress);
-    let scenes = match (args.scene.is_empty(), args.only.contains(&Experiment::Tuning)) {
-        (true, true) => {
-            // That of `compaction` first.
-            let mut names = built_in::names();
-            names.sort_by_key(|name| *name != "cornell-spheres");
-            names
-        }
-        (true, false) => vec!["cornell-spheres"],
-        _ => args.scene.iter().map(String::as_str).collect(),
-    };
-    let scenes = scenes.into_iter().map(|name| Scene::open(name, false)).collect::<Result<Vec<Scene>>>()?;
+    let scene = Scene::open(&args.scene, false)?;
     let gpu = Gpu::open(&args.device.steady())?;
     reporter.device(Some(&gpu));
     let usual = if gpu.facts().kind == "cpu" { WorkloadArg::Small } else { WorkloadArg::Full };
@@ -89,8 +78,8 @@ pub(super) fn run(args: &BenchArgs, cancelled: &AtomicBool) -> Result<End> {
             WorkloadArg::Small => Size::Small,
             WorkloadArg::Full => Size::Full,
         },
-        experiments: if args.only.is_empty() { Experiment::USUAL.to_vec() } else { args.only.clone() },
-        scenes,
+        experiments: if args.only.is_empty() { Experiment::ALL.to_vec() } else { args.only.clone() },
+        scene: Some(scene),
         scale: args.scale,
         budget: Duration::from_secs_f64(args.time.0),
     };

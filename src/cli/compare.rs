@@ -11,11 +11,11 @@ use crate::error::{Error, Result, require, within};
 use crate::output::destination::{Destination, check_distinct, check_not_read, write_all};
 use crate::output::exr_file;
 use crate::render::Percent;
+use crate::text::percent;
 use crate::verify::compare::Comparison;
 use crate::verify::compare::false_colour::Show;
 use crate::verify::compare::pair::Pair;
 use crate::verify::compare::picture::Picture;
-use crate::verify::compare::report::percent;
 use crate::verify::compare::z_scores::{self, ZScores};
 
 #[derive(Args)]

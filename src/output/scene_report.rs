@@ -19,7 +19,7 @@ use crate::plan::work_division::MapVariance;
 use crate::scene::geometry::Geometry;
 use crate::settings::scene::{Effect, SceneSettings};
 use crate::settings::stop::Stop;
-use crate::text::counted;
+use crate::text::{counted, percent};
 use crate::timings::Timings;
 
 /// A row of the plan: what was decided, and after a run what it cost and gave.
@@ -112,9 +112,9 @@ pub fn pilot_table(pilot: &Pilot, stop: &Stop, point: &str) -> String {
         let tile = counted(more, "tile");
         writeln!(text, "{tile} of 4 x 4 pixels have more paths than the others, up to {} times as many", 1 << tiles.most()).unwrap();
     }
-    let bias = if rounds.counts_bias { format!(", and a bias of the radius of {} %", percent(parts.bias)) } else { String::new() };
+    let bias = if rounds.counts_bias { format!(", and a bias of the radius of {}", percent(parts.bias)) } else { String::new() };
     text + &format!(
-        "expected: noise of {} %{bias}, with their bounds {} %",
+        "expected: noise of {}{bias}, with their bounds {}",
         percent(noise.sqrt()),
         percent(rounds.error(*chosen, expected.into()))
     )
@@ -127,17 +127,11 @@ fn expected(pilot: &Pilot, stop: &Stop) -> String {
     match (stop.error, stop.seconds) {
         (Some(error), most) if most.is_none_or(|most| until(error) <= most) => {
             let half = 0.5 * error;
-            format!("{} % takes about {}, {} % {}", percent(error), seconds(until(error)), percent(half), seconds(until(half)))
+            format!("{} takes about {}, {} {}", percent(error), seconds(until(error)), percent(half), seconds(until(half)))
         }
-        (_, Some(most)) => format!("about {} % after {}", percent(rounds.after(*chosen, most)), seconds(most)),
+        (_, Some(most)) => format!("about {} after {}", percent(rounds.after(*chosen, most)), seconds(most)),
         _ => String::new(),
     }
-}
-
-/// Two digits.
-fn percent(error: f64) -> String {
-    let percent = 100.0 * error;
-    if percent < 10.0 { format!("{}", (percent * 100.0).round() / 100.0) } else { format!("{percent:.0}") }
 }
 
 fn seconds(seconds: f64) -> String {

@@ -12,9 +12,9 @@ fn the_gallery_has_its_pictures_and_a_page_that_loads_nothing() {
     place.succeed("gallery -o g --size 24 --error 50% --time 2s");
     let page = place.text("g/index.html");
     assert!(page.len() < 3_000_000 && !page.contains("http") && !page.contains("Incomplete"), "{} bytes", page.len());
-    assert_eq!(page.matches("data:image/jpeg;base64,").count(), 11);
+    assert_eq!(page.matches("data:image/jpeg;base64,").count(), 14);
     assert_eq!(page.matches(", error at most ").count(), 11);
-    for name in ["caustic", "error", "without-caustics", "sunlit-room", "dispersion", "lightmaps"] {
+    for name in ["caustic", "error", "without-caustics", "sunlit-room", "dispersion", "lightmaps/floor"] {
         assert!(place.path().join(format!("g/{name}.png")).is_file(), "{name}");
     }
     // A command on the page makes the picture beside it.

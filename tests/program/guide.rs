@@ -1,6 +1,4 @@
-//! README and guide: commands run, tables are those of their sources, links and options exist.
-//!
-//! `PHOTONMILL_WRITE_GUIDE=1 cargo test --test tests guide::` writes the tables anew.
+//! README and guide: commands run, links and options exist.
 
 use std::fs;
 
@@ -8,11 +6,7 @@ use crate::common::gltf_file::{square, square_buffer};
 use crate::common::prelude::*;
 use crate::common::program::on_device;
 use crate::common::sources::{files, read, root};
-use photonmill::measure::bench::table::scaled;
-use photonmill::measure::bench::targets::{TARGETS, Target, Wanted};
-use photonmill::output::words::number;
 use photonmill::scene::gltf::source::binary_file;
-use serde_json::Value;
 
 /// Pages of the guide by path, without `links.md`, which is no page.
 fn pages() -> Vec<(String, String)> {
@@ -47,13 +41,15 @@ fn commands(text: &str) -> Vec<String> {
 }
 
 /// Commands that start so are not run, and why.
-const NOT_RUN: [(&str, &str); 17] = [
+const NOT_RUN: [(&str, &str); 19] = [
     ("pip install ", "builds a wheel; `tools/python/test` does, and runs what the page shows"),
     ("tools/setup && tools/test", "runs this test"),
     ("tools/setup && cargo build", "takes minutes; whatever it builds is here"),
     ("export PATH", "is for the user's shell"),
     ("tools/test", "runs this test"),
     ("tools/bench/run ", "writes into the repository"),
+    ("tools/bench/targets ", "measures for minutes what only an H200 is judged by"),
+    ("tools/bench/tuning ", "takes an hour"),
     ("tools/bench_peers", "installs other programs"),
     ("tools/fuzz/run ", "needs a nightly toolchain"),
     ("tools/faults", "takes half an hour; `tests/engine/failures.rs` has short forms"),
@@ -371,54 +367,6 @@ fn built_in_scenes_are_in_the_guide() {
     for name in built_in::names() {
         assert!(text.contains(&format!("`{name}`")), "{name}");
     }
-}
-
-/// The part of a text between the marks of a table that is written from a source.
-fn written<'a>(text: &'a str, name: &str) -> &'a str {
-    let (_, rest) = text.split_once(&format!("<!-- {name}: ")).expect("the table has its mark");
-    let (_, rest) = rest.split_once("-->\n").expect("the mark is a comment");
-    rest.split_once(&format!("<!-- end of {name} -->")).expect("the table has an end").0
-}
-
-/// Compares, or with `PHOTONMILL_WRITE_GUIDE=1` writes.
-fn table_is(path: &str, name: &str, table: &str) {
-    let text = read(path);
-    if std::env::var_os("PHOTONMILL_WRITE_GUIDE").is_some() {
-        let now = written(&text, name);
-        let start = now.as_ptr() as usize - text.as_ptr() as usize;
-        fs::write(root(path), [&text[..start], table, &text[start + now.len()..]].concat()).unwrap();
-        return;
-    }
-    assert_eq!(written(&text, name), table, "{path}: PHOTONMILL_WRITE_GUIDE=1 cargo test --test tests guide:: writes it anew");
-}
-
-/// Three digits with a unit.
-fn quantity(value: f64, unit: &str) -> String {
-    match unit {
-        "/s" => scaled(value) + "/s",
-        "s" if value < 1.0 => number(1e3 * value) + " ms",
-        unit => format!("{value:.2} {unit}"),
-    }
-}
-
-#[test]
-fn targets_in_the_guide_are_those_of_bench() {
-    let bench: Value = serde_json::from_str(&read("tools/bench/h200/bench.json")).unwrap();
-    let findings = bench["targets"].as_array().unwrap();
-    assert_eq!(findings.len(), TARGETS.len());
-    let row = |(target, finding): (&Target, &Value)| {
-        assert_eq!(finding["unit"], target.unit);
-        let value = |value: f64| quantity(value, target.unit);
-        let wanted = match target.wanted {
-            Wanted::AtLeast(least) => format!("at least {}", value(least)),
-            Wanted::AtMost(most) => format!("at most {}", value(most)),
-        };
-        let limit = finding["limit"].as_f64().map_or("-".to_owned(), value);
-        format!("| {} | {wanted} | {} | {limit} | {} |\n", target.work, value(finding["found"].as_f64().unwrap()), target.peer)
-    };
-    let rows: String = TARGETS.iter().zip(findings).map(row).collect();
-    let head = "\n| work | target | found | the device's limit | peer |\n| --- | --- | --- | --- | --- |\n";
-    table_is("src/guide/performance.md", "targets", &format!("{head}{rows}\n"));
 }
 
 /// The table of the same page is checked by `tests/light/hard_cases.rs`.

@@ -1,10 +1,9 @@
 //! How close every pass comes to the device's limits (roofline).
 //!
 //! [`rates`] measures what the device can do, [`room`] and [`scene`] time the passes of both worlds beside what
-//! they cannot do without ([`pass`]), [`experiments`] runs the workloads that the targets name ([`targets`]), and [`scale`]
-//! follows cost and memory over photons and triangles.
+//! they cannot do without ([`pass`]), [`experiments`] runs the workloads, and [`scale`] follows cost and memory over
+//! photons and triangles.
 
-pub mod accuracy;
 pub mod chart;
 pub mod experiment;
 pub mod experiments;
@@ -15,8 +14,6 @@ pub mod room;
 pub mod scale;
 pub mod scene;
 pub mod table;
-pub mod targets;
-pub mod tuning;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -32,8 +29,6 @@ use experiment::Experiment;
 use pass::Pass;
 use rates::Rates;
 use scale::Scale;
-use targets::Finding;
-use tuning::Tuned;
 
 /// How large the workloads are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -41,7 +36,7 @@ use tuning::Tuned;
 pub enum Size {
     /// Seconds on a software device.
     Small,
-    /// Those of the targets; on a software device smaller ones, minutes in all.
+    /// Minutes in all; on a software device smaller ones.
     Full,
 }
 
@@ -53,9 +48,9 @@ pub struct Request {
     pub size: Size,
     #[serde(skip)]
     pub experiments: Vec<Experiment>,
-    /// Builders are compared in the first, beside the paper's box, and settings in each.
+    /// Builders are compared in it, beside the paper's box.
     #[serde(skip)]
-    pub scenes: Vec<Scene>,
+    pub scene: Option<Scene>,
     /// Follow cost over photons and triangles instead.
     #[serde(skip)]
     pub scale: bool,
@@ -74,11 +69,8 @@ pub struct Bench {
     pub vulkan: String,
     pub rates: Rates,
     pub passes: Vec<Pass>,
-    pub targets: Vec<Finding>,
     /// The fastest builder by photon count, in a closed room by survival, and in a scene.
     pub compaction: Option<Map>,
-    /// What a pilot chooses beside the best of a search.
-    pub tuning: Vec<Tuned>,
     pub scale: Option<Scale>,
     /// What was not measured, and why.
     pub left_out: Vec<String>,
@@ -88,7 +80,7 @@ pub struct Bench {
 pub struct Lab<'a> {
     pub gpu: &'a Gpu,
     pub rates: Rates,
-    pub scenes: &'a [Scene],
+    pub scene: Option<&'a Scene>,
     pub size: Size,
     pub deadline: Instant,
     pub cancelled: &'a AtomicBool,
@@ -132,8 +124,8 @@ pub fn run(gpu: &Gpu, request: Request, cancelled: &AtomicBool, tell: &mut dyn F
     let deadline = Instant::now() + request.budget;
     tell("limits of the device");
     let rates = rates::measure(gpu, request.size)?;
-    let scenes = &request.scenes.clone();
-    let mut lab = Lab { gpu, rates, scenes, size: request.size, deadline, cancelled, tell };
+    let scene = request.scene.clone();
+    let mut lab = Lab { gpu, rates, scene: scene.as_ref(), size: request.size, deadline, cancelled, tell };
     let facts = gpu.facts();
     let mut bench = Bench {
         photonmill: env!("CARGO_PKG_VERSION"),
@@ -142,9 +134,7 @@ pub fn run(gpu: &Gpu, request: Request, cancelled: &AtomicBool, tell: &mut dyn F
         vulkan: facts.vulkan.clone(),
         rates,
         passes: Vec::new(),
-        targets: Vec::new(),
         compaction: None,
-        tuning: Vec::new(),
         scale: None,
         left_out: Vec::new(),
         request,

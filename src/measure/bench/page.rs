@@ -1,11 +1,10 @@
-//! A bench as a page: the targets, how close every pass comes to the device's limits, and the charts; all numbers fold away.
+//! A bench as a page: how close every pass comes to the device's limits, and the charts; all numbers fold away.
 
 use maud::{Markup, html};
 
 use super::pass::Pass;
-use super::table::{quantity, text, wanted};
-use super::targets::Finding;
-use super::{Bench, chart as charts, tuning};
+use super::table::text;
+use super::{Bench, chart as charts};
 use crate::measure::compaction;
 use crate::output::page::{chart, page, table};
 use crate::output::words::duration;
@@ -17,15 +16,10 @@ pub fn html(bench: &Bench) -> String {
             h1 { (title) }
             p.soft { "photonmill " (bench.photonmill) ", driver " (bench.driver) ", Vulkan " (bench.vulkan) ". " code { (bench.request.command) } }
         }
-        @if !bench.targets.is_empty() { (targets(&bench.targets)) }
         @if !bench.passes.is_empty() { (passes(&bench.passes)) }
         @if let Some(map) = &bench.compaction {
             h2 { "Fastest builder by photon count and survival" }
             (chart(Some(compaction::chart::draw(map)), "Each cell has the fastest builder, its speed relative to one atomic per thread, and the builders that are not significantly slower."))
-        }
-        @if !bench.tuning.is_empty() {
-            h2 { "What the pilot chooses, beside the best of a search" }
-            div.scroll { pre { (tuning::text(&bench.tuning)) } }
         }
         @if let Some(scale) = &bench.scale {
             @for series in scale.series.iter().filter(|series| !series.steps.is_empty()) {
@@ -37,22 +31,6 @@ pub fn html(bench: &Bench) -> String {
         details { summary { "All numbers" } div.scroll { pre { (text(bench)) } } }
     };
     page(&title, &content)
-}
-
-fn targets(findings: &[Finding]) -> Markup {
-    let head = html! { tr { th.name { "Work" } th { "target" } th { "found" } th { "the device's limit" } th { "met" } } };
-    let row = |finding: &Finding| {
-        let Finding { target, found, limit, met, how } = finding;
-        let value = |value: f64| quantity(value, target.unit);
-        html! {
-            tr {
-                th scope="row" { (target.work) small { (how) } }
-                td { (wanted(target)) } td { (value(*found)) } td { (limit.map_or_else(|| "-".to_owned(), value)) }
-                td { (met.map_or("H200 only", |met| if met { "yes" } else { "no" })) }
-            }
-        }
-    };
-    html! { h2 { "Targets" } (table(&head, &html! { @for finding in findings { (row(finding)) } })) }
 }
 
 /// A bar for each pass: the share of the device's limit that it reaches.

@@ -51,10 +51,6 @@ pub struct Timed {
     pub counts: Counts,
     /// Of a round, all passes together.
     pub round_ms: f64,
-    /// Of the run on the device, buffers' content and all.
-    pub run_ms: f64,
-    /// The same on the host's clock.
-    pub wall_ms: f64,
     /// Of a round.
     pub dispatches: f64,
     pub memory: HeldMemory,
@@ -75,36 +71,15 @@ impl Timed {
     ) -> Timed {
         let scopes = rounds_of(&run.timings, rounds, first);
         let pass = |(name, ms): &(String, Vec<f64>)| Some(Pass::new(workload, name, Spread::of(ms.clone())?, work(name), rates));
-        let sum = |scope: &str| run.timings.row(scope).and_then(|row| row.gpu_ms).unwrap_or(0.0);
         Timed {
             passes: scopes.iter().filter_map(pass).collect(),
             counts: Counts::of(&run.fates[0], rounds),
             round_ms: sum_of_outermost(&scopes),
-            run_ms: sum("set-up") + sum("round"),
-            wall_ms: run.timings.row("run").and_then(|row| row.wall_ms).unwrap_or(f64::NAN),
             dispatches: run.dispatches as f64 / f64::from(rounds),
             memory,
             stated_bytes: 0,
             counters: 1,
         }
-    }
-
-    pub fn pass(&self, name: &str) -> Option<&Pass> {
-        self.passes.iter().find(|pass| pass.name == name)
-    }
-
-    pub fn ms(&self, name: &str) -> f64 {
-        self.pass(name).map_or(f64::NAN, |pass| pass.ms.median)
-    }
-
-    /// Milliseconds that a pass takes at least.
-    pub fn limit_ms(&self, name: &str) -> Option<f64> {
-        self.pass(name)?.limit.map(|limit| limit.ms)
-    }
-
-    /// The same of all outermost passes together.
-    pub fn limit_of_round(&self) -> Option<f64> {
-        self.passes.iter().filter(|pass| !pass.name.contains('/')).map(|pass| pass.limit.map(|limit| limit.ms)).sum()
     }
 }
 
@@ -134,14 +109,11 @@ pub fn time(gpu: &Gpu, rates: &Rates, settings: &RoomSettings, cancelled: &Atomi
 }
 
 /// Times a run as it is, all rounds; a first one is dropped.
-pub fn time_run(gpu: &Gpu, rates: &Rates, settings: &RoomSettings, cancelled: &AtomicBool) -> Result<Vec<Timed>> {
-    let mut runs = Vec::new();
-    for _ in 0..=REPEATS {
-        gpu.forget_peaks();
-        let outcome = run_once(gpu, settings, cancelled)?;
-        runs.push(timed(gpu, rates, &outcome, settings.rounds, 0));
-    }
-    Ok(runs.split_off(1))
+pub fn time_run(gpu: &Gpu, rates: &Rates, settings: &RoomSettings, cancelled: &AtomicBool) -> Result<Timed> {
+    run_once(gpu, settings, cancelled)?;
+    gpu.forget_peaks();
+    let outcome = run_once(gpu, settings, cancelled)?;
+    Ok(timed(gpu, rates, &outcome, settings.rounds, 0))
 }
 
 fn timed(gpu: &Gpu, rates: &Rates, outcome: &RunResult, rounds: u32, first: u32) -> Timed {

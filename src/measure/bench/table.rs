@@ -1,10 +1,9 @@
-//! A bench as text: the device's rates, every pass with its limit, and the targets.
+//! A bench as text: the device's rates, and every pass with its limit.
 
+use super::Bench;
 use super::pass::Pass;
 use super::rates::Rates;
 use super::scale::{Growth, PassTime, Series};
-use super::targets::{Finding, Target, Wanted};
-use super::{Bench, tuning};
 use crate::output::command::lower_case;
 use crate::timings::Spread;
 
@@ -12,14 +11,8 @@ pub fn text(bench: &Bench) -> String {
     let mut text = format!("{}, driver {}, Vulkan {}\n{}\n\n", bench.device, bench.driver, bench.vulkan, bench.request.command);
     rates(&mut text, &bench.rates);
     passes(&mut text, &bench.passes);
-    if !bench.targets.is_empty() {
-        targets(&mut text, &bench.targets);
-    }
     if let Some(map) = &bench.compaction {
         text += &format!("\n{}", map.text());
-    }
-    if !bench.tuning.is_empty() {
-        text += &format!("\n{}", tuning::text(&bench.tuning));
     }
     bench.scale.iter().flat_map(|scale| &scale.series).for_each(|series| growth(&mut text, series));
     bench.left_out.iter().for_each(|line| text += &format!("not measured: {line}\n"));
@@ -46,7 +39,7 @@ fn growth(text: &mut String, Series { over, steps, growth }: &Series) {
 }
 
 /// Three significant digits and a thousands' letter: 4.80 T.
-pub fn scaled(value: f64) -> String {
+fn scaled(value: f64) -> String {
     if !value.is_finite() {
         return "-".to_owned();
     }
@@ -55,16 +48,6 @@ pub fn scaled(value: f64) -> String {
     let value = value / unit;
     let decimals = (2.0 - value.log10().floor().clamp(0.0, 2.0)) as usize;
     format!("{value:.decimals$}{letter}")
-}
-
-/// The same with its unit; seconds below one as milliseconds.
-pub fn quantity(value: f64, unit: &str) -> String {
-    match unit {
-        _ if !value.is_finite() => "-".to_owned(),
-        "/s" => scaled(value) + "/s",
-        "s" if value < 1.0 => format!("{:.3} ms", 1e3 * value),
-        unit => format!("{value:.2} {unit}"),
-    }
 }
 
 fn rates(text: &mut String, rates: &Rates) {
@@ -107,26 +90,6 @@ fn passes(text: &mut String, passes: &[Pass]) {
     }
 }
 
-pub fn wanted(target: &Target) -> String {
-    match target.wanted {
-        Wanted::AtLeast(least) => format!(">= {}", quantity(least, target.unit)),
-        Wanted::AtMost(most) => format!("<= {}", quantity(most, target.unit)),
-    }
-}
-
-fn targets(text: &mut String, findings: &[Finding]) {
-    *text += &format!("\n{:<14} {:>11} {:>11} {:>9}  work\n", "target", "found", "limit", "met");
-    for Finding { target, found, limit, met, how } in findings {
-        let value = |value: f64| quantity(value, target.unit);
-        let wanted = wanted(target);
-        let met = met.map_or("H200 only", |met| if met { "yes" } else { "no" });
-        let limit = limit.map_or("-".to_owned(), value);
-        *text += &format!("{wanted:<14} {:>11} {limit:>11} {met:>9}  {}\n", value(*found), target.work);
-        let peer = if target.peer == "-" { String::new() } else { format!("; {}", target.peer) };
-        *text += &format!("{:50}{how}{peer}\n", "");
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -134,7 +97,5 @@ mod tests {
     #[test]
     fn rates_have_three_digits_and_a_letter() {
         assert_eq!([4.8e12, 2.04e10, 999e6, 1234.0, 0.5, f64::NAN].map(scaled), ["4.80 T", "20.4 G", "999 M", "1.23 k", "0.50", "-"]);
-        assert_eq!([quantity(0.0012, "s"), quantity(2.5, "s"), quantity(1.1, "x")], ["1.200 ms", "2.50 s", "1.10 x"]);
-        assert_eq!([quantity(2e10, "/s"), quantity(f64::NAN, "x")], ["20.0 G/s", "-"]);
     }
 }

@@ -2,12 +2,14 @@
 
 use maud::{Markup, html};
 
-use super::findings::{self, Row, clock, equal_error, equal_time, percent};
+use super::findings::{Row, clock, equal_error, equal_time};
 use super::point::{Curve, Point};
 use super::{Part, Study, chart as charts};
 use crate::measure::compaction::{self, Map};
+use crate::measure::interval::CONFIDENCE_IN_WORDS;
 use crate::output::page::{chart, table};
 use crate::output::words::{count, duration, times};
+use crate::text::percent;
 
 pub fn of_builders(map: &Map) -> Markup {
     let is_scene = map.cells.iter().all(|cell| cell.scene.is_some());
@@ -68,8 +70,7 @@ fn front(part: &Part) -> Markup {
 
 /// All configurations at the same time or the same error.
 fn equal(title: &str, what: &str, rows: &[Row], show: impl Fn(f64) -> String) -> Markup {
-    let head =
-        html! { tr { th.name { (title) } th { (what) } th { (findings::words_of_confidence()) " interval" } th { "relative to base" } } };
+    let head = html! { tr { th.name { (title) } th { (what) } th { (CONFIDENCE_IN_WORDS) " interval" } th { "relative to base" } } };
     let body = html! {
         @for Row { name, value, ratio } in rows {
             tr {
@@ -92,7 +93,7 @@ fn equal(title: &str, what: &str, rows: &[Row], show: impl Fn(f64) -> String) ->
 }
 
 fn points(curve: &Curve) -> Markup {
-    let head = html! { tr { th { "rounds" } th { "photons" } th { "time (median)" } th { "fastest to slowest" } th { "wall" } th { "error" } th { (findings::words_of_confidence()) " interval" } th { "noise" } th { "bias" } } };
+    let head = html! { tr { th { "rounds" } th { "photons" } th { "time (median)" } th { "fastest to slowest" } th { "wall" } th { "error" } th { (CONFIDENCE_IN_WORDS) " interval" } th { "noise" } th { "bias" } } };
     html! {
         details {
             summary { (curve.label) ": all points" }
@@ -125,7 +126,7 @@ pub fn how(study: &Study) -> Markup {
             summary { h2 { "How this was measured" } }
             ul {
                 li { "Error: RMS difference from the reference, relative to the RMS of the reference. The contribution of the reference's own noise is subtracted." }
-                li { "Noise is the error that differs between runs with different seeds. Bias is the error that they share. Both are computed from the " (study.request.repeats) " runs of a point. Intervals and bands are " (findings::words_of_confidence()) " confidence intervals (Student's t over those runs); few runs give wide bands." }
+                li { "Noise is the error that differs between runs with different seeds. Bias is the error that they share. Both are computed from the " (study.request.repeats) " runs of a point. Intervals and bands are " (CONFIDENCE_IN_WORDS) " confidence intervals (Student's t over those runs); few runs give wide bands." }
                 li { "Time: device time of all rounds by timestamps, without set-up; the CPU builder uses the host's clock. Warm-up work before each run brings the device to its full clock. The time of a point is the median of its runs; the fastest and the slowest run show the drift of the clock." }
                 li { "Times to reach an error are interpolated linearly between points on logarithmic scales, and never extrapolated." }
                 li { "Each command repeats the first run of its point. The other runs use the seeds that follow." }

@@ -1,22 +1,19 @@
 //! Conclusions from the points: time to reach an error, cost and gain of each option, the Pareto front, tables, CSV.
 
 use super::axes::Axis;
-use super::point::{CONFIDENCE, Curve, Estimate, Point};
+use super::point::{Curve, Point};
 use super::{Comparison, Part, Study};
+use crate::measure::interval::{CONFIDENCE, Interval};
 use crate::measure::paper::published;
 use crate::output::csv_table::{Column, csv_table};
 use crate::output::words::{count, duration, number};
-use crate::text::counted;
+use crate::text::{counted, percent};
 
 /// Relative errors that people ask for, the largest first.
 const ASKED: [f64; 10] = [0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 0.0005];
 
-pub fn percent(share: f64) -> String {
-    format!("{}\u{a0}%", number(100.0 * share))
-}
-
 /// 'from a to b', or that nothing is known.
-pub fn between(estimate: Estimate, show: impl Fn(f64) -> String) -> String {
+pub fn between(estimate: Interval, show: impl Fn(f64) -> String) -> String {
     // Beyond that it is no knowledge.
     if estimate.low > 0.0 && estimate.high < 100.0 * estimate.low {
         format!("{} to {}", show(estimate.low), show(estimate.high))
@@ -159,8 +156,8 @@ const NEXT_TO_NOTHING: f64 = 1.02;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Effect {
     /// The time to this error over the base's, and that it is significantly more or less.
-    Differs(f64, Estimate),
-    Undecided(f64, Estimate),
+    Differs(f64, Interval),
+    Undecided(f64, Interval),
     /// The best errors that it and the base reach, and after how many milliseconds: the two have no error in common.
     Apart([(f64, f64); 2]),
     /// The budget allowed one point, which compares nothing.
@@ -214,7 +211,7 @@ impl Choice<'_> {
                 format!("{name} takes {} as long as the base to reach {at} ({interval}).", ratio(longer.value))
             }
             Effect::Differs(error, longer) => {
-                let faster = Estimate { value: 1.0 / longer.value, low: 1.0 / longer.high, high: 1.0 / longer.low };
+                let faster = Interval { value: 1.0 / longer.value, low: 1.0 / longer.high, high: 1.0 / longer.low };
                 format!(
                     "{name} is {} as fast as the base in reaching {} ({}).",
                     ratio(faster.value),
@@ -332,13 +329,13 @@ fn then_and_now(base: &Curve) -> Vec<String> {
 pub struct Row {
     pub name: String,
     /// The value, or why there is none.
-    pub value: Result<Estimate, String>,
+    pub value: Result<Interval, String>,
     /// Over the value of the base that was measured in turn with it.
     pub ratio: Option<f64>,
 }
 
 /// All curves and, in every comparison, what `value` says of them; the base stands first, once.
-fn rows(part: &Part, value: impl Fn(&Curve) -> Result<Estimate, String>) -> Vec<Row> {
+fn rows(part: &Part, value: impl Fn(&Curve) -> Result<Interval, String>) -> Vec<Row> {
     let of_base = |base: &Curve| Row { name: format!("base: {}", base.label), value: value(base), ratio: None };
     let mut rows: Vec<Row> = part.base().map(of_base).into_iter().collect();
     for comparison in &part.comparisons {
@@ -438,11 +435,6 @@ pub fn csv(study: &Study) -> Vec<u8> {
 
 pub fn clock(point: &Point) -> &'static str {
     if point.gpu_ms.iter().all(Option::is_some) { "gpu" } else { "wall" }
-}
-
-/// What intervals are.
-pub fn words_of_confidence() -> String {
-    format!("{} %", 100.0 * CONFIDENCE)
 }
 
 #[cfg(test)]

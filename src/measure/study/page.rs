@@ -4,13 +4,13 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, PreEscaped, html};
 
-use super::findings::{Choice, Effect, between, percent, ratio};
-use super::point::Estimate;
+use super::findings::{Choice, Effect, between, ratio};
 use super::strip::{Frame, Strip};
 use super::{Part, Study, chart as charts, details, summary};
+use crate::measure::interval::Interval;
 use crate::output::page::{chart, page, software_notice, table};
 use crate::output::words::duration;
-use crate::text::counted;
+use crate::text::{counted, percent};
 
 pub fn html(study: &Study) -> String {
     let title = format!("What accuracy costs in time: {}", study.title);
@@ -159,7 +159,7 @@ fn row(choice: &Choice) -> Markup {
     }
 }
 
-fn measured(name: &str, error: f64, longer: Estimate, undecided: bool) -> Markup {
+fn measured(name: &str, error: f64, longer: Interval, undecided: bool) -> Markup {
     html! {
         tr.undecided[undecided] {
             th scope="row" { (name) }
@@ -174,7 +174,7 @@ fn measured(name: &str, error: f64, longer: Estimate, undecided: bool) -> Markup
 /// From the middle, which is as fast as the base, to the right where it is slower; the ends are this many times as fast and as slow.
 const END_OF_BAR: f64 = 16.0;
 
-fn bar(longer: Estimate) -> Markup {
+fn bar(longer: Interval) -> Markup {
     let place = |ratio: f64| (50.0 + 50.0 * ratio.max(1e-9).ln() / END_OF_BAR.ln()).clamp(0.0, 100.0);
     let (from, to) = (place(longer.value).min(50.0), place(longer.value).max(50.0));
     let (low, high) = (place(longer.low), place(longer.high));

@@ -3,9 +3,9 @@
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::reference::Reference;
+use crate::measure::interval::{CONFIDENCE, Interval};
 use crate::measure::line_fit::LineFit;
 
 /// What one run left.
@@ -20,48 +20,6 @@ pub struct Shot {
     pub photons: u64,
     /// Photons of the global map still flying after the last bounce, over those emitted.
     pub cut_off: f64,
-}
-
-/// Chance that a stated interval holds the truth.
-pub const CONFIDENCE: f64 = 0.95;
-
-/// A number and the interval that holds it with [`CONFIDENCE`].
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Estimate {
-    pub value: f64,
-    pub low: f64,
-    pub high: f64,
-}
-
-impl Estimate {
-    /// The mean of independent values, by Student's distribution; of a single one nothing is known.
-    pub fn of_mean(values: &[f64]) -> Estimate {
-        Estimate::of_mean_with(values, CONFIDENCE)
-    }
-
-    /// The same of values above 0 whose logarithm is more nearly normal than they, as squared errors are: the interval
-    /// reaches further up than down.
-    fn of_squares(values: &[f64]) -> Estimate {
-        let plain = Estimate::of_mean(values);
-        let half = (plain.high - plain.value) / plain.value.max(f64::MIN_POSITIVE);
-        Estimate { value: plain.value, low: plain.value * (-half).exp(), high: plain.value * half.exp() }
-    }
-
-    fn of_mean_with(values: &[f64], confidence: f64) -> Estimate {
-        let count = values.len() as f64;
-        let mean = values.iter().sum::<f64>() / count;
-        if values.len() < 2 {
-            return Estimate { value: mean, low: f64::NEG_INFINITY, high: f64::INFINITY };
-        }
-        let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0);
-        let student = StudentsT::new(0.0, 1.0, count - 1.0).expect("there is a degree of freedom");
-        let half = student.inverse_cdf(0.5 + 0.5 * confidence) * (variance / count).sqrt();
-        Estimate { value: mean, low: mean - half, high: mean + half }
-    }
-
-    pub fn map(self, f: impl Fn(f64) -> f64) -> Estimate {
-        Estimate { value: f(self.value), low: f(self.low), high: f(self.high) }
-    }
 }
 
 /// The root of what may have come out below nothing.
@@ -114,8 +72,8 @@ impl Point {
     }
 
     /// Relative root mean square error.
-    pub fn error(&self) -> Estimate {
-        Estimate::of_squares(&self.squared_errors).map(root)
+    pub fn error(&self) -> Interval {
+        Interval::of_squares(&self.squared_errors).map(root)
     }
 
     /// What independent runs differ by, relative to the reference.
@@ -124,14 +82,14 @@ impl Point {
     }
 
     /// What all runs have in common. Below its upper end nothing can be told from noise.
-    pub fn bias(&self) -> Estimate {
-        Estimate::of_squares(&self.squared_errors).map(|square| root(square - self.squared_noise))
+    pub fn bias(&self) -> Interval {
+        Interval::of_squares(&self.squared_errors).map(|square| root(square - self.squared_noise))
     }
 
     /// Of all rounds: on the device where it has a clock, else the host's. The middle one, the shortest and the longest.
-    pub fn ms(&self) -> Estimate {
+    pub fn ms(&self) -> Interval {
         let all = sorted((0..self.wall_ms.len()).map(|run| self.ms_of(run)));
-        Estimate { value: all[all.len() / 2], low: all[0], high: all[all.len() - 1] }
+        Interval { value: all[all.len() / 2], low: all[0], high: all[all.len() - 1] }
     }
 
     /// Of one run.
@@ -152,13 +110,13 @@ fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
 
 /// A value with the interval that the spread of these logarithms makes. Where a run has none, as it never came so far,
 /// the others alone would say too much.
-fn around(value: f64, logs: &[Option<f64>], confidence: f64) -> Estimate {
+fn around(value: f64, logs: &[Option<f64>], confidence: f64) -> Interval {
     let known: Option<Vec<f64>> = logs.iter().copied().collect();
     let Some(known) = known.filter(|known| known.len() > 1) else {
-        return Estimate { value, low: 0.0, high: f64::INFINITY };
+        return Interval { value, low: 0.0, high: f64::INFINITY };
     };
-    let spread = Estimate::of_mean_with(&known, confidence);
-    Estimate { value, low: value * (spread.low - spread.value).exp(), high: value * (spread.high - spread.value).exp() }
+    let spread = Interval::of_mean(&known, confidence);
+    Interval { value, low: value * (spread.low - spread.value).exp(), high: value * (spread.high - spread.value).exp() }
 }
 
 /// A configuration at all its numbers of rounds.
@@ -186,7 +144,7 @@ impl Curve {
     }
 
     /// The same, with the interval that the single runs give.
-    pub fn time_to(&self, error: f64) -> Option<Estimate> {
+    pub fn time_to(&self, error: f64) -> Option<Interval> {
         let mean: Vec<(f64, f64)> = self.points.iter().map(|point| (point.ms().value, point.error().value)).collect();
         let value = Curve::crossing(&mean, error)?;
         Some(around(value, &self.logs_of_time_to(error), CONFIDENCE))
@@ -204,17 +162,17 @@ impl Curve {
     }
 
     /// How many times longer than `other` this takes to an error, run by run, with an interval of this confidence.
-    pub fn times_longer(&self, other: &Curve, error: f64, confidence: f64) -> Option<Estimate> {
+    pub fn times_longer(&self, other: &Curve, error: f64, confidence: f64) -> Option<Interval> {
         self.time_ratio(error, other, error, confidence)
     }
 
     /// How many times longer half an error takes.
-    pub fn halving(&self, error: f64) -> Option<Estimate> {
+    pub fn halving(&self, error: f64) -> Option<Interval> {
         self.time_ratio(0.5 * error, self, error, CONFIDENCE)
     }
 
     /// Time to `error` over that of `other` to `other_error`.
-    fn time_ratio(&self, error: f64, other: &Curve, other_error: f64, confidence: f64) -> Option<Estimate> {
+    fn time_ratio(&self, error: f64, other: &Curve, other_error: f64, confidence: f64) -> Option<Interval> {
         let value = self.time_to(error)?.value / other.time_to(other_error)?.value;
         let logs = self.logs_of_time_to(error).into_iter().zip(other.logs_of_time_to(other_error));
         let each: Vec<Option<f64>> = logs.map(|(own, other)| Some(own? - other?)).collect();
@@ -227,13 +185,13 @@ impl Curve {
     }
 
     /// Relative error after a time, where that lies between two points.
-    pub fn error_after(&self, ms: f64) -> Option<Estimate> {
+    pub fn error_after(&self, ms: f64) -> Option<Interval> {
         self.points.windows(2).find_map(|pair| {
             let (t0, t1) = (pair[0].ms().value, pair[1].ms().value);
             let share = (ms / t0).ln() / (t1 / t0).ln();
             let between = |from: f64, to: f64| if from > 0.0 && to > 0.0 { from * (to / from).powf(share) } else { 0.0 };
             let (e0, e1) = (pair[0].error(), pair[1].error());
-            (t0 <= ms && ms <= t1 && t1 > t0).then(|| Estimate {
+            (t0 <= ms && ms <= t1 && t1 > t0).then(|| Interval {
                 value: between(e0.value, e1.value),
                 low: between(e0.low, e1.low),
                 high: between(e0.high, e1.high),
@@ -266,8 +224,6 @@ impl Curve {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::measure::interval::Interval;
-    use crate::measure::interval::tests::{coverage, normal};
 
     /// Runs whose squared error is `noise`^2 / rounds plus that of a bias, all but equal.
     pub fn curve(noise: f64, bias: f64, ms_a_round: f64) -> Curve {
@@ -309,26 +265,5 @@ pub(super) mod tests {
         assert!(last.error().value > last.noise() && last.bias().low > 0.02);
         let without = curve(0.4, 0.0, 1.0).points.pop().unwrap();
         assert!(without.bias().value < 0.2 * without.noise());
-    }
-
-    /// Intervals over few runs hold the truth as often as they say, and of squared errors nearly so even where one pixel
-    /// in all carries the noise.
-    #[test]
-    fn intervals_cover() {
-        let normal = |trial: u32, draw: u32| normal([5, 9], trial, draw);
-        let interval = |Estimate { value, low, high }: Estimate| Interval { value, low, high };
-        for runs in [2, 3, 5] {
-            let values = |trial: u32| (0..runs).map(|draw| 7.0 + normal(trial, draw)).collect::<Vec<_>>();
-            let held = coverage(7.0, |trial| interval(Estimate::of_mean(&values(trial))));
-            // Three standard errors of a share of 0.95.
-            assert!((held - CONFIDENCE).abs() < 0.0104, "{runs} runs: {held}");
-        }
-        assert!(Estimate::of_mean(&[1.0]).high.is_infinite());
-        for (pixels, runs) in [(1, 3), (1, 5), (2, 3), (2, 5), (5, 3), (5, 5), (40, 5)] {
-            let square =
-                |trial: u32, run: u32| (0..pixels).map(|pixel| normal(trial, 64 * run + pixel).powi(2)).sum::<f64>() / f64::from(pixels);
-            let held = coverage(1.0, |trial| interval(Estimate::of_squares(&(0..runs).map(|run| square(trial, run)).collect::<Vec<_>>())));
-            assert!(held > 0.87, "{pixels} pixels, {runs} runs: {held}");
-        }
     }
 }

@@ -1,9 +1,11 @@
 //! Three sentences for whoever has a minute: what an error costs, what to change first, and what not to trust.
 
-use super::findings::{Effect, between, common_error, named, percent, ratio};
-use super::point::{CONFIDENCE, Curve};
+use super::findings::{Effect, between, common_error, named, ratio};
+use super::point::Curve;
 use super::{Part, Study};
+use crate::measure::interval::CONFIDENCE;
 use crate::output::words::{duration, times};
+use crate::text::percent;
 
 pub fn sentences(study: &Study, part: &Part) -> [String; 3] {
     [cost(study, part), first_change(part), doubts(part)]

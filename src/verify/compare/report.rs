@@ -10,7 +10,7 @@ use super::flip::{Flip, PIXELS_PER_DEGREE};
 use super::pair::LeftOut;
 use super::picture::{Picture, Values};
 use super::z_scores::ZScores;
-use crate::text::{counted, echo};
+use crate::text::{counted, echo, percent};
 
 /// The fields of the JSON.
 #[derive(Serialize)]
@@ -197,11 +197,4 @@ fn number(value: f64) -> String {
     }
     let decimals = (3 - size.log10().floor() as i32).max(0);
     format!("{value:.*}", decimals as usize)
-}
-
-/// Three significant digits of a share.
-pub fn percent(share: f64) -> String {
-    let percent = 100.0 * share;
-    let decimals = if percent == 0.0 { 0 } else { (2 - percent.abs().log10().floor() as i32).clamp(0, 6) };
-    format!("{percent:.*} %", decimals as usize)
 }

@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use crate::measure::interval::{CONFIDENCE, Decision, LEAST_VALUES};
+use crate::measure::interval::{CONFIDENCE_IN_WORDS, Decision, LEAST_VALUES};
 use crate::measure::paper::figures::SEEDS;
 use crate::measure::paper::verdicts::{MARGIN, Standing, Verdict};
 use crate::output::page::table;
@@ -17,7 +17,7 @@ pub fn summary(verdicts: &[Verdict]) -> Markup {
             @if claims.is_empty() {
                 p { "Too few experiments were completed to say." }
             } @else {
-                p { strong { (tally(&claims)) } " Ranges in brackets are " (percent()) " confidence intervals. Open a row for every number behind it." }
+                p { strong { (tally(&claims)) } " Ranges in brackets are " (CONFIDENCE_IN_WORDS) " confidence intervals. Open a row for every number behind it." }
                 (list("Finding of the paper", "Verdict", &claims))
             }
             @if !additions.is_empty() {
@@ -30,10 +30,6 @@ pub fn summary(verdicts: &[Verdict]) -> Markup {
             }
         }
     }
-}
-
-fn percent() -> String {
-    format!("{:.0}\u{a0}%", 100.0 * CONFIDENCE)
 }
 
 /// 'Of 9 findings, 5 still hold, 2 hold in part, 1 no longer holds and 1 is not decided by this run.'
@@ -115,7 +111,7 @@ fn method() -> Markup {
             li { "A finding was checked at several sizes. It holds where it holds at every size, and holds in part where it holds at some and not at others. If a size is not decided and no two sizes contradict each other, the finding is not decided by this run." }
             li { "Factors of times are ratios of geometric means of the repeated runs, with Welch's t interval (1947) on their logarithms. With fewer than " (LEAST_VALUES) " runs there is no interval and no decision." }
             li { "Numbers of the figures are geometric means over seeds 1 to " (SEEDS) ", with Student's t interval on their logarithms. Exponents have the t interval of a fitted slope. Shares of filled slots have Hoeffding's interval (1963)." }
-            li { "Each interval by itself contains the true value with a confidence level of " (percent()) ". The intervals describe this machine and driver only. The 2008 numbers were printed without a spread." }
+            li { "Each interval by itself contains the true value with a confidence level of " (CONFIDENCE_IN_WORDS) ". The intervals describe this machine and driver only. The 2008 numbers were printed without a spread." }
         }
     }
 }

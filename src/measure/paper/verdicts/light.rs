@@ -5,8 +5,9 @@ use crate::engine::room::film::WallEstimate;
 use crate::measure::interval::{Decision, Interval};
 use crate::measure::paper::Reproduction;
 use crate::measure::paper::figures::{Figure, Frame, SEEDS};
-use crate::output::words::{number, times};
+use crate::output::words::times;
 use crate::scene::open_box::open_box;
+use crate::text::percent;
 
 /// Noise that falls within this factor of the square root of the rounds' counts as independent.
 const NOISE_WITHIN: f64 = 1.15;
@@ -62,10 +63,6 @@ pub fn figure_1(found: &Reproduction) -> Option<Verdict> {
         }],
         standing: Standing::of([decision]),
     })
-}
-
-fn percent(share: f64) -> String {
-    format!("{}\u{a0}%", number(100.0 * share))
 }
 
 /// Standard deviation of a point between seeds, over the mean of all points; `None` with one seed.
