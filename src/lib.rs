@@ -1,53 +1,30 @@
 //! Photon mapping on any Vulkan GPU: GLSL compute kernels on raw Vulkan, results that are the same to the bit however
 //! the work is split, and a ledger of every photon.
 //!
-//! A scene to a picture ([`render`] has points and lightmaps, too):
+//! A scene to an image ([`render`] has points, lightmaps, photon maps and the paper's box, too):
 //!
 //! ```
-//! use photonmill::engine::Control;
 //! use photonmill::gpu::{Gpu, Options};
-//! use photonmill::render::{PreparedScene, Request, Style};
+//! use photonmill::render::{Observer, PreparedScene, RenderRequest};
 //! use photonmill::scene::picture_size::PictureSize;
 //! # let folder = tempfile::tempdir().unwrap();
 //! # std::env::set_current_dir(folder.path()).unwrap();
 //!
 //! let mut gpus = vec![Gpu::open(&Options::default())?];
 //! let scene = PreparedScene::open("cornell-spheres")?;
-//! let request = Request { rounds: Some(32), photons: Some(4096), ..Request::default() };
-//! let size = PictureSize::WidthAndHeight(32, 32);
-//! let picture = scene.render(&mut gpus, None, Some(size), &request, &mut Control::default())?;
-//! picture.save("picture.png", &Style::default())?;
-//! println!("{:.1} %", 100.0 * picture.run.error().noise);
-//! # assert!(picture.run.error().noise < 1.0 && std::path::Path::new("picture.png").is_file());
+//! let size = Some(PictureSize::WidthAndHeight(32, 32));
+//! let request = RenderRequest { size, rounds: Some(32), photons: Some(4096), ..RenderRequest::default() };
+//! let image = scene.render(&mut gpus, None, &request, &Observer::default())?;
+//! image.save("picture.png", &Observer::default())?;
+//! println!("{:.1} %", 100.0 * image.run.error().noise);
+//! # assert!(image.run.error().noise < 1.0 && std::path::Path::new("picture.png").is_file());
 //! # Ok::<(), photonmill::error::Error>(())
 //! ```
-//!
-//! # Depending on it
-//!
-//! From a clone of the sources, whose kernels are compiled with the library shaderc (`tools/setup` installs it, and `SHADERC_LIB_DIR` says where
-//! it is; without it cargo builds it):
-//!
-//! ```toml
-//! photonmill = { path = "photonmill", default-features = false, features = ["compile-glsl"] }
-//! ```
-//!
-//! From the crate that `tools/package` packs, which has the kernels compiled, so that Rust alone builds it:
-//!
-//! ```toml
-//! photonmill = { path = "photonmill-0.1.0", default-features = false }
-//! ```
-//!
-//! The features `program` (the commands), `window` (`photonmill view`) and `lab` (`study`, `bench`, `gallery` and `paper`) are for the program.
-//!
-//! The [`guide`] holds what a user needs: [the paper's box](guide::paper), [the window](guide::view), [scenes](guide::scenes),
-//! [materials](guide::materials), [accuracy](guide::accuracy), a [study](guide::study) of what accuracy costs,
-//! [performance](guide::performance), [scale](guide::scale), [hard cases](guide::hard_cases), [Python](guide::python) and [file formats](guide::formats).
-//! [Architecture](guide::architecture) explains how the program is built, why its results repeat, and how it is tested.
 //!
 //! # Versions
 //!
 //! Versions follow [semantic versioning](https://semver.org). The public API is [`render`] with the types that it takes and gives back
-//! ([`gpu::Gpu`] and its options, [`scene::Scene`], the settings, [`engine::Control`], [`engine::scene::RunResult`], [`error::Error`]), the
+//! ([`gpu::Gpu`] and its options, [`scene::Scene`], the settings, [`engine::scene::RunResult`], [`error::Error`]), the
 //! program's commands and options, the files that it writes, and the Python module. All else is public for the program and the tests, and may
 //! change in any release.
 //!
@@ -68,7 +45,7 @@
 //!
 //! ```text
 //! constants, error, text, records, rng, ledger, timings < settings, path, photon < scene < plan < cpu, gpu, oidn < engine < output
-//! output < bake < measure, render < cli;  output < view < cli;  scene < verify::judge;  engine < verify::selfcheck;  output < verify::compare < cli
+//! output < bake < render < measure, view < cli;  scene < verify::judge;  render < verify::selfcheck;  output < verify::compare < cli
 //! ```
 //!
 //! `tests/program/architecture.rs` checks it.
