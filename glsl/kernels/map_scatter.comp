@@ -34,7 +34,10 @@ void main()
         uint item = (2 * work_group_index() + sweep) * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
         uint index = item / 2;
         bool is_there = index < min(counters[0], push.photon_capacity);
-        if (is_there && (!HAS_SLOTS || map[2 * index].w != NONE)) {
+        if (HAS_SLOTS && is_there) {
+            is_there = map[2 * index].w != NONE;
+        }
+        if (is_there) {
             uint bucket = bucket_of(cell_at(uintBitsToFloat(map[2 * index].xyz), push), push);
             sorted_map[2 * (cells[bucket] + ranks[index]) + item % 2] = map[item];
         }

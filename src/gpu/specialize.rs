@@ -22,6 +22,7 @@ mod op {
     pub const FUNCTION_CALL: u32 = 57;
     pub const VARIABLE: u32 = 59;
     pub const LOAD: u32 = 61;
+    pub const STORE: u32 = 62;
     pub const ACCESS_CHAIN: u32 = 65;
     pub const DECORATE: u32 = 71;
     pub const COPY_OBJECT: u32 = 83;
@@ -148,6 +149,11 @@ fn folded(words: &[u32], values: &mut HashMap<u32, u32>, copies: &mut HashMap<u3
             (op::BRANCH_CONDITIONAL, [first, condition, targets @ ..]) => {
                 result.extend([*first, source_of(condition)]);
                 result.extend(targets);
+                continue;
+            }
+            (op::STORE, [first, pointer, value, access @ ..]) => {
+                result.extend([*first, *pointer, source_of(value)]);
+                result.extend(access);
                 continue;
             }
             (op::PHI, [_, kind, id, choices @ ..]) => {

@@ -38,7 +38,6 @@ pub mod targets;
 pub mod texture;
 mod work;
 
-use std::borrow::Cow;
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -52,7 +51,6 @@ pub use mesh::Mesh;
 pub use texture::Texture;
 
 use crate::error::{Error, Result};
-use crate::settings::scene::Effect;
 
 /// Called with what is being done while a scene is opened, and the share of it that is done.
 pub type Progress<'a> = &'a mut dyn FnMut(&'static str, f64);
@@ -116,32 +114,6 @@ impl Scene {
                 Err(Error::setting("SCENE", name, format!("{meant}must be a .gltf or .glb file, or one of {}", names.join(", "))))
             }
         }
-    }
-
-    /// The scene without what some effects would need.
-    pub fn without(&self, effects: &[Effect]) -> Cow<'_, Scene> {
-        if effects.is_empty() {
-            return Cow::Borrowed(self);
-        }
-        let lacks = |effect: Effect| effects.contains(&effect);
-        let mut scene = self.clone();
-        scene.lights.retain(|light| !match light.kind {
-            LightKind::Point { .. } => lacks(Effect::PointLights),
-            LightKind::Spot { .. } => lacks(Effect::SpotLights),
-            LightKind::Directional { .. } => lacks(Effect::DirectionalLights),
-            LightKind::Disc { .. } => lacks(Effect::DiscLights),
-            LightKind::Environment { .. } | LightKind::Sky(_) => lacks(Effect::Environment),
-        });
-        if lacks(Effect::VertexColours) {
-            scene.meshes.iter_mut().for_each(|mesh| {
-                mesh.colours.clear();
-                mesh.alphas.clear();
-            });
-        }
-        for material in &mut scene.materials {
-            effects.iter().for_each(|effect| material.leave_out(*effect));
-        }
-        Cow::Owned(scene)
     }
 
     /// Which lobes each material may have.
