@@ -42,6 +42,185 @@ uvec2 fixed_point(float flux, float chance)
     return uvec2(uint(fraction), uint(whole));
 }
 
+// What a point takes of photons.
+struct Query {
+    VisiblePoint point;
+    uint bits; // that decide what is rounded up
+    float radius;
+    vec3 normal;
+    vec3 ns;
+    vec3 wo;
+    bool is_flat;
+    bool is_even; // of a photon in its plane nothing matters but the flux
+    bool has_cuts;
+    Cuts cuts;
+    // Of a layered surface.
+    bool is_layered;
+    MattLobes lobes;
+    MattCover cover;
+};
+
+// That of this thread, and what it has found. No arguments: drivers keep copies of what has arrays.
+Query query;
+// Three channels of each arrival; the first three of a map that holds one arrival only. 32 bits after the binary point:
+// of a channel a billionth as bright as the photons' mean, a photon still adds some units.
+uvec2 sums[9];
+// The same of photons within NEAR_SHARE of the radius, all arrivals together.
+uvec2 nearer[3];
+bool has_found;
+
+// Whether a point asks this map, and is of a class that this grid serves: then `radius` is the point's own.
+bool is_asked(VisiblePoint point, uint index, inout float radius)
+{
+    uint wanted = HAS_ALL_ARRIVALS ? ARRIVED_DIRECT | ARRIVED_CAUSTIC | ARRIVED_INDIRECT : 1u << push.arrival;
+    if ((point.arrivals & wanted) == 0) {
+        return false;
+    }
+    if (HAS_RADIUS_CLASSES) {
+        uint own_class = radius_class(index, push.map_class);
+        radius = radius_of_class(push.radius, own_class);
+        return own_class >= push.first_class && own_class < push.end_class;
+    }
+    return true;
+}
+
+void start_query(VisiblePoint point, uint index, float radius)
+{
+    query.point = point;
+    query.bits = mix32(push.rounding + position_bits(point.position));
+    query.normal = plane_normal(point.plane);
+    query.cuts = cuts_of(push.first_cut + index, query.normal, radius);
+    query.has_cuts = query.cuts.lines[0].w < query.cuts.reach;
+    query.radius = min(radius, query.cuts.reach);
+    query.is_flat = point.shading_normal == NONE;
+    query.ns = query.is_flat ? query.normal : unpack_normal(point.shading_normal);
+    query.wo = unpack_direction(point.wo);
+    query.is_even = query.is_flat && !has_lobe(point.surface);
+    query.is_layered = HAS_LAYERS && point.surface == SURFACE_LAYERED;
+    query.cover = no_cover();
+    if (query.is_layered) {
+        query.lobes = matt_lobes[index];
+        if (HAS_COATS || HAS_SHEEN || HAS_IRIDESCENCE) {
+            query.cover = matt_covers[index];
+        }
+    }
+    [[unroll]] for (uint k = 0; k < 9; k++) {
+        sums[k] = uvec2(0);
+    }
+    nearer = uvec2[](uvec2(0), uvec2(0), uvec2(0));
+    has_found = false;
+}
+
+// The flux of a photon as a layered surface weighs it beside a Lambertian one.
+vec3 layered_weight(vec3 wi, float cosine)
+{
+    float coat_cosine = HAS_COATS ? abs(dot(wi, unpack_normal(query.cover.coat_normal))) : cosine;
+    MattLobes lobes = query.lobes;
+    MattCover cover = query.cover;
+    LayerAlbedos lit = albedos_at(lobes.alpha, cover, cosine, coat_cosine);
+    return 3.14159265358979324 * matt_brdf(lobes, cover, cover.film, lit, query.ns, query.wo, wi);
+}
+
+// Adds a photon of an arrival, 0 to 2; `near_gain` is what its flux counts within the smaller radius, 0 beyond.
+void add_photon(vec3 flux, uint arrival, bool is_near, float near_gain, float chance)
+{
+    [[unroll]] for (uint channel = 0; channel < 3; channel++) {
+        uvec2 amount = fixed_point(flux[channel], chance);
+        if (HAS_ALL_ARRIVALS) {
+            [[unroll]] for (uint k = 0; k < 3; k++) {
+                sums[3 * k + channel] = add64(sums[3 * k + channel], k == arrival ? amount : uvec2(0));
+            }
+        } else {
+            sums[channel] = add64(sums[channel], amount);
+        }
+        if (is_near) {
+            if (KERNEL != KERNEL_BOX) {
+                amount = fixed_point(flux[channel] * near_gain, chance);
+            }
+            nearer[channel] = add64(nearer[channel], amount);
+        }
+    }
+    has_found = true;
+}
+
+// Adds what a photon of the row yz of cells brings to the point.
+void gather_photon(uint place, ivec2 yz, uint index)
+{
+    VisiblePoint point = query.point;
+    float radius = query.radius;
+    uvec4 words = sorted_map[2 * place];
+    vec3 position = uintBitsToFloat(words.xyz);
+    precise vec3 way = position - point.position;
+    precise float distance_squared = way.x * way.x + way.y * way.y + way.z * way.z;
+    if (!(distance_squared <= radius * radius && cell_at(position, push.cells).yz == yz)) {
+        return;
+    }
+    uvec4 light = sorted_map[2 * place + 1];
+    uint arrival = light.w >> 30;
+    // Most photons lie in the point's plane: nothing of theirs is to be unpacked but their flux.
+    bool is_alike = words.w == point.plane;
+    vec3 photon_normal = query.normal;
+    float height = 0.0;
+    if (!is_alike) {
+        photon_normal = plane_normal(words.w);
+        height = plane_height(words.w, point.position);
+    }
+    bool may_count = is_alike || (belongs(query.normal, photon_normal, height, radius) && !are_apart(point.plane, words.w));
+    if (!may_count || (query.has_cuts && is_cut_off(query.cuts, way)) || ((point.arrivals >> arrival) & 1u) == 0) {
+        return;
+    }
+    vec3 wi = query.ns;
+    float cosine = 1.0;
+    if (!(is_alike && query.is_even)) {
+        wi = unpack_direction(light.w);
+        cosine = dot(wi, query.ns);
+    }
+    if (!(cosine > 0.0)) {
+        return;
+    }
+    float weight = lobe_weight(point.surface, point.exponent, query.ns, query.wo, wi);
+    float near_radius = radius * NEAR_SHARE;
+    bool is_near = HAS_DIFFERENCES && distance_squared <= near_radius * near_radius
+                && (is_alike || belongs(query.normal, photon_normal, height, near_radius));
+    float near_gain = 1.0;
+    if (KERNEL != KERNEL_BOX) {
+        float share = kernel_at(distance_squared, height, radius);
+        weight *= share;
+        near_gain = is_near ? divide(kernel_at(distance_squared, height, near_radius), share) : 0.0;
+    }
+    if (HAS_SMOOTH_NORMALS) {
+        weight *= query.is_flat ? 1.0 : shading_gain(cosine, dot(wi, photon_normal));
+    }
+    vec3 arrived = uintBitsToFloat(light.xyz);
+    if (query.is_layered) {
+        arrived *= layered_weight(wi, cosine);
+    }
+    precise vec3 flux = arrived * weight;
+    note_unless(is_finite(flux), NONFINITE_ESTIMATE, 0, push.round, index % push.pixel_count);
+    add_photon(flux, arrival, is_near, near_gain, chance_of(mix32(query.bits + position_bits(position))));
+}
+
+// Adds what was found to the sums of the point.
+void write_sums(uint index)
+{
+    // Without direct light the first set of sums is that of caustics.
+    uint first = HAS_ALL_ARRIVALS ? 3 * index : 3 * ((push.arrival - 1) * push.point_count + index);
+    uint sum_count = HAS_ALL_ARRIVALS ? 9 : 3;
+    [[unroll]] for (uint k = 0; k < 9; k++) {
+        if (k < sum_count && sums[k] != uvec2(0)) {
+            add_to_film(first + k / 3 * 3 * push.point_count + k % 3, sums[k]);
+        }
+    }
+    if (HAS_DIFFERENCES) {
+        uint place = place_of_near(index, push.point_count, push.map_class == CAUSTIC_CLASS);
+        for (uint channel = 0; channel < 3; channel++) {
+            if (nearer[channel] != uvec2(0)) {
+                add_to_near(place + 2 * channel, nearer[channel]);
+            }
+        }
+    }
+}
+
 void gather_photons()
 {
     work = push.work;
@@ -53,66 +232,15 @@ void gather_photons()
         return;
     }
     VisiblePoint point = visible_points[index];
-    uint point_bits = mix32(push.rounding + position_bits(point.position));
-    uint wanted = 1u << push.arrival;
-    if (HAS_ALL_ARRIVALS) {
-        wanted = ARRIVED_DIRECT | ARRIVED_CAUSTIC | ARRIVED_INDIRECT;
-    }
-    if ((point.arrivals & wanted) == 0) {
+    float radius = push.radius;
+    if (!is_asked(point, index, radius)) {
         return;
     }
-    float radius = push.radius;
-    if (HAS_RADIUS_CLASSES) {
-        uint own_class = radius_class(index, push.map_class);
-        if (own_class < push.first_class || own_class >= push.end_class) {
-            return;
-        }
-        radius = radius_of_class(push.radius, own_class);
-    }
-    vec3 normal = plane_normal(point.plane);
-    Cuts cuts = cuts_of(push.first_cut + index, normal, radius);
+    start_query(point, index, radius);
     CellRange range = cells_near(point.position, radius);
-    bool has_cuts = cuts.lines[0].w < cuts.reach;
-    radius = min(radius, cuts.reach);
-    bool is_flat = point.shading_normal == NONE;
-    vec3 ns = is_flat ? normal : unpack_normal(point.shading_normal);
-    vec3 wo = unpack_direction(point.wo);
-    bool is_even = is_flat && !has_lobe(point.surface);
-    bool is_layered = false;
-    MattLobes lobes;
-    MattCover cover = no_cover();
-    MattFilm film = no_film();
-    if (HAS_LAYERS) {
-        is_layered = point.surface == SURFACE_LAYERED;
-        if (is_layered) {
-            lobes = matt_lobes[index];
-            bool has_cover = HAS_COATS;
-            if (HAS_SHEEN) {
-                has_cover = true;
-            }
-            if (HAS_IRIDESCENCE) {
-                has_cover = true;
-            }
-            if (has_cover) {
-                cover = matt_covers[index];
-                film = cover.film;
-            }
-        }
-    }
     uint photon_count = map_length();
     uint slice_begin = slice * GATHER_SLICE;
     uint slice_end = slice_begin + GATHER_SLICE;
-
-    // Three channels of each arrival; the first three of a map that holds one arrival only. 32 bits after the binary point:
-    // of a channel a billionth as bright as the photons' mean, a photon still adds some units.
-    uvec2 sums[9];
-    [[unroll]] for (uint k = 0; k < 9; k++) {
-        sums[k] = uvec2(0);
-    }
-    // The same of photons nearer than that, all arrivals together.
-    uvec2 nearer[3] = uvec2[](uvec2(0), uvec2(0), uvec2(0));
-    float near_radius = radius * NEAR_SHARE;
-    bool found = false;
     uint passed = 0; // candidates in the rows before this one
     for (int z = range.first.z; z <= range.last.z; z++) {
         for (int y = range.first.y; y <= range.last.y; y++) {
@@ -121,77 +249,7 @@ void gather_photons()
             uint end = clamp(slice_end, passed, passed + run.y) - passed;
             for (uint k = begin + lane; k < end; k += push.lanes) {
                 uint place = run.x + k;
-                place = place >= photon_count ? place - photon_count : place;
-                uvec4 words = sorted_map[2 * place];
-                vec3 position = uintBitsToFloat(words.xyz);
-                precise vec3 way = position - point.position;
-                precise float distance_squared = way.x * way.x + way.y * way.y + way.z * way.z;
-                if (distance_squared <= radius * radius && cell_at(position, push.cells).yz == ivec2(y, z)) {
-                    uvec4 light = sorted_map[2 * place + 1];
-                    // Most photons lie in the point's plane: nothing of theirs is to be unpacked but their flux.
-                    bool is_alike = words.w == point.plane;
-                    vec3 photon_normal = normal;
-                    float height = 0.0;
-                    if (!is_alike) {
-                        photon_normal = plane_normal(words.w);
-                        height = plane_height(words.w, point.position);
-                    }
-                    bool may_count = is_alike || (belongs(normal, photon_normal, height, radius) && !are_apart(point.plane, words.w));
-                    bool counts = may_count && !(has_cuts && is_cut_off(cuts, way))
-                                  && ((point.arrivals >> (light.w >> 30)) & 1u) != 0;
-                    vec3 wi = ns;
-                    float cosine = 1.0;
-                    if (!(is_alike && is_even)) {
-                        wi = unpack_direction(light.w);
-                        cosine = dot(wi, ns);
-                    }
-                    if (counts && cosine > 0.0) {
-                        float weight = lobe_weight(point.surface, point.exponent, ns, wo, wi);
-                        bool is_near = false;
-                        if (HAS_DIFFERENCES) {
-                            is_near = distance_squared <= near_radius * near_radius
-                                      && (is_alike || belongs(normal, photon_normal, height, near_radius));
-                        }
-                        float near_gain = 1.0;
-                        if (KERNEL != KERNEL_BOX) {
-                            float share = kernel_at(distance_squared, height, radius);
-                            weight *= share;
-                            near_gain = is_near ? divide(kernel_at(distance_squared, height, near_radius), share) : 0.0;
-                        }
-                        if (HAS_SMOOTH_NORMALS) {
-                            weight *= is_flat ? 1.0 : shading_gain(cosine, dot(wi, photon_normal));
-                        }
-                        vec3 arrived = uintBitsToFloat(light.xyz);
-                        if (is_layered) {
-                            float coat_cosine = cosine;
-                            if (HAS_COATS) {
-                                coat_cosine = abs(dot(wi, unpack_normal(cover.coat_normal)));
-                            }
-                            LayerAlbedos lit = albedos_at(lobes.alpha, cover, cosine, coat_cosine);
-                            arrived *= 3.14159265358979324 * matt_brdf(lobes, cover, film, lit, ns, wo, wi);
-                        }
-                        precise vec3 flux = arrived * weight;
-                        note_unless(is_finite(flux), NONFINITE_ESTIMATE, 0, push.round, index % push.pixel_count);
-                        float chance = chance_of(mix32(point_bits + position_bits(position)));
-                        [[unroll]] for (uint channel = 0; channel < 3; channel++) {
-                            uvec2 amount = fixed_point(flux[channel], chance);
-                            if (HAS_ALL_ARRIVALS) {
-                                [[unroll]] for (uint arrival = 0; arrival < 3; arrival++) {
-                                    sums[3 * arrival + channel] = add64(sums[3 * arrival + channel], arrival == light.w >> 30 ? amount : uvec2(0));
-                                }
-                            } else {
-                                sums[channel] = add64(sums[channel], amount);
-                            }
-                            if (is_near) {
-                                if (KERNEL != KERNEL_BOX) {
-                                    amount = fixed_point(flux[channel] * near_gain, chance);
-                                }
-                                nearer[channel] = add64(nearer[channel], amount);
-                            }
-                        }
-                        found = true;
-                    }
-                }
+                gather_photon(place >= photon_count ? place - photon_count : place, ivec2(y, z), index);
             }
             passed += run.y;
         }
@@ -202,26 +260,7 @@ void gather_photons()
         crowded[3 + 2 * place] = passed;
         atomicMax(crowded[1], passed);
     }
-    if (found) {
-        // Without direct light the first set of sums is that of caustics.
-        uint first = 3 * ((push.arrival - 1) * push.point_count + index);
-        uint sum_count = 3;
-        if (HAS_ALL_ARRIVALS) {
-            first = 3 * index;
-            sum_count = 9;
-        }
-        [[unroll]] for (uint k = 0; k < 9; k++) {
-            if (k < sum_count && sums[k] != uvec2(0)) {
-                add_to_film(first + k / 3 * 3 * push.point_count + k % 3, sums[k]);
-            }
-        }
-        if (HAS_DIFFERENCES) {
-            uint place = place_of_near(index, push.point_count, push.map_class == CAUSTIC_CLASS);
-            for (uint channel = 0; channel < 3; channel++) {
-                if (nearer[channel] != uvec2(0)) {
-                    add_to_near(place + 2 * channel, nearer[channel]);
-                }
-            }
-        }
+    if (has_found) {
+        write_sums(index);
     }
 }

@@ -368,8 +368,8 @@ pub(super) fn decide(effect: Effect, facts: &Facts, settings: &SceneSettings) ->
     let (needed, evidence) = (row(effect).needed)(facts);
     let kept = (needed || settings.forces(effect)) && !settings.leaves_out(effect);
     let evidence = match (needed, kept) {
-        (true, false) => format!("left out by --without, although the scene needs it: {evidence}"),
-        (false, true) => format!("forced by --with: {evidence}"),
+        (true, false) => format!("left out by `without`, although the scene needs it: {evidence}"),
+        (false, true) => format!("forced by `with`: {evidence}"),
         _ => evidence,
     };
     EffectDecision { effect, kept, needed, evidence, photons: 0, bytes: 0 }

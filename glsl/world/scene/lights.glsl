@@ -107,66 +107,88 @@ struct Emission {
     bool is_far; // from beyond the scene
 };
 
+Emission emit_from_lamp(Emitter light, vec4 u, vec4 w)
+{
+    Triangle triangle = triangles[light.triangle];
+    SurfaceMaterial material = materials[triangle.material];
+    vec2 at = sample_triangle(u.yz);
+    if (HAS_TEXTURES) {
+        at = weights_in_triangle(light, at);
+    }
+    vec3 normal = triangle_normal(triangle);
+    if (HAS_TWO_SIDED) {
+        normal = material.two_sided != 0 && u.w < 0.5 ? -normal : normal;
+    }
+    float error = triangle_error(triangle);
+    vec2 inside = off_the_edges(triangle, at, error);
+    vec3 position = offset_origin(triangle_point(triangle, inside.x, inside.y), error, normal, normal);
+    vec3 direction = to_frame(sample_cosine_hemisphere(w.x, w.y), normal);
+    return Emission(position, direction, normal, light.flux * lamp_share(material, light.triangle, at.x, at.y), false);
+}
+
+// In proportion to the intensity: the inner cone evenly, the ring by its falloff.
+vec3 sample_spot(Emitter light, vec2 u)
+{
+    float width = light.outer_versine - light.size;
+    float below = u.x * spot_integral(light);
+    float versine = below;
+    if (below > light.size) {
+        float above = max(1.0 - divide(3.0 * (below - light.size), width), LEAST);
+        versine = light.outer_versine - width * exp2(log2(above) * (1.0 / 3.0));
+    }
+    return to_frame(direction_at(1.0 - versine, versine * (2.0 - versine), u.y), light.direction);
+}
+
+Emission emit_from_disc(Emitter light, vec4 u, vec4 w)
+{
+    vec3 start = sample_disc(light.position, light.direction, light.size, u.yz);
+    vec3 local = light.kind == EMITTER_DISC_COSINE ? sample_cosine_hemisphere(w.x, w.y) : sample_uniform_hemisphere(w.x, w.y);
+    vec3 position = offset_origin(start, position_error(start), light.direction, light.direction);
+    return Emission(position, to_frame(local, light.direction), light.direction, light.flux, false);
+}
+
+// What comes from beyond the scene starts on a disc that covers it.
+Emission emit_from_afar(Emitter light, vec3 direction, vec3 flux, float scene_radius, vec4 u)
+{
+    vec3 position = sample_disc(-2.0 * scene_radius * direction, direction, scene_radius, u.yz);
+    return Emission(position, direction, light.direction, flux, true);
+}
+
+Emission emit_from_sky(Emitter light, float scene_radius, vec4 u, vec4 w)
+{
+    if (HAS_SKY_PICTURE) {
+        SkySample found = sample_sky_table(light, w.xy);
+        // Over the density of an even choice of all directions; the strength is in the flux.
+        vec3 texel = sample_texture(textures[light.triangle], place_in_sky(light, found.wi)).xyz;
+        vec3 flux = light.flux * (texel * divide(0.07957747154594767, found.density));
+        return emit_from_afar(light, -found.wi, flux, scene_radius, u);
+    }
+    return emit_from_afar(light, sample_sphere(w.x, w.y), light.flux, scene_radius, u);
+}
+
 // A photon's start. u and w = eight uniform numbers: the light was chosen by u.x, and w.z and w.w are left.
 Emission sample_emission(Emitter light, float scene_radius, vec4 u, vec4 w)
 {
-    Emission emission = Emission(light.position, light.direction, light.direction, light.flux, false);
     if (HAS_TRIANGLE_LIGHTS && light.kind == EMITTER_TRIANGLE) {
-        Triangle triangle = triangles[light.triangle];
-        SurfaceMaterial material = materials[triangle.material];
-        vec2 at = sample_triangle(u.yz);
-        if (HAS_TEXTURES) {
-            at = weights_in_triangle(light, at);
-        }
-        vec3 normal = triangle_normal(triangle);
-        if (HAS_TWO_SIDED) {
-            normal = material.two_sided != 0 && u.w < 0.5 ? -normal : normal;
-        }
-        emission.axis = normal;
-        emission.direction = to_frame(sample_cosine_hemisphere(w.x, w.y), normal);
-        float error = triangle_error(triangle);
-        vec2 inside = off_the_edges(triangle, at, error);
-        emission.position = offset_origin(triangle_point(triangle, inside.x, inside.y), error, normal, normal);
-        emission.flux *= lamp_share(material, light.triangle, at.x, at.y);
-    }
-    if (HAS_POINT_LIGHTS && light.kind == EMITTER_POINT) {
-        emission.direction = sample_sphere(w.x, w.y);
-    }
-    if (HAS_SPOT_LIGHTS && light.kind == EMITTER_SPOT) {
-        // In proportion to the intensity: the inner cone evenly, the ring by its falloff.
-        float width = light.outer_versine - light.size;
-        float below = w.x * spot_integral(light);
-        float versine = below;
-        if (below > light.size) {
-            float above = max(1.0 - divide(3.0 * (below - light.size), width), LEAST);
-            versine = light.outer_versine - width * exp2(log2(above) * (1.0 / 3.0));
-        }
-        emission.direction = to_frame(direction_at(1.0 - versine, versine * (2.0 - versine), w.y), light.direction);
+        return emit_from_lamp(light, u, w);
     }
     if (HAS_DISC_LIGHTS && (light.kind == EMITTER_DISC_COSINE || light.kind == EMITTER_DISC_UNIFORM)) {
-        vec3 start = sample_disc(light.position, light.direction, light.size, u.yz);
-        vec3 local = light.kind == EMITTER_DISC_COSINE ? sample_cosine_hemisphere(w.x, w.y) : sample_uniform_hemisphere(w.x, w.y);
-        emission.direction = to_frame(local, light.direction);
-        emission.position = offset_origin(start, position_error(start), light.direction, light.direction);
+        return emit_from_disc(light, u, w);
     }
-    // What comes from beyond the scene starts on a disc that covers it.
-    emission.is_far = HAS_DIRECTIONAL_LIGHTS && light.kind == EMITTER_DIRECTIONAL;
+    if (HAS_DIRECTIONAL_LIGHTS && light.kind == EMITTER_DIRECTIONAL) {
+        return emit_from_afar(light, light.direction, light.flux, scene_radius, u);
+    }
     if (HAS_ENVIRONMENT && light.kind == EMITTER_ENVIRONMENT) {
-        emission.is_far = true;
-        if (HAS_SKY_PICTURE) {
-            SkySample found = sample_sky_table(light, w.xy);
-            emission.direction = -found.wi;
-            // Over the density of an even choice of all directions; the strength is in the flux.
-            vec3 texel = sample_texture(textures[light.triangle], place_in_sky(light, found.wi)).xyz;
-            emission.flux *= texel * divide(0.07957747154594767, found.density);
-        } else {
-            emission.direction = sample_sphere(w.x, w.y);
-        }
+        return emit_from_sky(light, scene_radius, u, w);
     }
-    if (emission.is_far) {
-        emission.position = sample_disc(-2.0 * scene_radius * emission.direction, emission.direction, scene_radius, u.yz);
+    vec3 direction = light.direction;
+    if (HAS_SPOT_LIGHTS && light.kind == EMITTER_SPOT) {
+        direction = sample_spot(light, w.xy);
     }
-    return emission;
+    if (HAS_POINT_LIGHTS && light.kind == EMITTER_POINT) {
+        direction = sample_sphere(w.x, w.y);
+    }
+    return Emission(light.position, direction, light.direction, light.flux, false);
 }
 
 // Whether a point at signed height `height` over a flat lamp lies off its plane for certain. What lies in that plane
@@ -190,13 +212,20 @@ struct Arriving {
 };
 
 // Density with which sample_light() takes a point of a lamp, 1/sr, from a place that the lamp faces.
-float lamp_density(Triangle shining, vec3 normal, vec3 position, vec3 point, float area)
+float lamp_density(Emitter light, Triangle triangle, vec3 position, vec3 point)
 {
+    Triangle shining = triangle;
+    float width = 1.0;
+    if (HAS_TEXTURES) {
+        shining = lamp_corners(light, triangle);
+        width = light.position.z;
+    }
     float angle = sample_spherical_triangle(normalize(shining.a - position), normalize(shining.b - position), normalize(shining.c - position),
                                             vec2(0.5)).w;
     vec3 way = point - position;
     float squared = dot(way, way);
-    float cosine = abs(dot(normal, way)) * inversesqrt(max(squared, 1e-30));
+    float cosine = abs(dot(triangle_normal(triangle), way)) * inversesqrt(max(squared, 1e-30));
+    float area = triangle_area(triangle) * width * width;
     return angle > 0.0 ? divide(1.0, angle) : divide(squared, max(cosine * area, 1e-30));
 }
 
@@ -211,110 +240,113 @@ float environment_density(Emitter sky, vec3 position, vec3 ns, vec3 wi)
     return density_with_table(sky, by_table, wi, others);
 }
 
+// Light from a point, which leaves with this share of its strength.
+void arrive_from_point(inout Arriving arriving, vec3 position, float share)
+{
+    vec3 way = arriving.target - position;
+    float distance_squared = dot(way, way);
+    arriving.wi = distance_squared > 0.0 ? way * inversesqrt(distance_squared) : vec3(0.0);
+    arriving.radiance *= distance_squared > 0.0 ? divide(share, distance_squared) : 0.0;
+}
+
+// A direction within the triangle as it is seen, or a point of it where that has no area.
+void sample_lamp(inout Arriving arriving, Emitter light, vec3 position, vec2 u)
+{
+    Triangle triangle = triangles[light.triangle];
+    SurfaceMaterial material = materials[triangle.material];
+    Triangle shining = triangle;
+    float area = triangle_area(triangle);
+    vec2 at = sample_triangle(u);
+    if (HAS_TEXTURES) {
+        shining = lamp_corners(light, triangle);
+        area *= light.position.z * light.position.z;
+        at = weights_in_triangle(light, at);
+    }
+    vec3 normal = triangle_normal(triangle);
+    vec3 point = triangle_point(triangle, at.x, at.y);
+    float side = dot(normal, position - point);
+    if (HAS_TWO_SIDED) {
+        normal = material.two_sided != 0 && side < 0.0 ? -normal : normal;
+    }
+    float cosine = is_before(side, position, triangle_error(triangle)) ? max(dot(normal, normalize(position - point)), 0.0) : 0.0;
+    vec4 direction = vec4(0.0);
+    if (cosine > 0.0) {
+        direction = sample_spherical_triangle(normalize(shining.a - position), normalize(shining.b - position), normalize(shining.c - position), u);
+    }
+    float approach = -dot(direction.xyz, normal);
+    bool by_direction = direction.w > 0.0 && approach > 0.0;
+    if (by_direction) {
+        point = position + direction.xyz * divide(dot(normal, position - triangle.a), approach);
+        if (HAS_TEXTURES) {
+            at = triangle_weights(triangle, point);
+        }
+        arriving.wi = direction.xyz;
+    }
+    arriving.target = offset_origin(point, position_error(point) + triangle_error(triangle), normal, normal);
+    arriving.radiance = material.emission * lamp_share(material, light.triangle, at.x, at.y) * divide(by_direction ? direction.w : area, light.probability);
+    if (!by_direction) {
+        arrive_from_point(arriving, position, cosine);
+    }
+    if (HAS_LAYERS) {
+        arriving.density = lamp_density(light, triangle, position, arriving.target);
+    }
+}
+
+void sample_disc_light(inout Arriving arriving, Emitter light, vec3 position, vec2 u)
+{
+    vec3 point = sample_disc(light.position, light.direction, light.size, u);
+    arriving.target = offset_origin(point, position_error(point), light.direction, light.direction);
+    arriving.radiance *= 3.14159265358979324 * light.size * light.size;
+    float cosine = dot(light.direction, normalize(position - point));
+    float share = light.kind == EMITTER_DISC_COSINE ? max(cosine, 0.0) : (cosine > 0.0 ? 1.0 : 0.0);
+    share = is_before(dot(light.direction, position - light.position), position, position_error(light.position)) ? share : 0.0;
+    arrive_from_point(arriving, position, share);
+}
+
+void sample_environment(inout Arriving arriving, Emitter light, vec3 position, vec3 ns, vec2 u)
+{
+    arriving.is_far = true;
+    if (HAS_OPENINGS && openings[0].radius != 0.0) {
+        SampledSky sampled = sample_sky(light, position, ns, u);
+        arriving.wi = sampled.wi;
+        arriving.is_beside = !sampled.is_aimed;
+        arriving.radiance *= divide(1.0, max(sampled.density, 1e-6));
+    } else if (HAS_SKY_PICTURE) {
+        SkySample sampled = sample_open_sky(light, ns, u);
+        arriving.wi = sampled.wi;
+        arriving.radiance *= divide(1.0, max(sampled.density, 1e-30));
+    } else {
+        vec3 local = sample_cosine_hemisphere(u.x, u.y);
+        arriving.wi = to_frame(local, ns);
+        arriving.radiance *= divide(3.14159265358979324, max(local.z, 1e-6));
+    }
+    if (HAS_SKY_PICTURE) {
+        arriving.radiance *= sample_texture(textures[light.triangle], place_in_sky(light, arriving.wi)).xyz;
+    }
+    if (HAS_LAYERS) {
+        arriving.density = environment_density(light, position, ns, arriving.wi);
+    }
+}
+
 // `light` has the probability with which it was chosen; u is for its area.
 Arriving sample_light(Emitter light, vec3 position, vec3 ns, vec2 u)
 {
     Arriving arriving = Arriving(vec3(0.0), divide(light.strength, light.probability), light.position, false, false, 0.0);
-    float cos_light = 1.0;
-    bool by_direction = false;
     if (HAS_TRIANGLE_LIGHTS && light.kind == EMITTER_TRIANGLE) {
-        Triangle triangle = triangles[light.triangle];
-        SurfaceMaterial material = materials[triangle.material];
-        Triangle shining = triangle;
-        float area = triangle_area(triangle);
-        vec2 at = sample_triangle(u);
-        if (HAS_TEXTURES) {
-            shining = lamp_corners(light, triangle);
-            area *= light.position.z * light.position.z;
-            at = weights_in_triangle(light, at);
-        }
-        vec3 normal = triangle_normal(triangle);
-        vec3 point = triangle_point(triangle, at.x, at.y);
-        float side = dot(normal, position - point);
-        if (HAS_TWO_SIDED) {
-            normal = material.two_sided != 0 && side < 0.0 ? -normal : normal;
-        }
-        arriving.target = offset_origin(point, position_error(point) + triangle_error(triangle), normal, normal);
-        float spread = divide(area, light.probability);
-        cos_light = is_before(side, position, triangle_error(triangle)) ? max(dot(normal, normalize(position - point)), 0.0) : 0.0;
-        if (cos_light > 0.0) {
-            vec4 direction = sample_spherical_triangle(normalize(shining.a - position), normalize(shining.b - position),
-                                                       normalize(shining.c - position), u);
-            float approach = -dot(direction.xyz, normal);
-            if (direction.w > 0.0 && approach > 0.0) {
-                by_direction = true;
-                point = position + direction.xyz * divide(dot(normal, position - triangle.a), approach);
-                float error = position_error(point) + triangle_error(triangle);
-                arriving.target = offset_origin(point, error, normal, normal);
-                if (HAS_TEXTURES) {
-                    at = triangle_weights(triangle, point);
-                }
-                spread = divide(direction.w, light.probability);
-                arriving.wi = direction.xyz;
-            }
-        }
-        arriving.radiance = material.emission * lamp_share(material, light.triangle, at.x, at.y) * spread;
-    }
-    if (HAS_SPOT_LIGHTS && light.kind == EMITTER_SPOT) {
-        cos_light = spot_falloff(light, versine_between(normalize(position - light.position), light.direction));
-    }
-    if (HAS_DISC_LIGHTS && (light.kind == EMITTER_DISC_COSINE || light.kind == EMITTER_DISC_UNIFORM)) {
-        vec3 point = sample_disc(light.position, light.direction, light.size, u);
-        arriving.target = offset_origin(point, position_error(point), light.direction, light.direction);
-        arriving.radiance *= 3.14159265358979324 * light.size * light.size;
-        float cosine = dot(light.direction, normalize(position - point));
-        cos_light = light.kind == EMITTER_DISC_COSINE ? max(cosine, 0.0) : (cosine > 0.0 ? 1.0 : 0.0);
-        cos_light = is_before(dot(light.direction, position - light.position), position, position_error(light.position)) ? cos_light : 0.0;
-    }
-    arriving.is_far = arriving.is_far || (HAS_DIRECTIONAL_LIGHTS && light.kind == EMITTER_DIRECTIONAL);
-    if (arriving.is_far) {
-        arriving.wi = -light.direction;
-    }
-    if (HAS_ENVIRONMENT && light.kind == EMITTER_ENVIRONMENT) {
+        sample_lamp(arriving, light, position, u);
+    } else if (HAS_DISC_LIGHTS && (light.kind == EMITTER_DISC_COSINE || light.kind == EMITTER_DISC_UNIFORM)) {
+        sample_disc_light(arriving, light, position, u);
+    } else if (HAS_DIRECTIONAL_LIGHTS && light.kind == EMITTER_DIRECTIONAL) {
         arriving.is_far = true;
-        bool is_open = !HAS_OPENINGS || openings[0].radius == 0.0;
-        if (is_open) {
-            if (HAS_SKY_PICTURE) {
-                SkySample sampled = sample_open_sky(light, ns, u);
-                arriving.wi = sampled.wi;
-                arriving.radiance *= divide(1.0, max(sampled.density, 1e-30));
-            } else {
-                vec3 local = sample_cosine_hemisphere(u.x, u.y);
-                arriving.wi = to_frame(local, ns);
-                arriving.radiance *= divide(3.14159265358979324, max(local.z, 1e-6));
-            }
-        } else {
-            SampledSky sampled = sample_sky(light, position, ns, u.xy);
-            arriving.wi = sampled.wi;
-            arriving.is_beside = !sampled.is_aimed;
-            arriving.radiance *= divide(1.0, max(sampled.density, 1e-6));
+        arriving.wi = -light.direction;
+    } else if (HAS_ENVIRONMENT && light.kind == EMITTER_ENVIRONMENT) {
+        sample_environment(arriving, light, position, ns, u);
+    } else {
+        float share = 1.0;
+        if (HAS_SPOT_LIGHTS && light.kind == EMITTER_SPOT) {
+            share = spot_falloff(light, versine_between(normalize(position - light.position), light.direction));
         }
-        if (HAS_SKY_PICTURE) {
-            arriving.radiance *= sample_texture(textures[light.triangle], place_in_sky(light, arriving.wi)).xyz;
-        }
-    }
-    if (HAS_LAYERS) {
-        if (HAS_ENVIRONMENT && light.kind == EMITTER_ENVIRONMENT) {
-            arriving.density = environment_density(light, position, ns, arriving.wi);
-        }
-        if (HAS_TRIANGLE_LIGHTS && light.kind == EMITTER_TRIANGLE) {
-            Triangle triangle = triangles[light.triangle];
-            float width = 1.0;
-            Triangle shining = triangle;
-            if (HAS_TEXTURES) {
-                shining = lamp_corners(light, triangle);
-                width = light.position.z;
-            }
-            arriving.density = lamp_density(shining, triangle_normal(triangle), position, arriving.target, triangle_area(triangle) * width * width);
-        }
-    }
-    if (!arriving.is_far) {
-        vec3 way = arriving.target - position;
-        float distance_squared = dot(way, way);
-        if (!by_direction) {
-            arriving.wi = distance_squared > 0.0 ? way * inversesqrt(distance_squared) : vec3(0.0);
-            arriving.radiance *= distance_squared > 0.0 ? divide(cos_light, distance_squared) : 0.0;
-        }
+        arrive_from_point(arriving, position, share);
     }
     return arriving;
 }
@@ -360,17 +392,13 @@ float lamp_light_density(uint emitter_count, Hit hit, vec3 position, vec3 point)
         if (light.kind != EMITTER_TRIANGLE || light.triangle != hit.triangle) {
             break;
         }
-        Triangle shining = triangle;
-        float width = 1.0;
         bool is_within = true;
         if (HAS_TEXTURES) {
-            shining = lamp_corners(light, triangle);
-            width = light.position.z;
-            vec2 at = divide(vec2(hit.u, hit.v) - light.position.xy, width);
+            vec2 at = divide(vec2(hit.u, hit.v) - light.position.xy, light.position.z);
             is_within = at.x >= 0.0 && at.y >= 0.0 && at.x + at.y <= 1.0;
         }
         if (is_within) {
-            return light.probability * lamp_density(shining, triangle_normal(triangle), position, point, triangle_area(triangle) * width * width);
+            return light.probability * lamp_density(light, triangle, position, point);
         }
     }
     return 0.0;
