@@ -5,12 +5,10 @@ use std::fmt::Write;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use super::report::{Intervals, Tail, errors, ledger};
-use crate::engine::bias::Bias;
-use crate::engine::error_bound::{ErrorPlaces, FilmError};
+use super::report::{Errors, errors, ledger};
+use crate::engine::error_bound::FilmError;
 use crate::engine::saved::SavedRun;
 use crate::engine::scene::SceneFilm;
-use crate::engine::unknown::Unknown;
 use crate::ledger::{Fates, Ledger};
 use crate::text::counted;
 
@@ -28,15 +26,8 @@ struct Report<'a> {
     missing: &'a [String],
     /// Of the photons of each map.
     ledgers: Vec<Ledger>,
-    /// As for a run; null where not known.
-    relative_error: f64,
-    error_bound: Option<f64>,
-    intervals: Intervals,
-    total_bound: Option<f64>,
-    unknown: &'a Unknown,
-    tail: Tail,
-    noise_sits: Option<ErrorPlaces>,
-    bias: Option<Bias>,
+    #[serde(flatten)]
+    errors: Errors<'a>,
 }
 
 pub fn json(run: &SavedRun, film: &SceneFilm, missing: &[String]) -> Vec<u8> {
@@ -51,14 +42,7 @@ pub fn json(run: &SavedRun, film: &SceneFilm, missing: &[String]) -> Vec<u8> {
         blocks_wanted: run.wanted,
         missing,
         ledgers: run.fates.iter().map(Fates::ledger).collect(),
-        relative_error: error.noise,
-        error_bound: Some(error.bound(confidence)).filter(|bound| bound.is_finite()),
-        intervals: Intervals::of(error.blocks, confidence),
-        total_bound: Some(error.bound_of_all(confidence, 0.0)).filter(|bound| bound.is_finite()),
-        unknown: &error.unknown,
-        tail: Tail::of(&error, confidence),
-        noise_sits: error.places,
-        bias: error.bias,
+        errors: Errors::of(&error, confidence, 0.0),
     };
     serde_json::to_vec_pretty(&report).expect("a report is plain data")
 }

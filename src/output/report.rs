@@ -37,6 +37,18 @@ pub(super) struct Common<'a, Settings> {
     photons_left_out: u64,
     /// Light that limits kept from the result.
     losses: Losses,
+    #[serde(flatten)]
+    errors: Errors<'a>,
+    /// Nonfinite values that `--paranoid` found; null without it.
+    nonfinite_values: Option<&'a NonfiniteValues>,
+    timings: &'a [Row],
+    dispatches: u64,
+    submissions: u64,
+}
+
+/// How far a result may be off.
+#[derive(Serialize)]
+pub(super) struct Errors<'a> {
     /// Of the noise, as the settings' `measure` says; null where fewer than eight blocks leave it unknown.
     relative_error: f64,
     /// What it is not above, with the confidence of the settings; null also while all is black and need not be.
@@ -52,17 +64,29 @@ pub(super) struct Common<'a, Settings> {
     noise_sits: Option<ErrorPlaces>,
     /// Of the radius, relative to the result; null where it was not measured.
     bias: Option<Bias>,
-    /// Nonfinite values that `--paranoid` found; null without it.
-    nonfinite_values: Option<&'a NonfiniteValues>,
-    timings: &'a [Row],
-    dispatches: u64,
-    submissions: u64,
+}
+
+impl Errors<'_> {
+    /// `lost` is light that limits kept, relative to the result.
+    pub(super) fn of(error: &FilmError, confidence: f64, lost: f64) -> Errors<'_> {
+        let known = |bound: f64| Some(bound).filter(|bound| bound.is_finite());
+        Errors {
+            relative_error: error.noise,
+            error_bound: known(error.bound(confidence)),
+            intervals: Intervals::of(error.blocks, confidence),
+            total_bound: known(error.bound_of_all(confidence, lost)),
+            unknown: &error.unknown,
+            tail: Tail { known: error.tail_is_known(confidence), unseen: error.unseen },
+            noise_sits: error.places,
+            bias: error.bias,
+        }
+    }
 }
 
 /// Of the noise: whether the rounds have shown how far it reaches, and what may be missing from them, relative to the result; null
 /// while all is black.
 #[derive(Serialize)]
-pub(super) struct Tail {
+struct Tail {
     known: bool,
     unseen: f64,
 }
@@ -70,22 +94,16 @@ pub(super) struct Tail {
 /// What follows from a standard error: light lies within so many of them to either side, with this confidence; null where fewer than
 /// eight blocks leave errors unknown.
 #[derive(Serialize)]
-pub(super) struct Intervals {
+struct Intervals {
     #[serde(flatten)]
     source: ErrorSource,
     standard_errors: Option<f64>,
 }
 
 impl Intervals {
-    pub(super) fn of(blocks: u32, confidence: f64) -> Intervals {
+    fn of(blocks: u32, confidence: f64) -> Intervals {
         let source = ErrorSource { degrees_of_freedom: blocks.saturating_sub(1), confidence };
         Intervals { source, standard_errors: source.reach() }
-    }
-}
-
-impl Tail {
-    pub(super) fn of(error: &FilmError, confidence: f64) -> Tail {
-        Tail { known: error.tail_is_known(confidence), unseen: error.unseen }
     }
 }
 
@@ -108,14 +126,7 @@ pub(super) fn common<'a, Plan, Film, Settings>(
         blocks: error.blocks,
         photons_left_out: run.left_out,
         losses: run.losses,
-        relative_error: error.noise,
-        error_bound: Some(error.bound(confidence)).filter(|bound| bound.is_finite()),
-        intervals: Intervals::of(error.blocks, confidence),
-        total_bound: Some(error.bound_of_all(confidence, run.losses.relative)).filter(|bound| bound.is_finite()),
-        unknown: &error.unknown,
-        tail: Tail::of(error, confidence),
-        noise_sits: error.places,
-        bias: error.bias,
+        errors: Errors::of(error, confidence, run.losses.relative),
         nonfinite_values: run.nonfinite_values.as_ref(),
         timings: run.timings.rows(),
         dispatches: run.dispatches,

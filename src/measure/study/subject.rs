@@ -29,6 +29,7 @@ use crate::scene::{Camera, Light, Mesh, Scene};
 use crate::settings::scene::{Effect, SceneSettings};
 use crate::settings::stop::Stop;
 use crate::settings::{Builder, Preset, RoomSettings};
+use crate::text::quoted;
 use crate::timings::Timings;
 use crate::verify::judge::radiosity::inward;
 
@@ -148,8 +149,8 @@ impl Subject {
     fn job(&self) -> String {
         let [width, height] = self.pixels;
         match self.camera {
-            Some(_) => format!("render {} --size {width}x{height} -o picture.exr", quoted(&self.name)),
-            None => format!("probe {} --points {POINTS} -o irradiance.csv", quoted(&self.name)),
+            Some(_) => format!("render {} --size {width}x{height} -o picture.exr", quoted(self.name.clone())),
+            None => format!("probe {} --points {POINTS} -o irradiance.csv", quoted(self.name.clone())),
         }
     }
 
@@ -276,12 +277,6 @@ impl Subject {
         let plan = scene::trial::plan(gpu, &self.scene, &view, &settings, target.sensor())?;
         scene::light(gpu, &view, plan, control)
     }
-}
-
-/// As a shell takes it for one word.
-fn quoted(name: &str) -> String {
-    let plain = |letter: char| letter.is_ascii_alphanumeric() || "-_./+,".contains(letter);
-    if name.chars().all(plain) { name.to_owned() } else { format!("'{}'", name.replace('\'', "'\\''")) }
 }
 
 /// Whether light goes from lamps that no path meets over mirrors or through glass.

@@ -1,6 +1,6 @@
 //! Findings about the light: the figures over several seeds.
 
-use super::{Evidence, MARGIN, Quantity, Standing, Verdict};
+use super::{Evidence, Quantity, Verdict};
 use crate::engine::room::film::WallEstimate;
 use crate::measure::interval::{Decision, Interval};
 use crate::measure::paper::Reproduction;
@@ -40,12 +40,10 @@ pub fn figure_1(found: &Reproduction) -> Option<Verdict> {
     let figure = figure(found, 1)?;
     let contrast = figure.over_seeds(|frames| mean_between(&frames[0], 0.9, 1.0) / mean_between(&frames[0], 0.0, 0.1));
     let lit = mean(illumination(&figure.frames[0].walls).map(|value| f64::from(u8::from(value > 0.0))));
-    let decision = contrast.above(MARGIN);
-    Some(Verdict {
+    Verdict {
         topic: "Places near the lights are brighter, and no place is black",
         then: "seen".to_owned(),
         here: format!("{} of the points receive photons", percent(lit)),
-        elsewhere: String::new(),
         text: format!(
             "The brightest tenth of all points is {} as bright as the dimmest tenth. {} of the points receive photons. {}",
             Quantity::Factor.shown(&contrast),
@@ -55,14 +53,10 @@ pub fn figure_1(found: &Reproduction) -> Option<Verdict> {
                 percent(noise)
             ))
         ),
-        evidence: vec![Evidence {
-            what: "brightest / dimmest tenth of the points".to_owned(),
-            interval: contrast,
-            quantity: Quantity::Factor,
-            decision: Some(decision),
-        }],
-        standing: Standing::of([decision]),
-    })
+        evidence: vec![Evidence::above_margin("brightest / dimmest tenth of the points".to_owned(), contrast)],
+        ..Verdict::default()
+    }
+    .decided()
 }
 
 /// Standard deviation of a point between seeds, over the mean of all points; `None` with one seed.
@@ -87,13 +81,11 @@ pub fn figure_3(found: &Reproduction) -> Option<Verdict> {
         topic: "Lower shininess, more light",
         then: "not described".to_owned(),
         here: Quantity::Factor.shown(&ratio),
-        elsewhere: String::new(),
         text: format!(
             "The walls become brighter as the shininess decreases: the mean illumination at 0.01 is {} that at 2.0. The paper makes no statement to compare this with.",
             Quantity::Factor.shown(&ratio)
         ),
-        evidence: Vec::new(),
-        standing: None,
+        ..Verdict::default()
     })
 }
 
@@ -109,11 +101,10 @@ pub(super) fn indirect_light(found: &Reproduction) -> Option<Verdict> {
         .into_iter()
         .map(|(what, lit)| {
             let interval = figure.over_seeds(|frames| wall_mean(&frames[0], lit) / wall_mean(&frames[1], lit));
-            let decision = Some(interval.above(MARGIN));
-            Evidence { what: format!("15 / 2 bounces, {what}"), interval, quantity: Quantity::Factor, decision }
+            Evidence::above_margin(format!("15 / 2 bounces, {what}"), interval)
         })
         .collect();
-    Some(Verdict {
+    Verdict {
         topic: "More bounces light the indirect areas",
         then: "seen in figure 2".to_owned(),
         here: format!("{} as bright on walls without a light", evidence[0].shown()),
@@ -123,9 +114,10 @@ pub(super) fn indirect_light(found: &Reproduction) -> Option<Verdict> {
             evidence[0].shown(),
             evidence[1].shown()
         ),
-        standing: Standing::of(evidence.iter().filter_map(|one| one.decision)),
         evidence,
-    })
+        ..Verdict::default()
+    }
+    .decided()
 }
 
 /// Figure 4's noise: the distance of each picture from the one with the most rounds.
@@ -150,26 +142,20 @@ pub(super) fn noise(found: &Reproduction) -> Option<Verdict> {
         Decision::No => "this run disagrees",
         Decision::Undecided => "this run does not decide whether that is so",
     };
-    let decision = interval.above(MARGIN);
     let [from, to, of] = [first, next_to_last, last].map(|frame| frame.settings.rounds);
-    Some(Verdict {
+    Verdict {
         topic: "More rounds lower the noise",
         then: "seen in figure 4".to_owned(),
         here: format!("{} less from {from} to {to} rounds", Quantity::Factor.shown(&interval)),
-        elsewhere: String::new(),
         text: format!(
             "From {from} to {to} rounds, the RMS difference from the image of {of} rounds falls by a factor of {}. Independent rounds predict {}; {end}.",
             Quantity::Factor.shown(&interval),
             times(independent)
         ),
-        evidence: vec![Evidence {
-            what: format!("RMS difference, {from} / {to} rounds"),
-            interval,
-            quantity: Quantity::Factor,
-            decision: Some(decision),
-        }],
-        standing: Standing::of([decision]),
-    })
+        evidence: vec![Evidence::above_margin(format!("RMS difference, {from} / {to} rounds"), interval)],
+        ..Verdict::default()
+    }
+    .decided()
 }
 
 /// What rounds do not mend: the rim of each wall, where part of the fixed disc lies beyond the wall.
@@ -199,7 +185,7 @@ pub(super) fn bias(found: &Reproduction) -> Option<Verdict> {
             "At the outermost points of each wall, part of the disc lies beyond the wall. The shares are relative to a value that is corrected for this. {end}"
         ),
         evidence: vec![rim(&first.label, before), rim(&last.label, after)],
-        standing: None,
+        ..Verdict::default()
     })
 }
 
@@ -226,6 +212,7 @@ fn rim_share(frame: &Frame) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Standing;
     use super::*;
     use crate::measure::paper::sample;
     use crate::output::image::tests::walls_of;

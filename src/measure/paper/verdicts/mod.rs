@@ -33,36 +33,31 @@ impl Standing {
     }
 
     pub fn words(self) -> &'static str {
-        self.words_and_class().0
-    }
-
-    /// Its class in the style sheet.
-    pub fn class(self) -> &'static str {
-        self.words_and_class().1
+        self.in_words()[0]
     }
 
     /// The same of what a figure shows.
     pub fn words_for_figures(self) -> &'static str {
-        match self {
-            Standing::Holds => "the same is seen",
-            Standing::HoldsInPart => "the same is seen in part",
-            Standing::NoLonger => "the same is not seen",
-            Standing::Undecided => "not decided by this run",
-        }
+        self.in_words()[1]
     }
 
-    fn words_and_class(self) -> (&'static str, &'static str) {
+    /// Its class in the style sheet.
+    pub fn class(self) -> &'static str {
+        self.in_words()[2]
+    }
+
+    fn in_words(self) -> [&'static str; 3] {
         match self {
-            Standing::Holds => ("still holds", "holds"),
-            Standing::HoldsInPart => ("holds in part", "in-part"),
-            Standing::NoLonger => ("no longer holds", "no-longer"),
-            Standing::Undecided => ("not decided by this run", "undecided"),
+            Standing::Holds => ["still holds", "the same is seen", "holds"],
+            Standing::HoldsInPart => ["holds in part", "the same is seen in part", "in-part"],
+            Standing::NoLonger => ["no longer holds", "the same is not seen", "no-longer"],
+            Standing::Undecided => ["not decided by this run", "not decided by this run", "undecided"],
         }
     }
 }
 
 /// One finding of the paper, or one that this run adds.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Verdict {
     pub topic: &'static str,
     /// What the paper found, in a few words.
@@ -80,6 +75,12 @@ pub struct Verdict {
 }
 
 impl Verdict {
+    /// A claim of the paper's, which stands as the evidence decides; `None` where nothing does.
+    fn decided(self) -> Option<Verdict> {
+        let standing = Some(Standing::of(self.evidence.iter().filter_map(|one| one.decision))?);
+        Some(Verdict { standing, ..self })
+    }
+
     /// 'holds at 2, not decided at 2 of 4'; empty where every number decides alike.
     pub fn split(&self) -> String {
         let all: Vec<Decision> = self.evidence.iter().filter_map(|one| one.decision).collect();
@@ -115,15 +116,10 @@ pub enum Quantity {
 impl Quantity {
     /// '1.36 × (1.31 to 1.41)'; the value alone where too few runs bound it.
     pub fn shown(self, interval: &Interval) -> String {
-        let digits = |value: f64| match self {
-            Quantity::Factor => number(value),
-            Quantity::Share => number(100.0 * value),
-            Quantity::Exponent => format!("{value:.2}"),
-        };
-        let unit = match self {
-            Quantity::Factor => "\u{a0}×",
-            Quantity::Share => "\u{a0}%",
-            Quantity::Exponent => "",
+        let (digits, unit): (fn(f64) -> String, &str) = match self {
+            Quantity::Factor => (number, "\u{a0}×"),
+            Quantity::Share => (|share| number(100.0 * share), "\u{a0}%"),
+            Quantity::Exponent => (|value| format!("{value:.2}"), ""),
         };
         let value = digits(interval.value) + unit;
         if interval.is_bounded() { format!("{value} ({} to {})", digits(interval.low), digits(interval.high)) } else { value }
@@ -131,6 +127,11 @@ impl Quantity {
 }
 
 impl Evidence {
+    /// A factor that supports the claim where it is above [`MARGIN`].
+    fn above_margin(what: String, interval: Interval) -> Evidence {
+        Evidence { what, interval, quantity: Quantity::Factor, decision: Some(interval.above(MARGIN)) }
+    }
+
     pub fn shown(&self) -> String {
         self.quantity.shown(&self.interval)
     }

@@ -1,7 +1,7 @@
 //! Findings about running times, memory and slots.
 
 use super::{Evidence, MARGIN, Quantity, Standing, Verdict};
-use crate::measure::interval::{Decision, Interval};
+use crate::measure::interval::Interval;
 use crate::measure::line_fit::LineFit;
 use crate::measure::paper::experiments::{Implementation, Pass, TotalTime, series};
 use crate::measure::paper::{Reproduction, published};
@@ -58,36 +58,28 @@ fn elsewhere<'a>(ratios: impl Iterator<Item = &'a Ratio>) -> String {
     }
 }
 
-fn evidence(name: &str, ratios: &[Ratio], decision: impl Fn(&Interval) -> Option<Decision>) -> Vec<Evidence> {
-    let one = |ratio: &Ratio| Evidence {
-        what: format!("{name}: {}", ratio.size()),
-        interval: ratio.interval,
-        quantity: Quantity::Factor,
-        decision: decision(&ratio.interval),
-    };
-    ratios.iter().map(one).collect()
+/// That the one takes longer at each size.
+fn takes_longer(name: &str, ratios: &[Ratio]) -> Vec<Evidence> {
+    ratios.iter().map(|ratio| Evidence::above_margin(format!("{name}: {}", ratio.size()), ratio.interval)).collect()
 }
 
-fn standing(evidence: &[Evidence]) -> Option<Standing> {
-    Standing::of(evidence.iter().filter_map(|one| one.decision))
-}
-
-fn takes_longer(interval: &Interval) -> Option<Decision> {
-    Some(interval.above(MARGIN))
+/// The same where the paper claims nothing.
+fn undecided(name: &str, ratios: &[Ratio]) -> impl Iterator<Item = Evidence> {
+    takes_longer(name, ratios).into_iter().map(|one| Evidence { decision: None, ..one })
 }
 
 /// What one builder took longer than another in 2008, and here.
 fn slower(topic: &'static str, then: f64, ratios: &[Ratio], name: &str, text: &str) -> Option<Verdict> {
-    let evidence = evidence(name, ratios, takes_longer);
-    Some(Verdict {
+    Verdict {
         topic,
         then: format!("{} as long", times(then)),
         here: glance(ratios),
         elsewhere: elsewhere(ratios.iter()),
         text: text.to_owned(),
-        standing: Some(standing(&evidence)?),
-        evidence,
-    })
+        evidence: takes_longer(name, ratios),
+        ..Verdict::default()
+    }
+    .decided()
 }
 
 pub(super) fn append(found: &Reproduction) -> Option<Verdict> {
@@ -128,19 +120,16 @@ fn on_gpu(found: &Reproduction, pass: Pass) -> Option<Verdict> {
         Pass::Rendering(_) => ("The GPU renders faster than the CPU", published::RENDERING_MS, ", by brute force"),
     };
     let [naive, modified] = [Builder::Naive, Builder::Atomic].map(|builder| ratios(found, Builder::Cpu, builder, pass));
-    let mut evidence = [("naive", &naive), ("modified", &modified)]
-        .map(|(name, ratios)| evidence(&format!("CPU / {name}"), ratios, takes_longer))
-        .concat();
-    let standing = standing(&evidence)?;
+    let mut evidence = [takes_longer("CPU / naive", &naive), takes_longer("CPU / modified", &modified)].concat();
     if pass == BRUTE {
         let grid = ratios(found, Builder::Cpu, Builder::Atomic, Pass::Rendering(Gather::Grid));
-        evidence.extend(self::evidence("CPU / modified, grid on both", &grid, |_| None));
+        evidence.extend(undecided("CPU / modified, grid on both", &grid));
     }
     let mut text = format!("The factors are the times of the {} pass on one CPU thread{how}, over those on the GPU.", pass.name());
     if device.is_cpu {
         text += " Here the 'GPU' is a software device on the same CPU.";
     }
-    Some(Verdict {
+    Verdict {
         topic,
         then: format!(
             "CPU takes {} as long as naive, {} as modified",
@@ -151,8 +140,9 @@ fn on_gpu(found: &Reproduction, pass: Pass) -> Option<Verdict> {
         elsewhere: elsewhere(naive.iter().chain(&modified)),
         text,
         evidence,
-        standing: Some(standing),
-    })
+        ..Verdict::default()
+    }
+    .decided()
 }
 
 pub(super) fn ballot(found: &Reproduction) -> Option<Verdict> {
@@ -176,8 +166,8 @@ pub(super) fn ballot(found: &Reproduction) -> Option<Verdict> {
         text: format!(
             "With a ballot, a whole subgroup needs one atomic addition. The factor is the time of this map pass over that with one atomic per thread. {end}"
         ),
-        evidence: evidence("ballot / modified", &ratios, |_| None),
-        standing: None,
+        evidence: undecided("ballot / modified", &ratios).collect(),
+        ..Verdict::default()
     })
 }
 
@@ -192,16 +182,17 @@ pub(super) fn empty_slots(found: &Reproduction) -> Option<Verdict> {
     };
     let evidence: Vec<Evidence> = found.sizes()[..2].iter().filter_map(|size| at_size(*size)).collect();
     let (first, others) = evidence.split_first()?;
-    Some(Verdict {
+    Verdict {
         topic: "Most slots of the naive map stay empty",
         then: "most photons are absorbed early".to_owned(),
         here: format!("{} filled", first.shown()),
         elsewhere: others.first().map(|other| format!("{} with 15 bounces", other.shown())).unwrap_or_default(),
         text: "The naive map reserves a slot for every photon and every bounce. The claim holds where less than half of them are filled."
             .to_owned(),
-        standing: Some(standing(&evidence)?),
         evidence,
-    })
+        ..Verdict::default()
+    }
+    .decided()
 }
 
 pub(super) fn memory(found: &Reproduction) -> Option<Verdict> {
@@ -214,14 +205,13 @@ pub(super) fn memory(found: &Reproduction) -> Option<Verdict> {
         topic: "Memory limits a round to about 5000 photons",
         then: "about 5000".to_owned(),
         here: format!("{} photons", count(u64::from(most.photons))),
-        elsewhere: String::new(),
         text: format!(
             "A round of {} photons and {} bounces was run on the device. A round that exceeds a buffer is split automatically. This is a count and has no interval.",
             count(u64::from(most.photons)),
             most.bounces
         ),
-        evidence: Vec::new(),
         standing: Some(Standing::NoLonger),
+        ..Verdict::default()
     })
 }
 
@@ -244,7 +234,7 @@ pub(super) fn linear(found: &Reproduction) -> Option<Verdict> {
     let values = evidence.iter().zip(&names).map(|(fit, name)| format!("{:.2} {name}", fit.interval.value));
     let elsewhere = list(&values.skip(1).collect::<Vec<_>>());
     let here = format!("exponent {} {}", evidence.first()?.shown(), names[0]);
-    Some(Verdict {
+    Verdict {
         topic: "Time grows in proportion to photons",
         then: format!("exponent {}", Quantity::Exponent.shown(&exponent(&paper)?)),
         here,
@@ -255,9 +245,10 @@ pub(super) fn linear(found: &Reproduction) -> Option<Verdict> {
             1.0 - LINEAR_WITHIN,
             1.0 + LINEAR_WITHIN
         ),
-        standing: Some(standing(&evidence)?),
         evidence,
-    })
+        ..Verdict::default()
+    }
+    .decided()
 }
 
 pub(super) fn table_1(found: &Reproduction) -> Option<Verdict> {
@@ -274,12 +265,10 @@ pub(super) fn table_1(found: &Reproduction) -> Option<Verdict> {
         topic: "The longest run of table 1",
         then: duration(then_ms),
         here: list(&described),
-        elsewhere: String::new(),
         text: format!(
             "{photons} photons in {rounds} rounds. A sorted grid gives a bit-identical image. Each time is one run and has no interval."
         ),
-        evidence: Vec::new(),
-        standing: None,
+        ..Verdict::default()
     })
 }
 
