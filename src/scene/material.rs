@@ -4,7 +4,6 @@ use glam::Vec3;
 
 pub use super::layers::{Layers, Medium, NormalMap, TextureUse, UvTransform};
 use crate::constants::{DELTA_ALPHA_INVERSE, LAYER_NORMAL, MAP_ALPHA_PER_MILLE};
-use crate::settings::scene::Effect;
 
 /// How a surface scatters light. Its base colour is the share it scatters, per channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -212,32 +211,6 @@ impl Material {
     /// Whether all light passes it as if it were not there, whatever its textures have.
     pub fn is_not_there(&self) -> bool {
         self.surface == Surface::Layered && self.coverage == Coverage::Blend { alpha: 0.0 }
-    }
-
-    /// Takes away what needs an effect.
-    pub fn leave_out(&mut self, effect: Effect) {
-        let layers = &mut self.layers;
-        match effect {
-            Effect::MeshLights => self.emission = Vec3::ZERO,
-            Effect::Glossy if matches!(self.surface, Surface::Glossy { .. }) => self.surface = Surface::Lambert,
-            Effect::Layers if self.surface == Surface::Layered => self.surface = Surface::Lambert,
-            Effect::Transmission => layers.transmission = 0.0,
-            Effect::Media => layers.medium = layers.medium.map(|_| Medium::CLEAR),
-            Effect::DiffuseTransmission => layers.diffuse_transmission = 0.0,
-            Effect::Anisotropy => layers.anisotropy = 0.0,
-            Effect::Iridescence => layers.iridescence = 0.0,
-            Effect::Dispersion => layers.dispersion = 0.0,
-            Effect::ClearCoat => layers.coat = 0.0,
-            Effect::Sheen => layers.sheen_colour = Vec3::ZERO,
-            Effect::NormalMaps => (self.normal_map, layers.coat_normal_map) = (None, None),
-            Effect::Alpha => self.coverage = Coverage::Whole,
-            Effect::TwoSided => self.two_sided = false,
-            Effect::Textures => {
-                (self.base_colour_texture, self.emission_texture, self.normal_map) = (None, None, None);
-                *layers = layers.without_textures();
-            }
-            _ => {}
-        }
     }
 
     /// Every use of a texture.
