@@ -10,7 +10,7 @@ use crate::error::Result;
 #[derive(Subcommand)]
 pub(super) enum Command {
     /// Measure error against time for every setting on this device, and write a page about it
-    #[command(after_help = STUDY)]
+    #[command(after_help = STUDY, mut_arg("scene", |argument| argument.help(study::scene_help())))]
     Study(study::StudyArgs),
     /// Measure the speed of every pass against the limits of the device
     #[command(after_help = BENCH)]

@@ -19,6 +19,8 @@ pub(super) const BAKE: u32 = options::Command::Bake as u32;
 pub(super) const PROBE: u32 = options::Command::Probe as u32;
 pub(super) const MAP: u32 = options::Command::Map as u32;
 pub(super) const PLAN: u32 = options::Command::Plan as u32;
+#[cfg(feature = "lab")]
+pub(super) const STUDY: u32 = options::Command::Study as u32;
 pub(super) const BOX: u32 = options::Command::Box as u32;
 
 /// What a command line calls the scene.

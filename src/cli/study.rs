@@ -6,13 +6,15 @@ use std::sync::atomic::AtomicBool;
 use clap::Args;
 
 use super::progress::{ProgressArgs, ProgressReporter};
+use super::request::{RequestArgs, STUDY};
 use super::values::{parse_integer, parse_seconds, parse_within};
 use super::{DeviceArgs, End, complain, help, say};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::measure::study::{self, Request, peers};
 use crate::output::destination::Folder;
-use crate::render::Seconds;
+use crate::render::options::row;
+use crate::render::{Event, Observer, PreparedScene, Seconds};
 use crate::scene::Scene;
 
 #[derive(Args)]
@@ -20,8 +22,8 @@ pub(super) struct StudyArgs {
     /// Folder for index.html, points.csv, study.json and charts; a study that was interrupted resumes from what is there
     #[arg(short, long, alias = "out", value_name = "DIR", help_heading = "Output")]
     output: PathBuf,
-    #[arg(value_name = "SCENE", help = scene_help())]
-    scene: String,
+    #[command(flatten)]
+    request: RequestArgs<STUDY>,
     /// Time of all measurements together, without a path-traced reference: 90s, 10m
     #[arg(long, value_name = "TIME", value_parser = parse_seconds, allow_hyphen_values = true, default_value = "4m", help_heading = "When to stop")]
     budget: Seconds,
@@ -52,16 +54,21 @@ pub(super) struct StudyArgs {
     device: DeviceArgs,
 }
 
-fn scene_help() -> String {
+/// Fields that say which camera looks, and how.
+const CAMERA: [&str; 8] = ["camera", "eye", "look_at", "up", "fov", "orthographic", "aperture", "focus"];
+
+pub(super) fn scene_help() -> String {
     let reference = "The reference is radiosity for open-box, the closed form for scenes of one floor, and path tracing for others";
     format!("{}. {reference}", help::scene())
 }
 
 pub(super) fn run(args: &StudyArgs, cancelled: &AtomicBool) -> Result<End> {
+    let view = &args.request.0;
+    view.check_camera()?;
     let folder = Folder::open("-o", &args.output)?;
     let budget = study::budget(args.budget.0)?;
     let request = |is_cpu: bool| {
-        let usual = Request::usual(&args.scene, is_cpu);
+        let usual = Request::usual(&view.scene, is_cpu);
         Request {
             size: args.side.unwrap_or(usual.size),
             photons: args.photons.unwrap_or(usual.photons),
@@ -69,20 +76,24 @@ pub(super) fn run(args: &StudyArgs, cancelled: &AtomicBool) -> Result<End> {
             seed: args.seed,
             reference_samples: args.reference_samples,
             budget,
+            view: view.words().split_off(1),
             most_rounds: args.rounds,
             ..usual
         }
     };
     request(true).validate()?;
     let reporter = ProgressReporter::new(&args.progress);
-    reporter.status(&format!("reading {}", args.scene));
-    let scene = Scene::open(&args.scene, false)?;
-    for warning in &scene.warnings {
-        complain(&format!("warning: {warning}"));
+    let tell = |event: Event| reporter.event(event);
+    let observer = Observer { cancelled, tell: &tell };
+    let mut scene = Scene::clone(&PreparedScene::read(view, &observer)?.scene);
+    if CAMERA.iter().any(|field| row(field).is_some_and(|row| row.text(view).is_some())) {
+        // The first camera is the one that is studied.
+        let (camera, _) = view.viewpoint(&scene, None, &observer)?;
+        scene.cameras.insert(0, camera);
     }
     let gpu = Gpu::open(&args.device.steady())?;
     reporter.device(Some(&gpu));
-    let peers = args.peers.as_ref().map_or(Ok(Vec::new()), |path| peers::read(path, &args.scene))?;
+    let peers = args.peers.as_ref().map_or(Ok(Vec::new()), |path| peers::read(path, &view.scene))?;
     let request = Request { peers, ..request(gpu.facts().kind == "cpu") };
     reporter.note(&format!(
         "plan: {}, {side} along a side; {} photons per round, {} runs of each point; stops measuring after {} s",

@@ -55,6 +55,7 @@ pub enum Command {
     Plan = 1 << 5,
     /// Without a name: the paper's box.
     Box = 1 << 6,
+    Study = 1 << 7,
 }
 
 const R: u32 = Command::Render as u32;
@@ -64,6 +65,7 @@ const P: u32 = Command::Probe as u32;
 const M: u32 = Command::Map as u32;
 const L: u32 = Command::Plan as u32;
 const X: u32 = Command::Box as u32;
+const S: u32 = Command::Study as u32;
 /// Those that light a scene to its end, and what they share with `plan`, which shows what they would do.
 const LIT: u32 = R | B | P;
 const RUNS: u32 = LIT | L;
@@ -123,33 +125,33 @@ pub const ROWS: &[Row] = rows! {
             requires "output";
     }
     Scene {
-        radiometric "" Picture SCENES
+        radiometric "" Picture (SCENES | S)
             "Take the intensities of the lights of a glTF file as W/sr and W/m2" default "candela and lux, divided by 683 lm/W";
-        at "SECONDS" Picture SCENES
+        at "SECONDS" Picture (SCENES | S)
             "Take nodes, skins and morph targets as the file's first animation has them at this time" default "at rest";
-        environment "R,G,B|FILE" Picture SCENES
+        environment "R,G,B|FILE" Picture (SCENES | S)
             "Light from beyond the scene in place of the file's own: W/m2/sr, one number or three for red, green and blue, or a picture of all directions (equirectangular, .hdr or .exr)"
             default "the file's; 1 if nothing in the file emits light";
-        sun "AZIMUTH,ELEVATION" Picture SCENES
+        sun "AZIMUTH,ELEVATION" Picture (SCENES | S)
             "Add a sun, degrees clockwise from -z as seen from above and above the horizon, and the clear sky that belongs to it unless `environment` is given";
-        environment_rotate "DEGREES" Picture SCENES
+        environment_rotate "DEGREES" Picture (SCENES | S)
             "Turn the environment's picture about the vertical, degrees, counter-clockwise as seen from above; not the sky of `sun`";
-        environment_strength "FACTOR" Picture SCENES "Multiply the environment's light, or that of `sun` and its sky";
-        camera "NAME" Picture SEEN "Camera by name" default "the first one; one that sees the whole scene if it has none";
-        eye "X,Y,Z" Picture (SEEN | X) "Where the camera stands, metres, in place of where the scene has it"
+        environment_strength "FACTOR" Picture (SCENES | S) "Multiply the environment's light, or that of `sun` and its sky";
+        camera "NAME" Picture (SEEN | S) "Camera by name" default "the first one; one that sees the whole scene if it has none";
+        eye "X,Y,Z" Picture (SEEN | X | S) "Where the camera stands, metres, in place of where the scene has it"
             box "Position of the eye for the Phong weight, metres"
             default "0,0,1";
-        look_at "X,Y,Z" Picture SEEN "What it looks at, metres" default "straight on, as the scene's camera does";
-        up "X,Y,Z" Picture SEEN "What is up in its picture, as a direction" default "0,1,0 with `look_at`";
-        fov "DEGREES" Picture SEEN
+        look_at "X,Y,Z" Picture (SEEN | S) "What it looks at, metres" default "straight on, as the scene's camera does";
+        up "X,Y,Z" Picture (SEEN | S) "What is up in its picture, as a direction" default "0,1,0 with `look_at`";
+        fov "DEGREES" Picture (SEEN | S)
             "Angle between the picture's lower and upper edge, degrees" default "that of the scene's camera";
-        orthographic "METRES" Picture SEEN "Height of what the picture shows by parallel rays, metres" conflicts ["fov"];
+        orthographic "METRES" Picture (SEEN | S) "Height of what the picture shows by parallel rays, metres" conflicts ["fov"];
         size "WIDTH[xHEIGHT]" Picture SEEN
             "Size of the picture in pixels; a width alone takes its height from the camera's aspect ratio"
             default "about 307200 pixels in the camera's aspect ratio, 640x480 if it has none";
-        aperture "METRES" Picture SEEN
+        aperture "METRES" Picture (SEEN | S)
             "Diameter of the camera's lens, metres: what is not in focus is blurred" default "0, a pinhole";
-        focus "METRES" Picture SEEN
+        focus "METRES" Picture (SEEN | S)
             "Distance of the plane in focus, metres" default "that of what the middle of the picture shows" requires "aperture";
         emission "LAW" Picture X
             "Angular distribution of emission: constant over the hemisphere, or proportional to the cosine" default "uniform";

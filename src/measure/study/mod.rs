@@ -40,6 +40,9 @@ use subject::Subject;
 pub struct Request {
     /// As the user names it.
     pub scene: String,
+    /// Options of its light and its camera, as of `photonmill render`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub view: Vec<String>,
     /// Pixels along the longer side of the picture, or texels along each wall of the paper's box.
     pub size: u32,
     /// Photons of a round, from which the axis of photons goes up and down.
@@ -73,6 +76,7 @@ impl Request {
     pub fn usual(scene: &str, is_cpu: bool) -> Request {
         Request {
             scene: scene.to_owned(),
+            view: Vec::new(),
             size: match (scene == "open-box", is_cpu) {
                 (true, true) => 24,
                 (false, false) => 128,

@@ -47,8 +47,9 @@ pub struct Subject {
     side: u32,
     /// Of the camera's picture.
     pixels: [u32; 2],
-    /// The scene as the user named it.
+    /// The scene as the user named it, and options of its light and its camera.
     name: String,
+    view: Vec<String>,
 }
 
 /// What a pilot has chosen for an error.
@@ -92,7 +93,14 @@ impl Subject {
             side: size,
             pixels,
             name: name.clone(),
+            view: request.view.clone(),
         };
+        let has_known_light = name == "open-box" || Reference::floor(&name, size).is_some();
+        if let Some(option) = request.view.first().filter(|_| has_known_light) {
+            let allowed =
+                format!("cannot be studied with {option}: its reference is of its own light; leave that out, or name another scene");
+            return Err(Error::setting("SCENE", &name, allowed));
+        }
         let of_scene = |is_picture: bool| scene_axes(gpu, scene, &geometry, request, is_picture.then_some(pixels));
         if name == "open-box" {
             tell("reference: radiosity of the box");
@@ -149,7 +157,10 @@ impl Subject {
     fn job(&self) -> String {
         let [width, height] = self.pixels;
         match self.camera {
-            Some(_) => format!("render {} --size {width}x{height} -o picture.exr", quoted(self.name.clone())),
+            Some(_) => {
+                let words: Vec<String> = [&self.name].into_iter().chain(&self.view).cloned().map(quoted).collect();
+                format!("render {} --size {width}x{height} -o picture.exr", words.join(" "))
+            }
             None => format!("probe {} --points {POINTS} -o irradiance.csv", quoted(self.name.clone())),
         }
     }
