@@ -7,8 +7,9 @@ use glam::{DVec3, Vec3};
 
 use super::connected::bits;
 use super::contact::{self, Contact, Kind};
+use super::coplanar::{self, Sheet};
 use super::frame::{Frame, has_area};
-use super::overlap::{self, Sheet};
+use super::overlap;
 use super::planes::IN_PLANE;
 use super::{Mesh, Scene};
 
@@ -60,7 +61,7 @@ impl Offsets {
             .unzip();
         let kind_of = |triangle: u32| kinds[sources[triangle as usize].0 as usize];
         let is_candidate = |triangle: u32| kind_of(triangle) != Kind::Opaque;
-        let mut pairs = overlap::pairs(scene, kinds, &sources, &corners, Contact::Both, is_candidate, |_| ());
+        let mut pairs = coplanar::pairs(scene, kinds, &sources, &corners, Contact::Both, is_candidate, |_| ());
         if pairs.is_empty() {
             return Offsets::default();
         }

@@ -1,4 +1,4 @@
-// Skies: one radiance for all directions, or a picture of them and a table that samples it (src/scene/sky.rs). A light sample leaves by the
+// Skies: one radiance for all directions, or a picture of them and a table that samples it (src/scene/sky_table.rs). A light sample leaves by the
 // cosine or by the table, and weighs by the density of both together (the balance heuristic, Veach 1997, section 9.2).
 
 // A direction, and its density, 1/sr.

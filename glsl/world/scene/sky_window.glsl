@@ -4,7 +4,7 @@
 
 // A direction is left to the pixel's own rays unless the table chooses it so many times as often.
 const float PEAK = 4.0;
-// Of light samples that the table of a sky chooses (Table::share in src/scene/sky.rs): skies with less have no peaks.
+// Of light samples that the table of a sky chooses (Table::share in src/scene/sky_table.rs): skies with less have no peaks.
 const float LEAST_PEAK_SHARE = 0.5;
 
 struct SkyWindow {
