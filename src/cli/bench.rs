@@ -11,7 +11,7 @@ use super::values::parse_seconds;
 use super::{DeviceArgs, End, JsonArg, optional_file, say_beside};
 use crate::error::{Result, require};
 use crate::gpu::Gpu;
-use crate::measure::bench::experiment::Experiment;
+use crate::measure::bench::experiments::{self, Experiment};
 use crate::measure::bench::{self, Request, Size, table};
 use crate::output::destination::{Destination, Folder, check_distinct, write_all};
 use crate::render::Seconds;
@@ -55,10 +55,7 @@ enum WorkloadArg {
 }
 
 fn parse_experiment(name: &str) -> std::result::Result<Experiment, String> {
-    Experiment::ALL.into_iter().find(|experiment| experiment.name() == name).ok_or_else(|| {
-        let names = Experiment::ALL.map(Experiment::name);
-        format!("must be one of {}", names.join(", "))
-    })
+    experiments::by_name(name).ok_or_else(|| format!("must be one of {}", experiments::ALL.map(|experiment| experiment.name).join(", ")))
 }
 
 pub(super) fn run(args: &BenchArgs, cancelled: &AtomicBool) -> Result<End> {
@@ -78,12 +75,12 @@ pub(super) fn run(args: &BenchArgs, cancelled: &AtomicBool) -> Result<End> {
             WorkloadArg::Small => Size::Small,
             WorkloadArg::Full => Size::Full,
         },
-        experiments: if args.only.is_empty() { Experiment::ALL.to_vec() } else { args.only.clone() },
+        experiments: if args.only.is_empty() { experiments::ALL.to_vec() } else { args.only.clone() },
         scene: Some(scene),
         scale: args.scale,
         budget: Duration::from_secs_f64(args.time.0),
     };
-    let names: Vec<&str> = request.experiments.iter().map(|experiment| experiment.name()).collect();
+    let names: Vec<&str> = request.experiments.iter().map(|experiment| experiment.name).collect();
     let what = if args.scale { "time and memory against photons and triangles".to_owned() } else { names.join(", ") };
     reporter.note(&format!("plan: {what}; starts no experiment after {} s", args.time.0));
     let found = bench::run(&gpu, request, cancelled, &mut |line| reporter.step(line))?;

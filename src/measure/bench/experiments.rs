@@ -2,7 +2,6 @@
 
 use std::time::Instant;
 
-use super::experiment::Experiment;
 use super::pass::Pass;
 use super::room::{self, Timed};
 use super::scale::{BALL_ROOM, ball_room};
@@ -15,23 +14,49 @@ use crate::scene::geometry::Geometry;
 use crate::settings::scene::{Illumination, SceneSettings};
 use crate::settings::{Builder, Preset, RoomSettings};
 
-/// Adds what an experiment finds to the bench.
-pub fn run(lab: &mut Lab, experiment: Experiment, bench: &mut Bench) -> Result<()> {
-    let passes = match experiment {
-        Experiment::OpenBox => open_box(lab)?,
-        Experiment::Builders => builders(lab)?,
-        Experiment::Table1 => table_1(lab)?,
-        Experiment::Index => index(lab)?,
-        Experiment::Gather => gather(lab)?,
-        Experiment::Cornell => cornell(lab)?,
-        Experiment::Mesh => mesh(lab)?,
-        Experiment::Compaction => {
-            bench.compaction = Some(compaction(lab)?);
-            return Ok(());
+/// What is measured, by its name.
+#[derive(Debug, Clone, Copy)]
+pub struct Experiment {
+    pub name: &'static str,
+    pub title: &'static str,
+    measure: Measure,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Measure {
+    Passes(fn(&Lab) -> Result<Vec<Pass>>),
+    Compaction,
+}
+
+const fn passes(name: &'static str, title: &'static str, measure: fn(&Lab) -> Result<Vec<Pass>>) -> Experiment {
+    Experiment { name, title, measure: Measure::Passes(measure) }
+}
+
+/// The last takes all the time that is left.
+pub const ALL: [Experiment; 8] = [
+    passes("open-box", "open box, 15 bounces, every builder", open_box),
+    passes("builders", "the paper's workload, 2 and 15 bounces, every builder", builders),
+    passes("table-1", "last row of table 1", table_1),
+    passes("index", "index of a large photon map", index),
+    passes("gather", "gather at the points of a picture", gather),
+    passes("cornell", "cornell, 16 bounces", cornell),
+    passes("mesh", "many triangles", mesh),
+    Experiment { name: "compaction", title: "fastest builder by photon count and survival", measure: Measure::Compaction },
+];
+
+pub fn by_name(name: &str) -> Option<Experiment> {
+    ALL.into_iter().find(|experiment| experiment.name == name)
+}
+
+impl Experiment {
+    /// Adds what it finds to the bench.
+    pub fn run(self, lab: &mut Lab, bench: &mut Bench) -> Result<()> {
+        match self.measure {
+            Measure::Passes(measure) => bench.passes.extend(measure(lab)?),
+            Measure::Compaction => bench.compaction = Some(compaction(lab)?),
         }
-    };
-    bench.passes.extend(passes);
-    Ok(())
+        Ok(())
+    }
 }
 
 /// The paper's box at other sizes: cells of a centimetre, random numbers that fit any count, all photons at once.

@@ -5,7 +5,6 @@
 //! photons and triangles.
 
 pub mod chart;
-pub mod experiment;
 pub mod experiments;
 pub mod page;
 pub mod pass;
@@ -25,7 +24,7 @@ use crate::gpu::Gpu;
 use crate::measure::compaction::{self, Map};
 use crate::output::destination::{Folder, write_all};
 use crate::scene::Scene;
-use experiment::Experiment;
+use experiments::Experiment;
 use pass::Pass;
 use rates::Rates;
 use scale::Scale;
@@ -154,15 +153,15 @@ fn measure(lab: &mut Lab, bench: &mut Bench) -> Result<()> {
     for (number, experiment) in bench.request.experiments.clone().into_iter().enumerate() {
         lab.go_on()?;
         if lab.is_late() {
-            bench.left_out.push(format!("{}: no --time left", experiment.name()));
+            bench.left_out.push(format!("{}: no --time left", experiment.name));
             continue;
         }
-        (lab.tell)(&format!("[{}/{}] {}", number + 1, bench.request.experiments.len(), experiment.title()));
-        match experiments::run(lab, experiment, bench) {
+        (lab.tell)(&format!("[{}/{}] {}", number + 1, bench.request.experiments.len(), experiment.title));
+        match experiment.run(lab, bench) {
             Ok(()) => {}
             // What this device cannot do is no reason to end.
             Err(Error::Setting { option, value, allowed }) => {
-                bench.left_out.push(format!("{}: {option} {value} {allowed}", experiment.name()));
+                bench.left_out.push(format!("{}: {option} {value} {allowed}", experiment.name));
             }
             Err(error) => return Err(error),
         }
