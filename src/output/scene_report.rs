@@ -11,13 +11,14 @@ use crate::engine::End;
 use crate::engine::scene::RunResult;
 use crate::engine::scene::pilot::Pilot;
 use crate::ledger::Ledger;
+use crate::plan::effects;
 use crate::plan::evidence::EffectDecision;
 use crate::plan::radius::{RadiusFrom, Trial};
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
 use crate::plan::work_division::MapVariance;
 use crate::scene::geometry::Geometry;
-use crate::settings::scene::{Effect, SceneSettings};
+use crate::settings::scene::SceneSettings;
 use crate::settings::stop::Stop;
 use crate::text::counted;
 use crate::timings::Timings;
@@ -46,14 +47,9 @@ pub fn rows<'a>(plan: &'a ScenePlan, run: Option<(&Timings, &[u64])>) -> Vec<Eff
     plan.decisions
         .iter()
         .map(|decision| {
-            let (gpu_ms, share) = match decision.effect {
-                _ if !decision.kept => (None, None),
-                Effect::Direct => (pass("round/visible points"), share(0)),
-                Effect::SpecularChains => (None, share(1)),
-                effect if effect.is_caustic() => (pass("round/caustic"), share(2)),
-                Effect::Indirect => (pass("round/global"), share(3)),
-                _ => (None, None),
-            };
+            let measured = effects::measured(decision.effect).filter(|_| decision.kept);
+            let gpu_ms = measured.and_then(|measured| pass(measured.pass?));
+            let share = measured.and_then(|measured| share(measured.part));
             EffectRow { decision, gpu_ms, share }
         })
         .collect()
@@ -171,11 +167,8 @@ pub fn plan_table(plan: &ScenePlan, run: Option<(&Timings, &[u64])>) -> String {
         }
         writeln!(text, "  {}", decision.evidence).unwrap();
     }
-    let shared: Vec<&str> = rows
-        .iter()
-        .filter(|row| row.decision.kept && matches!(row.decision.effect, Effect::ReflectiveCaustics | Effect::RefractiveCaustics))
-        .map(|row| row.decision.effect.name())
-        .collect();
+    let shared: Vec<&str> =
+        rows.iter().filter(|row| row.decision.kept && row.decision.effect.is_caustic()).map(|row| row.decision.effect.name()).collect();
     if shared.len() > 1 {
         writeln!(text, "{} share one caustic map: its photons, bytes, time and light stand in both rows.", shared.join(" and ")).unwrap();
     }

@@ -4,6 +4,7 @@
 pub mod buffers;
 pub mod capacity;
 pub mod differences;
+pub mod effects;
 pub mod evidence;
 pub mod extra_samples;
 pub mod film;

@@ -3,19 +3,17 @@
 use std::f64::consts::PI;
 use std::time::{Duration, Instant};
 
-use super::Limits;
 use super::buffers::{PlannedBuffer, bytes_of};
-use super::evidence::{EffectDecision, Facts};
+use super::evidence::Facts;
 use super::extra_samples::ExtraSamples;
 use super::film::{BiasPlan, FilmPlan, LostOffSurfaces};
-use super::light_choice::LightChoice;
 use super::maps::Maps;
 use super::radius::Trial;
 use super::scene::{LightOf, MapPlan, SEGMENT_BOUNCES, ScenePlan};
 use super::sensor::Sensor;
+use super::{Limits, effects};
 use crate::constants::*;
 use crate::error::{Error, Result, require};
-use crate::photon::MapPhoton;
 use crate::scene::geometry::Geometry;
 use crate::scene::{LobeKinds, Scene, Surface, openings};
 use crate::settings::scene::{Effect, Illumination, SceneSettings};
@@ -31,8 +29,6 @@ const MOST_UNITS: f64 = (1u64 << 62) as f64;
 const ROUNDS_OF_UNIT: u32 = 1 << 16;
 /// Chunks of so few photons take next to no memory.
 const LEAST_CHUNK: u32 = 1 << 10;
-/// A photon in its map, sorted and unsorted, and its place in its bucket.
-const MAP_ENTRY_BYTES: u64 = 2 * size_of::<MapPhoton>() as u64 + 4;
 
 impl ScenePlan {
     /// With radii by the scene's area where none are given.
@@ -108,7 +104,7 @@ impl ScenePlan {
         let whole = format!("must be whole blocks of {block} rounds (--block), or fewer than one has");
         require(settings.rounds < block || settings.rounds.is_multiple_of(block), "--rounds", settings.rounds, whole)?;
         let facts = Facts::new(scene, geometry, settings, sensor);
-        let decisions: Vec<EffectDecision> = Effect::ALL.iter().map(|effect| facts.decide(*effect, settings)).collect();
+        let decisions = Effect::ALL.map(|effect| effects::decide(effect, &facts, settings)).to_vec();
         let keeps = |effect: Effect| decisions.iter().any(|decision| decision.effect == effect && decision.kept);
 
         let by_itself = if settings.math == Math::Strict || !limits.votes_in_loops { Builder::Ballot } else { Builder::Persistent };
@@ -183,7 +179,7 @@ impl ScenePlan {
         plan.constants.push(("HAS_PARTS", u32::from(plan.keeps_parts())));
         plan.constants.push(("HAS_DIFFERENCES", u32::from(plan.film.bias == BiasPlan::Blocks)));
         plan.check_sizes(geometry, limits)?;
-        plan.decisions = plan.decisions.iter().map(|decision| plan.given(decision, geometry)).collect();
+        plan.decisions = plan.decisions.iter().map(|decision| effects::with_cost(decision, &plan, geometry)).collect();
         plan.planned_in = began.elapsed();
         Ok(plan)
     }
@@ -258,53 +254,6 @@ impl ScenePlan {
         self.bytes = bytes_of(&self.buffers(geometry));
         Ok(())
     }
-
-    fn aim_in_words(&self) -> String {
-        match (&self.caustic, self.targets.len()) {
-            (None, _) => String::new(),
-            (_, 0) => "; photons emitted in all directions".into(),
-            (_, 1) => "; photons aimed at 1 bounding sphere".into(),
-            (_, count) => format!("; photons aimed at {count} bounding spheres"),
-        }
-    }
-
-    fn openings_in_words(&self) -> String {
-        match self.trial.as_ref().map_or(0, |trial| trial.openings.len()) {
-            0 => String::new(),
-            count => format!("; rays and photons aimed at {}", crate::text::counted(count as u32, "opening")),
-        }
-    }
-
-    /// A decision with the photons and bytes that exist for its effect, and what became of it.
-    fn given(&self, decision: &EffectDecision, geometry: &Geometry) -> EffectDecision {
-        let mut decision = decision.clone();
-        if !decision.kept {
-            return decision;
-        }
-        let map_bytes = |map: &MapPlan| u64::from(map.capacity) * MAP_ENTRY_BYTES + u64::from(map.bucket_count) * 4;
-        (decision.photons, decision.bytes) = match decision.effect {
-            Effect::Indirect => self.global.as_ref().map_or((0, 0), |map| (u64::from(map.photons), map_bytes(map))),
-            effect if effect.is_caustic() => {
-                decision.evidence.push_str(&self.aim_in_words());
-                self.caustic.as_ref().map_or((0, 0), |map| (u64::from(map.photons), map_bytes(map)))
-            }
-            Effect::Direct => {
-                let lights = self.lights();
-                decision.evidence.push_str(&lights.map_or_else(String::new, LightChoice::in_words));
-                (0, lights.map_or(0, LightChoice::bytes))
-            }
-            Effect::Environment | Effect::DirectionalLights => {
-                decision.evidence.push_str(&self.openings_in_words());
-                (0, 0)
-            }
-            Effect::Textures => (0, size_of_val(geometry.uvs.as_slice()) as u64 + size_of_val(geometry.texels.as_slice()) as u64),
-            Effect::VertexColours => (0, size_of_val(geometry.colours.as_slice()) as u64),
-            Effect::SmoothNormals => (0, size_of_val(geometry.normals.as_slice()) as u64),
-            Effect::Bvh => (0, size_of_val(geometry.nodes.as_slice()) as u64),
-            _ => (0, 0),
-        };
-        decision
-    }
 }
 
 /// Specialization constants that follow from effects, maps and settings.
@@ -315,31 +264,15 @@ fn constants(
     maps: &Maps,
     keeps: &dyn Fn(Effect) -> bool,
 ) -> Vec<(&'static str, u32)> {
-    let flag = |effect: Effect| u32::from(keeps(effect));
     let split = settings.illumination == Illumination::Split;
-    vec![
-        ("HAS_BVH", flag(Effect::Bvh)),
+    let mut constants = effects::constants(keeps);
+    constants.extend([
         ("HAS_OVERLAPS", u32::from(geometry.triangles.iter().any(|triangle| triangle.plane >= HIDDEN))),
-        ("HAS_SMOOTH_NORMALS", flag(Effect::SmoothNormals)),
-        ("HAS_TEXTURES", flag(Effect::Textures)),
         ("HAS_MANY_TEXELS", u32::from(geometry.texels.len() > TEXELS_PER_BUFFER as usize)),
-        ("HAS_VERTEX_COLOURS", flag(Effect::VertexColours)),
-        ("HAS_TWO_SIDED", flag(Effect::TwoSided)),
-        ("HAS_GLOSSY", flag(Effect::Glossy)),
-        ("HAS_LAYERS", flag(Effect::Layers)),
-        ("HAS_TRANSMISSION", flag(Effect::Transmission)),
         ("HAS_LAYER_TEXTURES", u32::from(keeps(Effect::Layers) && keeps(Effect::Textures) && facts.has_layer_textures())),
         ("HAS_PANES", u32::from(keeps(Effect::Transmission) && facts.has_kind(|kinds| kinds.pane))),
-        ("HAS_MEDIA", flag(Effect::Media)),
         ("MEDIUM_BITS", geometry.medium_bits),
         ("HAS_MEDIA_BY_SIZE", u32::from(keeps(Effect::Media) && geometry.has_media_by_size)),
-        ("HAS_DIFFUSE_TRANSMISSION", flag(Effect::DiffuseTransmission)),
-        ("HAS_IRIDESCENCE", flag(Effect::Iridescence)),
-        ("HAS_ANISOTROPY", flag(Effect::Anisotropy)),
-        ("HAS_DISPERSION", flag(Effect::Dispersion)),
-        ("HAS_COATS", flag(Effect::ClearCoat)),
-        ("HAS_SHEEN", flag(Effect::Sheen)),
-        ("HAS_NORMAL_MAPS", flag(Effect::NormalMaps)),
         ("HAS_PASSING", u32::from(keeps(Effect::Layers) && facts.has_kind(|kinds| kinds.passing))),
         ("HAS_MIRROR", u32::from(facts.has(|surface| surface == Surface::Mirror) || settings.forces(Effect::SpecularChains))),
         (
@@ -347,12 +280,6 @@ fn constants(
             u32::from(facts.has(|surface| matches!(surface, Surface::Dielectric { .. })) || settings.forces(Effect::SpecularChains)),
         ),
         ("HAS_PAPER_PHONG", u32::from(facts.has(|surface| matches!(surface, Surface::PaperPhong { .. })))),
-        ("HAS_TRIANGLE_LIGHTS", flag(Effect::MeshLights)),
-        ("HAS_POINT_LIGHTS", flag(Effect::PointLights)),
-        ("HAS_SPOT_LIGHTS", flag(Effect::SpotLights)),
-        ("HAS_DIRECTIONAL_LIGHTS", flag(Effect::DirectionalLights)),
-        ("HAS_DISC_LIGHTS", flag(Effect::DiscLights)),
-        ("HAS_ENVIRONMENT", flag(Effect::Environment)),
         ("HAS_SKY_PICTURE", u32::from(keeps(Effect::Environment) && geometry.has_sky_picture())),
         ("PARANOID", u32::from(settings.paranoid)),
         ("STRICT_MATH", settings.math as u32),
@@ -363,10 +290,10 @@ fn constants(
         ("HAS_ALL_ARRIVALS", u32::from(!split)),
         ("PARTS", settings.part as u32),
         ("FILTER", settings.filter as u32),
-        ("HAS_SPECULAR_CHAINS", flag(Effect::SpecularChains)),
         ("HAS_SLOTS", u32::from(settings.builder == Some(Builder::Naive))),
         ("HAS_AIMED_PHOTONS", u32::from(!maps.targets.is_empty())),
         ("HAS_OPENINGS", u32::from(settings.aim && openings::light_from_beyond(geometry))),
         ("HAS_RADIUS_CLASSES", u32::from(maps.global.iter().chain(&maps.caustic).any(|map| map.classes.is_some()))),
-    ]
+    ]);
+    constants
 }

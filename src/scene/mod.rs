@@ -34,11 +34,10 @@ pub mod targets;
 pub mod texture;
 mod work;
 
-use std::borrow::Cow;
 use std::collections::HashMap;
 use std::path::Path;
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
 pub use camera::{Camera, Lens, Projection};
@@ -48,8 +47,6 @@ pub use mesh::Mesh;
 pub use texture::Texture;
 
 use crate::error::{Error, Result};
-use crate::settings::scene::Effect;
-use material::{Coverage, Medium};
 
 /// Called with what is being done while a scene is opened, and the share of it that is done.
 pub type Progress<'a> = &'a mut dyn FnMut(&'static str, f64);
@@ -113,80 +110,6 @@ impl Scene {
                 Err(Error::setting("SCENE", name, format!("{meant}must be a .gltf or .glb file, or one of {}", names.join(", "))))
             }
         }
-    }
-
-    /// The scene without what some effects would need.
-    pub fn without(&self, effects: &[Effect]) -> Cow<'_, Scene> {
-        if effects.is_empty() {
-            return Cow::Borrowed(self);
-        }
-        let lacks = |effect: Effect| effects.contains(&effect);
-        let mut scene = self.clone();
-        scene.lights.retain(|light| !match light.kind {
-            LightKind::Point { .. } => lacks(Effect::PointLights),
-            LightKind::Spot { .. } => lacks(Effect::SpotLights),
-            LightKind::Directional { .. } => lacks(Effect::DirectionalLights),
-            LightKind::Disc { .. } => lacks(Effect::DiscLights),
-            LightKind::Environment { .. } | LightKind::Sky(_) => lacks(Effect::Environment),
-        });
-        if lacks(Effect::VertexColours) {
-            scene.meshes.iter_mut().for_each(|mesh| {
-                mesh.colours.clear();
-                mesh.alphas.clear();
-            });
-        }
-        for material in &mut scene.materials {
-            if lacks(Effect::MeshLights) {
-                material.emission = Vec3::ZERO;
-            }
-            if lacks(Effect::Glossy) && matches!(material.surface, Surface::Glossy { .. }) {
-                material.surface = Surface::Lambert;
-            }
-            if lacks(Effect::Layers) && material.surface == Surface::Layered {
-                material.surface = Surface::Lambert;
-            }
-            if lacks(Effect::Transmission) {
-                material.layers.transmission = 0.0;
-            }
-            if lacks(Effect::Media) {
-                material.layers.medium = material.layers.medium.map(|_| Medium::CLEAR);
-            }
-            if lacks(Effect::DiffuseTransmission) {
-                material.layers.diffuse_transmission = 0.0;
-            }
-            if lacks(Effect::Anisotropy) {
-                material.layers.anisotropy = 0.0;
-            }
-            if lacks(Effect::Iridescence) {
-                material.layers.iridescence = 0.0;
-            }
-            if lacks(Effect::Dispersion) {
-                material.layers.dispersion = 0.0;
-            }
-            if lacks(Effect::ClearCoat) {
-                material.layers.coat = 0.0;
-            }
-            if lacks(Effect::Sheen) {
-                material.layers.sheen_colour = Vec3::ZERO;
-            }
-            if lacks(Effect::NormalMaps) {
-                material.normal_map = None;
-                material.layers.coat_normal_map = None;
-            }
-            if lacks(Effect::Alpha) {
-                material.coverage = Coverage::Whole;
-            }
-            if lacks(Effect::TwoSided) {
-                material.two_sided = false;
-            }
-            if lacks(Effect::Textures) {
-                material.base_colour_texture = None;
-                material.emission_texture = None;
-                material.normal_map = None;
-                material.layers = material.layers.without_textures();
-            }
-        }
-        Cow::Owned(scene)
     }
 
     /// Which lobes each material may have.
