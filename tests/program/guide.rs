@@ -1,6 +1,6 @@
 //! README and guide: commands run, tables are those of their sources, links and options exist.
 //!
-//! `PHOTONMILL_WRITE_GUIDE=1 cargo test --test tests guide::` writes the tables anew.
+//! `PHOTONMILL_WRITE_GUIDE=1 cargo test --lib guide::` writes the tables anew.
 
 use std::fs;
 
@@ -389,7 +389,7 @@ fn table_is(path: &str, name: &str, table: &str) {
         fs::write(root(path), [&text[..start], table, &text[start + now.len()..]].concat()).unwrap();
         return;
     }
-    assert_eq!(written(&text, name), table, "{path}: PHOTONMILL_WRITE_GUIDE=1 cargo test --test tests guide:: writes it anew");
+    assert_eq!(written(&text, name), table, "{path}: PHOTONMILL_WRITE_GUIDE=1 cargo test --lib guide:: writes it anew");
 }
 
 /// Three digits with a unit.
