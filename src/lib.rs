@@ -55,6 +55,10 @@
     allow(dead_code, reason = "what only the program, the window or the lab uses")
 )]
 
+// Tests and fuzzing name what they use as a user of the library does.
+#[cfg(any(test, fuzzing))]
+extern crate self as photonmill;
+
 pub mod bake;
 #[cfg(feature = "program")]
 pub mod cli;
@@ -85,3 +89,14 @@ pub mod timings;
 pub mod verify;
 #[cfg(feature = "window")]
 pub mod view;
+
+#[cfg(any(test, fuzzing))]
+#[doc(hidden)]
+#[path = "../tools/fuzz/src/mod.rs"]
+pub mod fuzz;
+#[cfg(test)]
+#[path = "../tests/main.rs"]
+mod tests;
+
+#[cfg(test)]
+use tests::common;

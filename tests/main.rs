@@ -1,8 +1,6 @@
-//! The integration tests, a module a subject. They are one program: it is linked once, and no core waits for the last test of
-//! a subject.
+//! The tests of the whole, a module a subject. They are a part of the library's own tests, which see what is private to it.
 
-mod common;
-
+pub mod common;
 mod engine;
 mod files;
 mod light;

@@ -6,7 +6,7 @@ use glam::dvec3;
 
 use super::known::of_any_room;
 use super::prelude::*;
-use crate::engine::unseen_light::room_without_floor;
+use crate::tests::engine::unseen_light::room_without_floor;
 use photonmill::engine::scene::{self, RunResult, Target, View, trial};
 
 fn lamp_of(radiance: f32) -> Material {

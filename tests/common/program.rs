@@ -3,6 +3,7 @@
 use std::io::{BufRead, BufReader, Lines, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStderr, Command, Output, Stdio};
+use std::sync::LazyLock;
 use std::sync::mpsc::{self, Sender};
 use std::time::Duration;
 
@@ -10,7 +11,25 @@ use serde_json::Value;
 
 use super::{no_gpu, work};
 
-pub const PROGRAM: &str = env!("CARGO_BIN_EXE_photonmill");
+/// A file of this build, in whose folder that of the tests' own program is.
+pub fn built(name: &str) -> PathBuf {
+    let tests = std::env::current_exe().expect("a program knows where it is");
+    tests.ancestors().nth(2).expect("it lies in a folder of the build").join(name)
+}
+
+/// The program, as a path.
+pub fn program() -> &'static str {
+    static PROGRAM: LazyLock<String> = LazyLock::new(|| {
+        let path = built(&format!("photonmill{}", std::env::consts::EXE_SUFFIX));
+        assert!(
+            path.is_file(),
+            "the program is not built: {} is not there; `tools/test` builds it, and so does `cargo test`",
+            path.display()
+        );
+        path.into_os_string().into_string().expect("the path is text")
+    });
+    &PROGRAM
+}
 
 /// What has not happened by then does not happen, however busy the machine.
 pub const PATIENCE: Duration = Duration::from_secs(600);
@@ -90,7 +109,7 @@ impl Place {
     }
 
     pub fn command(&self, line: &str) -> Command {
-        self.prepared(Command::new(PROGRAM), line)
+        self.prepared(Command::new(program()), line)
     }
 
     fn prepared(&self, mut command: Command, line: &str) -> Command {
@@ -104,7 +123,7 @@ impl Place {
     pub fn start(&self, line: &str) -> Running {
         let mut command = Command::new("env");
         // The program leaves alone what it was started to ignore, and tests that nohup or a script's & starts ignore some signals.
-        command.args(["--default-signal=INT,TERM,HUP", PROGRAM]);
+        command.args(["--default-signal=INT,TERM,HUP", program()]);
         let mut child = self.prepared(command, line).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("env is there");
         let (guard, ended) = mpsc::channel();
         let id = child.id().to_string();
@@ -168,7 +187,7 @@ impl Place {
     /// A line of a shell, in which the program is called photonmill.
     pub fn shell(&self, line: &str) -> Command {
         let mut command = Command::new("bash");
-        command.args(["-c", &line.replace("photonmill", PROGRAM)]).current_dir(self.path()).stdin(Stdio::null());
+        command.args(["-c", &line.replace("photonmill", program())]).current_dir(self.path()).stdin(Stdio::null());
         command
     }
 

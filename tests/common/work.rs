@@ -4,16 +4,17 @@
 use std::cell::Cell;
 use std::fs::File;
 use std::io::Write;
-use std::path::Path;
 use std::sync::{LazyLock, Mutex};
 
 use photonmill::gpu;
 use photonmill::verify::judge::paths_traced;
 
+use super::program::built;
+
 /// Emptied by the process that runs the tests, or by tools/runner, whose processes all go on with it. Its lines: a test, what is
 /// counted, how many.
 static FILE: LazyLock<Mutex<File>> = LazyLock::new(|| {
-    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("work.txt");
+    let path = built("work.txt");
     let goes_on = std::env::var_os("PHOTONMILL_TESTS_GO_ON").is_some();
     let file = File::options().create(true).write(true).append(goes_on).truncate(!goes_on).open(path);
     Mutex::new(file.expect("target can be written"))

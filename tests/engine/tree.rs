@@ -2,7 +2,7 @@
 //! photons that f64 finds by looking at all of them, whatever order they come in.
 
 use crate::common::prelude::*;
-use crate::engine::film::{assert_same, few_effects, film, gathered_on_cpu, gathered_on_gpu};
+use crate::tests::engine::film::{assert_same, few_effects, film, gathered_on_cpu, gathered_on_gpu};
 use photonmill::engine::film::BlockSums;
 use photonmill::engine::room::film::{RoomFilm, estimate_walls};
 

@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use crate::common::layered::dull;
 use crate::common::lit::{Viewed, light};
 use crate::common::prelude::*;
-use crate::engine::unseen_light::room_without_floor;
+use crate::tests::engine::unseen_light::room_without_floor;
 use glam::dvec3;
 use photonmill::engine::scene::{self, Target, View, trial};
 use photonmill::output::scene_report;

@@ -282,7 +282,7 @@ fn through_a_pane_at_45_degrees() -> f64 {
 }
 
 fn below_a_pane(lights: Vec<LightKind>) -> Scene {
-    let mut meshes = crate::materials::media::cuboid("pane", dvec3(-3.0, 2.0, -3.0), dvec3(3.0, 2.01, 3.0), 1);
+    let mut meshes = crate::tests::materials::media::cuboid("pane", dvec3(-3.0, 2.0, -3.0), dvec3(3.0, 2.01, 3.0), 1);
     meshes.push(level(0.0, [6.0; 2], true, 0));
     scene_of(meshes, vec![matt(0.0), glass(1.5)], lights)
 }

@@ -1,5 +1,5 @@
 //! Scenes from glTF: what a file says is what the scene holds, and what it cannot be used for is refused in one line. What mutations
-//! of files come to is in tests/fuzz.rs.
+//! of files come to is in tests/files/fuzz.rs.
 
 use super::other_readers::noise;
 use crate::common::gltf_file::{data_uri, encoded, floats, set_buffer, square, square_buffer};

@@ -5,6 +5,7 @@ pub mod compare;
 pub mod denoise;
 pub mod extensions;
 pub mod far_away;
+pub mod fuzz;
 pub mod gltf;
 pub mod info;
 pub mod lightmap_texels;

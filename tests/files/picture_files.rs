@@ -393,6 +393,6 @@ fn what_cannot_be_made_again_is_refused() {
 fn other_programs_find_all_layers() {
     let Some(_) = device() else { return };
     let tool = format!("{}/tools/open_pictures", env!("CARGO_MANIFEST_DIR"));
-    let output = Command::new(tool).arg(crate::common::program::PROGRAM).output().expect("the tool starts");
+    let output = Command::new(tool).arg(crate::common::program::program()).output().expect("the tool starts");
     assert!(output.status.success(), "{}{}", text(&output.stdout), text(&output.stderr));
 }

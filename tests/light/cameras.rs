@@ -2,7 +2,7 @@
 
 use crate::common::gltf_file::square;
 use crate::common::prelude::*;
-use crate::files::gltf::load;
+use crate::tests::files::gltf::load;
 use glam::dvec3;
 use photonmill::scene::{Lens, Projection};
 use serde_json::json;

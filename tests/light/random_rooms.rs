@@ -2,7 +2,7 @@
 //! everything left at its default but the number of photons.
 //!
 //! Of every point z = (found - true) / stated, where the stated error is the noise that a run states by default. All z
-//! together must be those of Student's t. A room is a seed: `PHOTONMILL_ROOM=17 cargo test --test tests seven_random_rooms --
+//! together must be those of Student's t. A room is a seed: `PHOTONMILL_ROOM=17 cargo test --lib seven_random_rooms --
 //! --ignored --nocapture` shows room 17 and judges its points alone.
 
 use std::fmt::Write;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::common::estimate_check;
 use crate::common::prelude::*;
-use crate::light::openings::{direct, room_under};
+use crate::tests::light::openings::{direct, room_under};
 use glam::dvec3;
 use photonmill::engine::scene::{Target, render};
 use photonmill::scene::material::Coverage;

@@ -4,7 +4,7 @@
 use super::scattering::{ALBEDOS, INCIDENCES};
 use crate::common::known::{self, mean_irradiance};
 use crate::common::prelude::*;
-use crate::light::hard_cases::{POINTS, settings};
+use crate::tests::light::hard_cases::{POINTS, settings};
 use photonmill::verify::selfcheck::Estimate;
 use photonmill::verify::selfcheck::measure::irradiance;
 

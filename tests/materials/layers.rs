@@ -6,7 +6,7 @@ use crate::common::layered::{
 use crate::common::plates::{Place, Plates};
 use crate::common::prelude::*;
 use crate::common::{estimate_check, known, planted, sheets};
-use crate::materials::media;
+use crate::tests::materials::media;
 use photonmill::engine::scene::{self, RunResult, Target};
 use photonmill::scene::material::{Coverage, Layers, Medium, NormalMap};
 use photonmill::scene::texture::Filter;

@@ -2,7 +2,7 @@
 //! completions and manual pages.
 
 use crate::common::prelude::*;
-use crate::common::program::{PROGRAM, assert_says, entries, on_device};
+use crate::common::program::{assert_says, entries, on_device, program};
 use serde_json::Value;
 
 const FILE: &str = "\
@@ -143,7 +143,7 @@ fn messages_are_more_or_fewer() {
 /// What a command prints on a terminal, with an environment variable.
 #[cfg(target_os = "linux")]
 fn on_terminal(place: &Place, line: &str, variable: (&str, &str)) -> String {
-    let command = format!("{PROGRAM} {line}");
+    let command = format!("{} {line}", program());
     let mut script = std::process::Command::new("script");
     script
         .args(["-qec", &command, "/dev/null"])
@@ -174,8 +174,9 @@ fn no_escapes_reach_who_does_not_want_them() {
 
 /// bash's answer to the tabulator after some words.
 fn completed(place: &Place, words: &str) -> Vec<String> {
+    let program = program();
     let script = format!(
-        "source <({PROGRAM} completions bash)\nCOMP_WORDS=({words}); COMP_CWORD=$((${{#COMP_WORDS[@]}}-1)); COMPREPLY=()\n\
+        "source <({program} completions bash)\nCOMP_WORDS=({words}); COMP_CWORD=$((${{#COMP_WORDS[@]}}-1)); COMPREPLY=()\n\
          _photonmill photonmill \"${{COMP_WORDS[-1]}}\" \"${{COMP_WORDS[-2]}}\"; echo \"${{COMPREPLY[*]}}\""
     );
     let output = std::process::Command::new("bash").args(["-c", &script]).current_dir(place.path()).output().expect("bash is there");

@@ -31,7 +31,7 @@ use photonmill::scene::{Scene, Surface, built_in};
 use photonmill::settings::scene::SceneSettings;
 use photonmill::settings::{Builder, RoomSettings};
 
-use crate::file;
+use super::file;
 
 /// Keeps what a run saves last.
 struct Latest(Option<SavedRun>);

@@ -4,6 +4,7 @@
 use std::fmt::Debug;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
+use std::process::Command;
 use std::sync::atomic::AtomicBool;
 use std::sync::mpsc;
 use std::time::Duration;
@@ -36,17 +37,11 @@ use photonmill::settings::{Builder, RoomSettings};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
-use change::{Random, change, pack, parts};
-use gltf_file::{data_uri, encoded, floats, set_buffer};
+use crate::common::gltf_file::{self, data_uri, encoded, floats, set_buffer};
+use crate::common::rich_file;
+use crate::fuzz::change::{Random, change, pack, parts};
 
-#[path = "../tools/fuzz/src/change.rs"]
-mod change;
-#[path = "common/gltf_file.rs"]
-mod gltf_file;
-#[path = "common/rich_file.rs"]
-mod rich_file;
-
-const BLENDER: &[u8] = include_bytes!("scenes/blender.glb");
+const BLENDER: &[u8] = include_bytes!("../scenes/blender.glb");
 /// The same mutations each time; `tools/fuzz/run` goes on with others for as long as it is let.
 const SEED: u64 = 1;
 
@@ -250,12 +245,29 @@ fn peak_memory() -> Option<u64> {
     Some(line.split_whitespace().nth(1)?.parse::<u64>().ok()? * 1024)
 }
 
+/// Runs the test that calls this in a process of its own, whose memory nobody else takes, and says so; in that process it says no.
+fn is_run_alone() -> bool {
+    const ALONE: &str = "PHOTONMILL_TEST_ALONE";
+    if std::env::var_os(ALONE).is_some() {
+        return false;
+    }
+    let thread = std::thread::current();
+    let test = thread.name().expect("a test's thread has its name");
+    let output = Command::new(std::env::current_exe().unwrap()).args([test, "--exact"]).env(ALONE, "yes").output().unwrap();
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success() && said.contains("1 passed"), "{said}{}", String::from_utf8_lossy(&output.stderr));
+    true
+}
+
 fn assert_memory() {
     assert!(peak_memory().is_none_or(|bytes| bytes < 1 << 30), "{:?} bytes of memory", peak_memory());
 }
 
 /// Cases `make` makes are refused in one line or planned; neither may be all of them.
 fn survive(what: &str, count: usize, mut make: impl FnMut(&mut Random) -> Vec<u8>) {
+    if is_run_alone() {
+        return;
+    }
     let name = if what.ends_with("gltf") { "a.gltf" } else { "a.glb" };
     let (mut random, mut folder) = (Random(SEED), tempfile::tempdir().unwrap());
     // Where a case fails, its file is there to be looked at.
@@ -361,6 +373,9 @@ fn documents_without_sense_are_refused() {
 /// A few bytes that claim much.
 #[test]
 fn claims_without_content_take_no_memory() {
+    if is_run_alone() {
+        return;
+    }
     let before = peak_memory();
     refusals(&[
         ("elements", |v| v["accessors"][0]["count"] = json!(u32::MAX)),
@@ -479,6 +494,9 @@ fn pictures_cut_off_are_refused_in_one_line() {
 /// A picture is read in several ways, each of which takes memory of its own: all of them count before it is decoded.
 #[test]
 fn every_use_of_a_large_picture_counts() {
+    if is_run_alone() {
+        return;
+    }
     let fate = |kinds: &[&str], samplers: usize| {
         let mut value = square_with_jpeg(|jpeg| claim(jpeg, 0x1000, 0x1000));
         let wraps = [10497, 33071, 33648];
@@ -516,6 +534,9 @@ fn every_use_of_a_large_picture_counts() {
 /// Skies from bytes that were changed or cut off: a picture without odd numbers, or one line.
 #[test]
 fn skies_of_any_bytes_are_read_or_refused() {
+    if is_run_alone() {
+        return;
+    }
     let folder = tempfile::tempdir().unwrap();
     let colours = image::Rgb32FImage::from_fn(32, 16, |i, j| image::Rgb([0.1 * i as f32, j as f32, 1e4]));
     let picture = image::DynamicImage::ImageRgb32F(colours);
@@ -555,6 +576,9 @@ fn skies_of_any_bytes_are_read_or_refused() {
 /// What extensions bring, with changed members: a scene, or one line.
 #[test]
 fn extensions_with_changed_members_are_read_or_refused() {
+    if is_run_alone() {
+        return;
+    }
     let files = [
         rich_file::animated(),
         rich_file::instanced(),

@@ -1,9 +1,13 @@
-//! What the targets share.
+//! What the targets of fuzzing run. They are a part of the library where it is built for fuzzing or for tests, and see what is private to it.
 
 pub mod change;
-pub mod mutation;
-pub mod sealed;
-pub mod seeds;
+pub mod checkpoint;
+pub mod gltf;
+pub mod map;
+mod mutation;
+mod sealed;
+mod seeds;
+pub mod settings;
 
 use std::path::PathBuf;
 
