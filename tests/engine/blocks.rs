@@ -172,7 +172,7 @@ fn shorter(latest: &LatestBlocks) -> LatestBlocks {
 fn assert_refused<T>(what: &str, ran: Result<T>) {
     let Err(error) = ran else { panic!("a run went on with {what}") };
     let line = error.to_string();
-    assert!(line.starts_with("--resume a file: contradicts itself") && !line.contains('\n'), "{what}: {line}");
+    assert!(line.starts_with("`resume` a file: contradicts itself") && !line.contains('\n'), "{what}: {line}");
 }
 
 #[test]

@@ -40,7 +40,7 @@ fn no_run_is_persistent_where_lanes_vote_wrong() {
     assert!(builders.len() == 5 && !builders.contains(&Builder::Persistent), "{builders:?}");
     let asked = RoomSettings { builder: Builder::Persistent, ..settings };
     let refused = RoomPlan::new(&open_box(&asked), &asked, &limits(gpu.facts())).unwrap_err().to_string();
-    assert!(refused.starts_with("--variant persistent: needs the lanes of a subgroup"), "{refused}");
+    assert!(refused.starts_with("`variant` persistent: needs the lanes of a subgroup"), "{refused}");
 
     let scene = Scene::open("cornell", false).unwrap();
     let plan = |builder| {

@@ -129,7 +129,7 @@ fn pairs_are_refused(lesser: &Gpu) {
     let error = room::on_gpu(lesser, &open_box(&pairs), &pairs, &mut Control::default()).unwrap_err();
     let line = error.to_string();
     assert_eq!(error.exit_code(), 2, "{line}");
-    assert!(["--sums", "compensated", "64-bit atomics", "integer or f32"].iter().all(|word| line.contains(word)), "{line}");
+    assert!(["`sums`", "compensated", "64-bit atomics", "integer or f32"].iter().all(|word| line.contains(word)), "{line}");
     let expected = film(lesser, &settings);
     assert_holds("f32", near(&film(lesser, &RoomSettings { sums: Sums::F32, ..settings }), &expected, |_| 0.0));
 }

@@ -104,7 +104,7 @@ fn an_error_beyond_a_cap_is_refused() {
         let stop = Stop { error: Some(error), ..Stop::default() };
         let settings = SceneSettings { bounces, photons: 500, rounds: 31, stop, ..settings() };
         let refused = run(&gpu, &scene, &settings, 16, &AtomicBool::new(false)).map(|lit| lit.losses).unwrap_err().to_string();
-        assert!(refused.starts_with("--error ") && refused.contains("cannot be reached") && refused.contains(why), "{refused}");
+        assert!(refused.starts_with("`error` ") && refused.contains("cannot be reached") && refused.contains(why), "{refused}");
     }
 }
 
@@ -253,7 +253,7 @@ fn long_rounds_end_soon_after_they_are_asked_to() {
     let photons = lit.fates[0].emitted;
     assert!(photons < u64::from(long.photons) && lit.fates[1].emitted > 0);
     let report = scene_report::text("cornell-spheres", &lit, "pixel", false);
-    assert!(report.contains("time was up in the first round") && report.contains("use fewer --photons"), "{report}");
+    assert!(report.contains("time was up in the first round") && report.contains("use fewer `photons`"), "{report}");
     // It ended long before the last chunk of photons.
     let chunks = lit.plan.global.as_ref().unwrap().chunks().count();
     assert!(chunks > 100 && photons < u64::from(long.photons) / 4, "{photons} photons, {chunks} chunks");

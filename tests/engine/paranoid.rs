@@ -77,7 +77,7 @@ fn a_planted_value_is_counted_and_its_photon_named() {
         let plan = spheres.planned(&gpu, &settings, square_picture(24));
         let nonfinite_values = spheres.lit(&gpu, plan.clone()).nonfinite_values.unwrap();
         assert!(nonfinite_values.count > 10, "{nonfinite_values:?}");
-        assert!(nonfinite_values.text().contains("--replay 0:"), "{}", nonfinite_values.text());
+        assert!(nonfinite_values.text().contains("`replay` 0:"), "{}", nonfinite_values.text());
         let of_photons = nonfinite_values.first.iter().filter(|value| value.what == What::Photon);
         let named: BTreeSet<u32> = of_photons.map(|value| value.item).collect();
         // All of them were written down, so that those not named have nothing odd.

@@ -72,7 +72,7 @@ fn a_persistent_invocation_takes_photon_after_photon() {
     }
     let longer = RoomSettings { builder: Builder::Persistent, bounces: 321, rng: Rng::Philox, ..RoomSettings::default() };
     let refused = longer.validate().unwrap_err().to_string();
-    assert!(refused.starts_with("--bounces 321: "), "{refused}");
+    assert!(refused.starts_with("`bounces` 321: "), "{refused}");
 }
 
 #[test]

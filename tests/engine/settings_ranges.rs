@@ -53,8 +53,8 @@ struct Rule {
     refusal: String,
 }
 
-fn rule(option: &str, value: impl ToString, holds: bool) -> Rule {
-    Rule { holds, refusal: format!("{option} {}: ", echo(value.to_string())) }
+fn rule(field: &str, value: impl ToString, holds: bool) -> Rule {
+    Rule { holds, refusal: format!("`{field}` {}: ", echo(value.to_string())) }
 }
 
 /// Compares validation with the rules, case by case. Every rule must have been the only broken one somewhere, else
@@ -144,33 +144,33 @@ fn settings_are_accepted_exactly_within_their_ranges() {
         let is_rand48 = settings.rng == Rng::Rand48;
         let is_sobol = settings.rng == Rng::Sobol;
         vec![
-            rule("--photons", photons, (2..=1 << 31).contains(&photons)),
-            rule("--rounds", rounds, rounds >= 1),
-            rule("--bounces", bounces, (1..=10_000).contains(&bounces)),
-            rule("--mesh", settings.mesh, (1..=1024).contains(&settings.mesh)),
-            rule("--radius", settings.radius, (0.5 / 65_536.0..=0.5).contains(&settings.radius)),
-            rule("--full-light", settings.full_light, (1e-12..=1e12).contains(&settings.full_light)),
-            rule("--light-power", floor, is_power(floor)),
-            rule("--light-power", left, is_power(left)),
-            rule("--light-power", format!("{floor},{left}"), !powers_are_allowed || floor.min(left) >= 1e-6 * (floor + left)),
-            rule("--light-radius", settings.light_radius, settings.light_radius > 0.0 && settings.light_radius <= 0.25),
-            rule("--reflectance", settings.reflectance, (0.0..=1.0).contains(&settings.reflectance)),
-            rule("--shininess", wrong.unwrap_or_default(), wrong.is_none()),
-            rule("--eye", format!("{x},{y},{z}"), settings.eye.iter().all(is_coordinate)),
-            rule("--threads", settings.threads, (1..=1024).contains(&settings.threads)),
-            rule("--group-size", settings.group_size, [32, 64, 128, 256, 512, 1024].contains(&settings.group_size)),
-            rule("--counters", counters, [1, 2, 4, 8, 16, 32, 64].contains(&counters)),
-            rule("--chunk", settings.chunk.unwrap_or_default(), settings.chunk.is_none_or(|chunk| (2..=1 << 31).contains(&chunk))),
-            rule("--nearest", nearest, settings.nearest.is_none_or(|nearest| (2..=1024).contains(&nearest))),
-            rule("--nearest", nearest, settings.nearest.is_none() || settings.gather == Gather::KdTree),
-            rule("--chunk", chunk_or_all, settings.nearest.is_none() || chunk_or_all >= photons),
-            rule("--rounds", rounds, u64::from(nearest) * u64::from(rounds) <= 1 << 31),
-            rule("--seed", settings.seed, !is_rand48 || settings.seed <= u64::from(u32::MAX)),
-            rule("--rng", "rand48", !is_rand48 || draws <= 1 << 48),
-            rule("--bounces", bounces, !is_mt || bounces <= photonmill::rng::MT_MAX_BOUNCES),
-            rule("--rng", "mt", !is_mt || all_photons <= 1 << 32),
-            rule("--rng", "sobol", !is_sobol || all_photons <= 1 << 32),
-            rule("--rounds", rounds, all_photons * u128::from(bounces) <= 1 << 47),
+            rule("photons", photons, (2..=1 << 31).contains(&photons)),
+            rule("rounds", rounds, rounds >= 1),
+            rule("bounces", bounces, (1..=10_000).contains(&bounces)),
+            rule("mesh", settings.mesh, (1..=1024).contains(&settings.mesh)),
+            rule("radius", settings.radius, (0.5 / 65_536.0..=0.5).contains(&settings.radius)),
+            rule("full_light", settings.full_light, (1e-12..=1e12).contains(&settings.full_light)),
+            rule("light_power", floor, is_power(floor)),
+            rule("light_power", left, is_power(left)),
+            rule("light_power", format!("{floor},{left}"), !powers_are_allowed || floor.min(left) >= 1e-6 * (floor + left)),
+            rule("light_radius", settings.light_radius, settings.light_radius > 0.0 && settings.light_radius <= 0.25),
+            rule("reflectance", settings.reflectance, (0.0..=1.0).contains(&settings.reflectance)),
+            rule("shininess", wrong.unwrap_or_default(), wrong.is_none()),
+            rule("eye", format!("{x},{y},{z}"), settings.eye.iter().all(is_coordinate)),
+            rule("threads", settings.threads, (1..=1024).contains(&settings.threads)),
+            rule("group_size", settings.group_size, [32, 64, 128, 256, 512, 1024].contains(&settings.group_size)),
+            rule("counters", counters, [1, 2, 4, 8, 16, 32, 64].contains(&counters)),
+            rule("chunk", settings.chunk.unwrap_or_default(), settings.chunk.is_none_or(|chunk| (2..=1 << 31).contains(&chunk))),
+            rule("nearest", nearest, settings.nearest.is_none_or(|nearest| (2..=1024).contains(&nearest))),
+            rule("nearest", nearest, settings.nearest.is_none() || settings.gather == Gather::KdTree),
+            rule("chunk", chunk_or_all, settings.nearest.is_none() || chunk_or_all >= photons),
+            rule("rounds", rounds, u64::from(nearest) * u64::from(rounds) <= 1 << 31),
+            rule("seed", settings.seed, !is_rand48 || settings.seed <= u64::from(u32::MAX)),
+            rule("rng", "rand48", !is_rand48 || draws <= 1 << 48),
+            rule("bounces", bounces, !is_mt || bounces <= photonmill::rng::MT_MAX_BOUNCES),
+            rule("rng", "mt", !is_mt || all_photons <= 1 << 32),
+            rule("rng", "sobol", !is_sobol || all_photons <= 1 << 32),
+            rule("rounds", rounds, all_photons * u128::from(bounces) <= 1 << 47),
         ]
     };
     judge(any_settings, rules, RoomSettings::validate);
@@ -212,19 +212,19 @@ fn transport_settings_are_accepted_exactly_within_their_ranges() {
         let builder = settings.builder;
         let is_for_scenes = |builder| builder != Builder::Cpu;
         vec![
-            rule("--photons", settings.photons, (1..=1 << 31).contains(&settings.photons)),
-            rule("--caustic-photons", settings.caustic_photons, (1..=1 << 31).contains(&settings.caustic_photons)),
-            rule("--rounds", settings.rounds, (1..=1 << 20).contains(&settings.rounds)),
-            rule("--bounces", settings.bounces, (1..=10_000).contains(&settings.bounces)),
-            rule("--variant", builder.map_or("", Builder::name), builder.is_none_or(is_for_scenes)),
-            rule("--shadow-rays", settings.shadow_rays, (1..=MAX_SHADOW_RAYS).contains(&settings.shadow_rays)),
-            rule("--samples", settings.samples, (0..=10).any(|k| settings.samples == 1 << k)),
-            rule("--radius", settings.radius.unwrap_or_default(), is_radius(settings.radius)),
-            rule("--caustic-radius", settings.caustic_radius.unwrap_or_default(), is_radius(settings.caustic_radius)),
-            rule("--alpha", settings.alpha, settings.alpha > 0.0 && settings.alpha <= 1.0),
-            rule("--group-size", settings.group_size, [32, 64, 128, 256, 512, 1024].contains(&settings.group_size)),
-            rule("--chunk", settings.chunk.unwrap_or_default(), settings.chunk.is_none_or(|chunk| (1..=1 << 31).contains(&chunk))),
-            rule("--without", both.map_or("", |effect| effect.name()), both.is_none()),
+            rule("photons", settings.photons, (1..=1 << 31).contains(&settings.photons)),
+            rule("caustic_photons", settings.caustic_photons, (1..=1 << 31).contains(&settings.caustic_photons)),
+            rule("rounds", settings.rounds, (1..=1 << 20).contains(&settings.rounds)),
+            rule("bounces", settings.bounces, (1..=10_000).contains(&settings.bounces)),
+            rule("variant", builder.map_or("", Builder::name), builder.is_none_or(is_for_scenes)),
+            rule("shadow_rays", settings.shadow_rays, (1..=MAX_SHADOW_RAYS).contains(&settings.shadow_rays)),
+            rule("samples", settings.samples, (0..=10).any(|k| settings.samples == 1 << k)),
+            rule("radius", settings.radius.unwrap_or_default(), is_radius(settings.radius)),
+            rule("caustic_radius", settings.caustic_radius.unwrap_or_default(), is_radius(settings.caustic_radius)),
+            rule("alpha", settings.alpha, settings.alpha > 0.0 && settings.alpha <= 1.0),
+            rule("group_size", settings.group_size, [32, 64, 128, 256, 512, 1024].contains(&settings.group_size)),
+            rule("chunk", settings.chunk.unwrap_or_default(), settings.chunk.is_none_or(|chunk| (1..=1 << 31).contains(&chunk))),
+            rule("without", both.map_or("", |effect| effect.name()), both.is_none()),
         ]
     };
     judge(any_transport_settings, rules, SceneSettings::validate);

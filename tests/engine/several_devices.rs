@@ -244,7 +244,7 @@ fn devices_that_compute_otherwise_are_refused() {
     let Some(_) = device() else { return };
     let Err(error) = shared(&room(), 2, &settings(), Trouble { differs: Some(1), ..Trouble::default() }) else { panic!("taken together") };
     let line = error.to_string();
-    assert!(line.starts_with("--devices ") && line.contains("cannot take part") && line.contains("seed"), "{line}");
+    assert!(line.starts_with("`devices` ") && line.contains("cannot take part") && line.contains("seed"), "{line}");
 }
 
 #[test]

@@ -302,5 +302,5 @@ fn plans_keep_a_round_together() {
     assert_eq!(RoomPlan::new(&open_box(&settings), &settings, &limits).unwrap().chunks_per_round, 1);
     let small = Limits { memory_bytes: 1 << 20, ..limits };
     let error = RoomPlan::new(&open_box(&settings), &settings, &small).unwrap_err().to_string();
-    assert!(error.starts_with("--nearest 10: searches the 300000 photons of a round at once"), "{error}");
+    assert!(error.starts_with("`nearest` 10: searches the 300000 photons of a round at once"), "{error}");
 }

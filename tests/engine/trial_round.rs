@@ -163,7 +163,7 @@ fn a_room_too_small_for_its_scene_has_an_unknown_bias() {
         let bias = scene::bias::measure(&gpu, &scene, &view, &plan, (1.0, 2), &AtomicBool::new(false)).unwrap().unwrap();
         assert_eq!(bias.is_known(), is_known, "{width} m: {bias:?}");
         let warning = scene_report::radius_warning(&plan, &geometry, "point").unwrap_or_default();
-        assert_eq!(warning.contains("use --final-gather"), !is_known, "{width} m: {warning}");
+        assert_eq!(warning.contains("use `final_gather`"), !is_known, "{width} m: {warning}");
     }
 }
 

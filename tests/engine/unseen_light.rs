@@ -373,5 +373,5 @@ fn points_off_surfaces_have_no_error_where_photons_alone_bring_light() {
     // An error that no round can reach ends the run with a line.
     let stop = Stop { error: Some(0.05), ..Stop::default() };
     let refused = lit_at(&[(dvec3(0.5, 0.85, 0.0), DVec3::Y)], &SceneSettings { stop, ..settings }).err().map(|error| error.to_string());
-    assert!(refused.as_ref().is_some_and(|line| line.contains("--error 5%") && line.contains("no point lies on a surface")), "{refused:?}");
+    assert!(refused.as_ref().is_some_and(|line| line.contains("`error` 5%") && line.contains("no point lies on a surface")), "{refused:?}");
 }

@@ -354,12 +354,12 @@ fn large_maps_are_coarser_and_too_many_texels_are_refused() {
     assert!(warnings.is_empty() && tiny.width.min(tiny.height) >= 4 && !tiny.texels.is_empty(), "{} x {}", tiny.width, tiny.height);
     for density in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let error = Layout::new(&scene_of(wall()), density).unwrap_err();
-        assert!(error.exit_code() == 2 && error.to_string().contains("--texels-per-metre"), "{error}");
+        assert!(error.exit_code() == 2 && error.to_string().contains("`texels_per_metre`"), "{error}");
     }
     let mut scene = scene_of(wall());
     scene.meshes = (0..42).map(|_| Mesh { uvs: [Vec::new(), wall().uvs[0].clone()], ..wall() }).collect();
     let error = Layout::new(&scene, 1e4).unwrap_err().to_string();
-    assert!(error.contains("--texels-per-metre 10000") && !error.contains('\n'), "{error}");
+    assert!(error.contains("`texels_per_metre` 10000") && !error.contains('\n'), "{error}");
 }
 
 #[test]

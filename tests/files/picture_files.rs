@@ -260,7 +260,7 @@ fn files_say_how_they_were_made() {
     // The paper's box says it too, and its command makes it again.
     place.succeed("--photons 500 --rounds 3 --mesh 8 --reflectance 0.5 -o box.png -q");
     let made = Metadata::read(&place.content("box.png")).unwrap();
-    assert_eq!(made.command, "photonmill --reflectance 0.5 --photons 500 --mesh 8 --rounds 3 -o picture.png");
+    assert_eq!(made.command, "photonmill --reflectance 0.5 --photons 500 --rounds 3 --mesh 8 -o picture.png");
     place.succeed(&format!("{} -q", made.command.strip_prefix("photonmill ").unwrap()));
     assert!(place.content("picture.png") == place.content("box.png"));
     let (said, _) = place.succeed("repeat box.png -o again.png -q");

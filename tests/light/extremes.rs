@@ -385,7 +385,7 @@ fn radii_beyond_what_positions_allow_are_refused() {
     let least = 1.0 / 32_768.0;
     assert!(plan(2.0).is_ok() && plan(least).is_ok());
     for radius in [2.0f64.next_up(), least.next_down(), 1e-23, f64::MIN_POSITIVE, 1e30, f64::NAN, f64::INFINITY, 0.0, -0.1] {
-        assert!(plan(radius).unwrap_err().to_string().starts_with("--radius"), "{radius}");
+        assert!(plan(radius).unwrap_err().to_string().starts_with("`radius`"), "{radius}");
     }
     // Where no photon is in reach of any point there is nothing, and no division by it.
     let lit = received(&gpu, &furnace, &furnace_settings(least), &[(DVec3::new(0.5, 0.0, 0.5), DVec3::Y)]);
@@ -494,7 +494,7 @@ fn slots_of_a_chunk_are_numbered_in_32_bits() {
     // Room for fewer than two photons is an error that names the bounces.
     let none = Limits { buffer_bytes: 3 * 16 * 15, ..vast() };
     let settings = RoomSettings { mesh: 1, ..RoomSettings::default() };
-    assert!(planned(&settings, &none).unwrap_err().to_string().starts_with("--bounces"));
+    assert!(planned(&settings, &none).unwrap_err().to_string().starts_with("`bounces`"));
 }
 
 /// The same for maps of scenes of triangles.
@@ -528,7 +528,7 @@ fn maps_of_a_chunk_are_numbered_in_32_bits() {
     // Film sums and estimates take 48 bytes a pixel.
     let rows = (1 << 27) / 48 / 1024;
     assert!(size(1024, rows).is_ok());
-    assert!(size(1024, rows + 1).unwrap_err().to_string().starts_with("--size"));
+    assert!(size(1024, rows + 1).unwrap_err().to_string().starts_with("`size`"));
 }
 
 /// One group more than a row of 65 535 of them: photons of the second row fly, land and are looked up too.

@@ -378,7 +378,7 @@ fn an_effect_that_the_scene_needs_is_missed_when_it_is_left_out() {
     // So many triangles cannot be a list; of few the bits are the same, as the pairs above show.
     let no_tree = SceneSettings { without: vec![Bvh], ..small() };
     let refused = scene_plan(&gpu, &spheres, &no_tree, square_picture(SIZE)).unwrap_err().to_string();
-    assert!(refused.starts_with("--without bvh"), "{refused}");
+    assert!(refused.starts_with("`without` bvh"), "{refused}");
 
     let mut planned: HashSet<Effect> = HashSet::new();
     for scene in [plates().0, lit_points().0, spheres] {

@@ -16,6 +16,7 @@ use photonmill::output::destination::Folder;
 fn request(scene: &str, most_rounds: u32) -> Request {
     let (scene, budget) = (scene.to_owned(), Duration::from_secs(360_000));
     Request {
+        view: Vec::new(),
         scene,
         size: 6,
         photons: 2048,
