@@ -325,7 +325,29 @@ struct Kernel {
     strides: Vec<(String, usize)>,
 }
 
+/// The module with `false` in place of constants that follow from others by `&&`, `||` and the like, which spirq cannot evaluate: nothing
+/// that is read here depends on them.
+fn without_operations_on_truth(words: &[u32]) -> Vec<u32> {
+    const CONSTANT_FALSE: u32 = 42 | 3 << 16;
+    const SPEC_CONSTANT_OP: u32 = 52;
+    const LOGICAL: std::ops::RangeInclusive<u32> = 164..=168;
+    let (header, mut rest) = words.split_at(5);
+    let mut result = header.to_vec();
+    while let Some(first) = rest.first() {
+        let (instruction, others) = rest.split_at((first >> 16) as usize);
+        match instruction {
+            [_, kind, id, operation, ..] if first & 0xffff == SPEC_CONSTANT_OP && LOGICAL.contains(operation) => {
+                result.extend([CONSTANT_FALSE, *kind, *id]);
+            }
+            _ => result.extend(instruction),
+        }
+        rest = others;
+    }
+    result
+}
+
 fn reflect(words: &[u32]) -> Kernel {
+    let words = without_operations_on_truth(words);
     let entry_points = ReflectConfig::new().spv(words).ref_all_rscs(true).reflect().expect("spirq reads what shaderc wrote");
     let mut kernel = Kernel::default();
     for variable in &entry_points[0].vars {
