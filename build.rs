@@ -325,12 +325,14 @@ struct Kernel {
     strides: Vec<(String, usize)>,
 }
 
-/// The module with `false` in place of constants that follow from others by `&&`, `||` and the like, which spirq cannot evaluate: nothing
-/// that is read here depends on them.
+/// The module with `false` in place of constants that follow from others by `&&`, `||` and the like, and 1 in place of those by `?`, which
+/// spirq cannot evaluate: nothing that is read here depends on them.
 fn without_operations_on_truth(words: &[u32]) -> Vec<u32> {
     const CONSTANT_FALSE: u32 = 42 | 3 << 16;
     const SPEC_CONSTANT_OP: u32 = 52;
     const LOGICAL: std::ops::RangeInclusive<u32> = 164..=168;
+    const CONSTANT: u32 = 43 | 4 << 16;
+    const SELECT: u32 = 169;
     let (header, mut rest) = words.split_at(5);
     let mut result = header.to_vec();
     while let Some(first) = rest.first() {
@@ -339,6 +341,7 @@ fn without_operations_on_truth(words: &[u32]) -> Vec<u32> {
             [_, kind, id, operation, ..] if first & 0xffff == SPEC_CONSTANT_OP && LOGICAL.contains(operation) => {
                 result.extend([CONSTANT_FALSE, *kind, *id]);
             }
+            [_, kind, id, SELECT, ..] if first & 0xffff == SPEC_CONSTANT_OP => result.extend([CONSTANT, *kind, *id, 1]),
             _ => result.extend(instruction),
         }
         rest = others;
