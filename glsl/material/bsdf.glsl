@@ -14,6 +14,47 @@ bool has_layers(uint kind)
     return HAS_LAYERS && kind == SURFACE_LAYERED;
 }
 
+// With which probability a path from wo follows each lobe: as it takes a share of the light.
+void set_chances(inout Lobes lobes, Surface surface, LayerAlbedos seen, float below_diffuse, float cosine)
+{
+    Layers layers = surface.layers;
+    vec3 exact = vec3(0.0);
+    if (HAS_TRANSMISSION && layers.transmission > 0.0) {
+        exact = dielectric_reflectance(lobes.base, layers.is_solid, cosine);
+    }
+    float left_by_sheen = below_sheen(lobes.cover.sheen, seen.sheen);
+    float below = (1.0 - seen.coat) * left_by_sheen;
+    vec3 transmitted = transmission_along(lobes, layers, exact);
+    float diffuse = diffuse_weight(surface, lobes.base, below_diffuse) * left_by_sheen;
+    float sheen = (1.0 - left_by_sheen) * (1.0 - seen.coat);
+    float reflection = reflection_weight(lobes.base, layers, seen, exact, cosine) * below;
+    float coat = seen.coat;
+    float transmission = largest(transmitted) * below;
+    lobes.passing = vec3(0.0);
+    lobes.pass_chance = 0.0;
+    if (HAS_PASSING) {
+        lobes.passing = vec3(1.0 - layers.coverage);
+        if (HAS_TRANSMISSION && !layers.is_solid && layers.transmission > 0.0 && layers.alpha < DELTA_ALPHA) {
+            lobes.passing += layers.coverage * below * transmitted;
+            transmission = 0.0;
+        }
+        lobes.pass_chance = min(largest(lobes.passing), 1.0);
+    }
+    float sum = diffuse + sheen + reflection + coat + transmission;
+    float beyond = 0.0;
+    if (HAS_DIFFUSE_TRANSMISSION) {
+        beyond = diffuse_transmission_weight(layers, lobes.base, below_diffuse) * left_by_sheen;
+        sum += beyond;
+    }
+    float share = sum > 0.0 && !layers.is_unlit ? divide(1.0, sum) : 0.0;
+    lobes.diffuse_chance = diffuse * share;
+    lobes.sheen_chance = sheen * share;
+    lobes.reflection_chance = reflection * share;
+    lobes.coat_chance = coat * share;
+    lobes.transmission_chance = transmission * share;
+    lobes.beyond_chance = beyond * share;
+}
+
 // `eta`: index where wo is over that beyond, of a solid.
 Lobes lobes_of(Surface surface, vec3 wo, float eta)
 {
@@ -26,74 +67,26 @@ Lobes lobes_of(Surface surface, vec3 wo, float eta)
     lobes.cover.coat_albedo = seen.coat;
     lobes.cover.sheen_albedo = seen.sheen;
 
-    // What is scattered evenly, to either side.
     vec2 bound = reflectance_bound(lobes.base, layers);
     lobes.matt.e0 = bound.x;
     lobes.matt.e90 = bound.y;
     lobes.matt.alpha = layers.alpha;
     float below_diffuse = share_below(layers, lobes.matt, seen, cosine), left = mean_share_below(layers, lobes.matt);
     float left_over = (0.31830988618379067 * divide(below_diffuse, max(left, 1e-6)));
-    vec3 colour = surface.base_colour;
+    lobes.matt.diffuse = diffuse_colour(surface, lobes.base) * left_over;
     lobes.beyond = vec3(0.0);
     if (HAS_DIFFUSE_TRANSMISSION) {
-        vec3 beyond = lobes.base.opaque_share * layers.diffuse_transmission * layers.diffuse_transmission_colour;
-        lobes.beyond = beyond * left_over;
-        colour *= 1.0 - layers.diffuse_transmission;
+        lobes.beyond = diffuse_transmission_colour(layers, lobes.base) * left_over;
     }
-    lobes.matt.diffuse = lobes.base.opaque_share * colour * left_over;
-
-    bool is_in_map = is_matt_reflection(lobes, layers);
-    if (HAS_IRIDESCENCE) {
-        lobes.base.film.is_matt = uint(is_in_map);
-    }
+    lobes.transmitted = (1.0 - layers.metallic) * layers.transmission * surface.base_colour;
+    bool is_in_map = is_matt_reflection(lobes, layers) && !layers.is_unlit;
+    lobes.base.film.is_matt = uint(is_in_map);
     lobes.matt.f0 = is_in_map ? lobes.base.f0 : vec3(0.0);
     lobes.matt.f90 = is_in_map ? lobes.base.f90 : 0.0;
-    lobes.transmitted = (1.0 - layers.metallic) * layers.transmission * surface.base_colour;
-
-    // Of light from wo, the share that each lobe takes.
-    vec3 exact = vec3(0.0);
-    if (HAS_TRANSMISSION && layers.transmission > 0.0) {
-        exact = dielectric_reflectance(lobes.base, layers.is_solid, cosine);
-    }
-    float left_by_sheen = below_sheen(lobes.cover.sheen, seen.sheen);
-    float below = (1.0 - seen.coat) * left_by_sheen;
-    vec3 transmitted = transmission_along(lobes, layers, exact);
-    lobes.passing = vec3(0.0);
-    lobes.pass_chance = 0.0;
-    float coat = seen.coat;
-    float sheen = (1.0 - left_by_sheen) * (1.0 - seen.coat);
-    float diffuse = largest(lobes.base.opaque_share * colour) * below_diffuse * left_by_sheen;
-    float reflection = reflection_weight(lobes.base, layers, seen, exact, cosine, below);
-    float transmission = largest(transmitted) * below;
-    float beyond = 0.0;
-    if (HAS_DIFFUSE_TRANSMISSION) {
-        beyond = lobes.base.opaque_share * layers.diffuse_transmission * largest(layers.diffuse_transmission_colour) * below_diffuse * left_by_sheen;
-    }
-    if (HAS_PASSING) {
-        lobes.passing = vec3(1.0 - layers.coverage);
-        if (HAS_TRANSMISSION && !layers.is_solid && layers.transmission > 0.0 && layers.alpha < DELTA_ALPHA) {
-            lobes.passing += layers.coverage * below * transmitted;
-            transmission = 0.0;
-        }
-        lobes.pass_chance = min(largest(lobes.passing), 1.0);
-    }
-    float sum = diffuse + sheen + reflection + coat + transmission;
-    if (HAS_DIFFUSE_TRANSMISSION) {
-        sum += beyond;
-    }
-    float share = sum > 0.0 ? divide(1.0, sum) : 0.0;
     if (layers.is_unlit) {
-        share = 0.0;
-        lobes.matt.diffuse = lobes.matt.f0 = vec3(0.0);
-        lobes.matt.f90 = 0.0;
-        lobes.base.film.is_matt = 0;
+        lobes.matt.diffuse = vec3(0.0);
     }
-    lobes.diffuse_chance = diffuse * share;
-    lobes.sheen_chance = sheen * share;
-    lobes.reflection_chance = reflection * share;
-    lobes.coat_chance = coat * share;
-    lobes.transmission_chance = transmission * share;
-    lobes.beyond_chance = beyond * share;
+    set_chances(lobes, surface, seen, below_diffuse, cosine);
     return lobes;
 }
 
@@ -125,6 +118,40 @@ float density_of_matt_lobes(Surface surface, Lobes lobes, vec3 wo, vec3 wi)
     return density;
 }
 
+// What the base reflects or transmits, at v.h.
+vec3 base_colour_at(Lobes lobes, bool is_solid, float cosine, bool is_beyond)
+{
+    vec3 exact = vec3(0.0);
+    if (HAS_TRANSMISSION && (is_beyond || lobes.base.exact_share > 0.0)) {
+        exact = dielectric_reflectance(lobes.base, is_solid, cosine);
+    }
+    if (HAS_TRANSMISSION && is_beyond) {
+        return transmission_colour(lobes, exact);
+    }
+    return reflection_colour(lobes.base, exact, cosine);
+}
+
+// BRDF or BTDF times cosine of what rays follow of the base that is no delta, beside which a light sample of this density counts in part.
+vec3 sharp_base(Surface surface, Lobes lobes, LayerAlbedos lit, vec3 wo, vec3 wi, bool is_beyond, float light_density)
+{
+    Layers layers = surface.layers;
+    float chance = is_beyond ? lobes.transmission_chance : (is_matt_reflection(lobes, layers) ? 0.0 : lobes.reflection_chance);
+    if (layers.alpha < DELTA_ALPHA || chance <= 0.0) {
+        return vec3(0.0);
+    }
+    Weighed found;
+    if (HAS_TRANSMISSION && is_beyond) {
+        found = weigh_transmission(surface, lobes, wo, wi);
+    } else {
+        found = weigh_reflection(base_facets(surface), wo, wi);
+    }
+    if (found.density <= 0.0) {
+        return vec3(0.0);
+    }
+    vec3 colour = base_colour_at(lobes, layers.is_solid, found.along, is_beyond) * below_cover(lobes.cover, lit);
+    return colour * (found.value * light_share(light_density, chance * found.density));
+}
+
 // What arrives from a direction, as matt and as sharp lobes weigh it: BRDF times cosine.
 struct LobeLight {
     vec3 matt;
@@ -137,21 +164,18 @@ LobeLight weigh_light(Surface surface, Lobes lobes, vec3 wo, vec3 wi, float ligh
     LobeLight light = LobeLight(vec3(0.0), vec3(0.0));
     float cosine = dot(wi, surface.ns);
     LayerAlbedos lit = albedos_towards(surface, lobes.cover, wi);
-    if (dot(wi, surface.ng) <= 0.0) {
-        if (HAS_TRANSMISSION) {
-            light.sharp = sharp_transmission(surface, lobes, lit, wo, wi, light_density);
-        }
-        light.sharp += sharp_diffuse_transmission(surface, lobes, lit, wi, light_density);
-        return light;
-    }
-    if (cosine > 0.0) {
+    bool is_beyond = dot(wi, surface.ng) <= 0.0;
+    if (!is_beyond && cosine > 0.0) {
         light.matt = matt_brdf(lobes.matt, lobes.cover, lobes.base.film, lit, surface.ns, wo, wi) * cosine;
         if (asks_matt) {
             light.matt *= light_share(light_density, density_of_matt_lobes(surface, lobes, wo, wi));
         }
     }
-    light.sharp = sharp_reflection(surface, lobes, lit, wo, wi, light_density);
-    if (HAS_COATS) {
+    light.sharp = sharp_base(surface, lobes, lit, wo, wi, is_beyond, light_density);
+    if (HAS_DIFFUSE_TRANSMISSION && is_beyond) {
+        light.sharp += sharp_diffuse_transmission(surface, lobes, lit, wi, light_density);
+    }
+    if (HAS_COATS && !is_beyond) {
         light.sharp += sharp_coat(surface, lobes, wo, wi, light_density);
     }
     return light;
@@ -207,22 +231,56 @@ bool is_smooth_lobe(Layers layers, Lobes lobes, uint lobe)
         || (HAS_TRANSMISSION && lobe == LOBE_TRANSMISSION && is_smooth_transmission(layers, lobes));
 }
 
-Scatter sample_lobe_of_facets(Surface surface, Lobes lobes, vec3 wo, vec2 u, ChosenLobe chosen, bool carries_radiance)
+// Diffuse lobe, sheen and diffuse transmission: by the cosine.
+Scatter sample_even_lobe(Surface surface, Lobes lobes, vec3 wo, vec2 u, ChosenLobe chosen)
 {
+    bool is_beyond = HAS_DIFFUSE_TRANSMISSION && chosen.lobe == LOBE_DIFFUSE_TRANSMISSION;
+    vec3 n = is_beyond ? -surface.ns : surface.ns, side = is_beyond ? -surface.ng : surface.ng;
+    vec3 wi = to_frame(sample_cosine_hemisphere(u.x, u.y), n);
+    LayerAlbedos lit = albedos_towards(surface, lobes.cover, wi);
+    Scatter scatter = Scatter(wi, vec3(0.0), dot(wi, side) > 0.0, is_beyond, false, 0.0);
+    if (is_beyond) {
+        scatter.weight = diffuse_transmission_btdf(lobes, lit);
+        scatter.density = chosen.chance * even_density(n, wi);
+        scatter.alive = scatter.alive && scatter.density > 0.0;
+    } else if (HAS_SHEEN && chosen.lobe == LOBE_SHEEN) {
+        scatter.weight = sheen_brdf(lobes.cover, lit, surface.ns, wo, wi);
+    } else {
+        scatter.weight = diffuse_brdf(lobes.matt, lobes.cover, lit);
+    }
+    scatter.weight *= divide(3.14159265358979324, chosen.chance);
+    return scatter;
+}
+
+// Reflection, transmission and coat: by facets, as often as they are seen.
+Scatter sample_facet_lobe(Surface surface, Lobes lobes, vec3 wo, vec2 u, ChosenLobe chosen, bool carries_radiance)
+{
+    Layers layers = surface.layers;
     bool is_coat = HAS_COATS && chosen.lobe == LOBE_COAT, is_beyond = HAS_TRANSMISSION && chosen.lobe == LOBE_TRANSMISSION;
     Facets facets = base_facets(surface);
     if (is_coat) {
         facets = coat_facets(surface);
     }
-    bool is_delta = facets.alpha < DELTA_ALPHA || (is_beyond && goes_straight(surface.layers, lobes));
+    bool is_delta = facets.alpha < DELTA_ALPHA || (is_beyond && goes_straight(layers, lobes));
     SampledFacet facet = sample_facet(facets, is_delta, wo, u, chosen.chance);
-    if (is_coat) {
-        return sample_coat(surface, facets, facet, wo, chosen.chance);
-    }
+    vec3 wi;
     if (is_beyond) {
-        return sample_transmission(surface, lobes, facets, facet, wo, chosen.chance, carries_radiance);
+        wi = transmit_at_facet(surface, lobes, facet, wo);
+    } else {
+        wi = reflect_at_facet(facet, wo);
     }
-    return sample_reflection(surface, lobes, facets, facet, wo, chosen.chance);
+    float cos_l = is_beyond ? -dot(wi, facets.n) : dot(wi, facets.n);
+    Scatter scatter = leave_facet(facets, facet, wo, wi, cos_l, is_beyond ? -surface.ng : surface.ng, chosen.chance);
+    scatter.weight *= carries_radiance && is_beyond && layers.is_solid ? lobes.base.eta * lobes.base.eta : 1.0;
+    if (is_coat) {
+        scatter.weight *= coat_colour(layers.coat, facet.along);
+        scatter.is_specular = !is_matt(facets.alpha);
+    } else {
+        LayerAlbedos lit = albedos_towards(surface, lobes.cover, scatter.direction);
+        scatter.weight *= base_colour_at(lobes, layers.is_solid, facet.along, is_beyond) * below_cover(lobes.cover, lit);
+        scatter.is_specular = is_beyond || !is_matt_reflection(lobes, layers);
+    }
+    return scatter;
 }
 
 // u.x chooses the lobe, the others the direction. A path that does not pass keeps the share `coverage` over one less the probability of
@@ -239,16 +297,10 @@ Scatter sample_layered(Surface surface, Lobes lobes, vec3 wo, vec3 u, bool carri
     if (chosen.chance <= 0.0) {
         return Scatter(-wo, vec3(0.0), false, false, false, 0.0);
     }
-    if (chosen.lobe == LOBE_DIFFUSE) {
-        return sample_diffuse(surface, lobes, u.yz, chosen.chance);
+    if (chosen.lobe == LOBE_DIFFUSE || chosen.lobe == LOBE_SHEEN || chosen.lobe == LOBE_DIFFUSE_TRANSMISSION) {
+        return sample_even_lobe(surface, lobes, wo, u.yz, chosen);
     }
-    if (HAS_SHEEN && chosen.lobe == LOBE_SHEEN) {
-        return sample_sheen(surface, lobes, wo, u.yz, chosen.chance);
-    }
-    if (HAS_DIFFUSE_TRANSMISSION && chosen.lobe == LOBE_DIFFUSE_TRANSMISSION) {
-        return sample_diffuse_transmission(surface, lobes, u.yz, chosen.chance);
-    }
-    return sample_lobe_of_facets(surface, lobes, wo, u.yz, chosen, carries_radiance);
+    return sample_facet_lobe(surface, lobes, wo, u.yz, chosen, carries_radiance);
 }
 
 // Samples where a path goes on that came from wo; u = (choice, two for the direction). A camera path carries radiance, which refraction

@@ -178,9 +178,9 @@ Scatter leave_facet(Facets facets, SampledFacet facet, vec3 wo, vec3 wi, float c
     return Scatter(wi, vec3(weight), is_alive && dot(wi, side) > 0.0, true, false, facet.density);
 }
 
-Scatter reflect_at_facet(Facets facets, SampledFacet facet, vec3 wo, vec3 side, float chance)
+// Where it goes on that is reflected.
+vec3 reflect_at_facet(inout SampledFacet facet, vec3 wo)
 {
-    vec3 wi = 2.0 * facet.along * facet.normal - wo;
     facet.density *= 0.25;
-    return leave_facet(facets, facet, wo, wi, dot(wi, facets.n), side, chance);
+    return 2.0 * facet.along * facet.normal - wo;
 }

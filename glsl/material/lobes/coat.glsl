@@ -49,11 +49,3 @@ vec3 sharp_coat(Surface surface, Lobes lobes, vec3 wo, vec3 wi, float light_dens
     float share = light_share(light_density, lobes.coat_chance * found.density);
     return vec3(coat_colour(layers.coat, found.along) * found.value * share);
 }
-
-Scatter sample_coat(Surface surface, Facets facets, SampledFacet facet, vec3 wo, float chance)
-{
-    Scatter scatter = reflect_at_facet(facets, facet, wo, surface.ng, chance);
-    scatter.weight *= coat_colour(surface.layers.coat, facet.along);
-    scatter.is_specular = !is_matt(facets.alpha);
-    return scatter;
-}

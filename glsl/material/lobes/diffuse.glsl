@@ -43,21 +43,29 @@ float mean_share_below(Layers layers, MattLobes matt)
     return left;
 }
 
+vec3 diffuse_colour(Surface surface, Base base)
+{
+    vec3 colour = surface.base_colour;
+    if (HAS_DIFFUSE_TRANSMISSION) {
+        colour *= 1.0 - surface.layers.diffuse_transmission;
+    }
+    return base.opaque_share * colour;
+}
+
+// Share of light that it takes, of what gets below coat and reflection.
+float diffuse_weight(Surface surface, Base base, float below)
+{
+    return largest(diffuse_colour(surface, base)) * below;
+}
+
 // The diffuse lobe under coat and sheen, 1/sr.
 vec3 diffuse_brdf(MattLobes lobes, MattCover cover, LayerAlbedos lit)
 {
     return below_all(lobes.diffuse, lobes, cover, lit);
 }
 
-// Of the diffuse lobe, and of sheen.
+// Of what is scattered about n as by the cosine.
 float even_density(vec3 n, vec3 wi)
 {
     return 0.31830988618379067 * max(dot(wi, n), 0.0);
-}
-
-Scatter sample_diffuse(Surface surface, Lobes lobes, vec2 u, float chance)
-{
-    vec3 wi = to_frame(sample_cosine_hemisphere(u.x, u.y), surface.ns);
-    vec3 brdf = diffuse_brdf(lobes.matt, lobes.cover, albedos_towards(surface, lobes.cover, wi));
-    return Scatter(wi, brdf * divide(3.14159265358979324, chance), dot(wi, surface.ng) > 0.0, false, false, 0.0);
 }

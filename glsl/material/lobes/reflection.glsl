@@ -82,21 +82,18 @@ vec3 dielectric_reflectance(Base base, bool is_solid, float cosine)
     return exact;
 }
 
-// At v.h.
-vec3 reflection_colour(Base base, bool is_solid, float cosine)
+// At v.h; `exact` is the reflectance of what transmits, where some does.
+vec3 reflection_colour(Base base, vec3 exact, float cosine)
 {
     vec3 colour = base.f0 + (base.f90 - base.f0) * fifth_power(clamp(1.0 - cosine, 0.0, 1.0));
     if (HAS_IRIDESCENCE && base.film.share > 0.0) {
         colour = under_film(colour, base.film, cosine);
     }
-    if (HAS_TRANSMISSION && base.exact_share > 0.0) {
-        colour += base.exact_share * dielectric_reflectance(base, is_solid, cosine);
-    }
-    return colour;
+    return colour + base.exact_share * exact;
 }
 
-// Share of light from wo that is reflected; `exact` is the reflectance of what transmits, and `below` what coat and sheen leave.
-float reflection_weight(Base base, Layers layers, LayerAlbedos seen, vec3 exact, float cosine, float below)
+// Share of light from wo that is reflected, as far as coat and sheen leave it.
+float reflection_weight(Base base, Layers layers, LayerAlbedos seen, vec3 exact, float cosine)
 {
     vec3 reflected = base.f0 * seen.base.x + base.f90 * seen.base.y;
     if (HAS_IRIDESCENCE && layers.iridescence > 0.0) {
@@ -105,10 +102,7 @@ float reflection_weight(Base base, Layers layers, LayerAlbedos seen, vec3 exact,
                         vec3(0.02 * layers.iridescence * (layers.metallic + base.film.dielectric)));
         reflected = (1.0 - layers.iridescence) * reflected + (seen.base.x + seen.base.y) * film;
     }
-    if (HAS_TRANSMISSION) {
-        reflected += base.exact_share * exact;
-    }
-    return largest(reflected) * below;
+    return largest(reflected + base.exact_share * exact);
 }
 
 // The BRDF of what photon maps know of it, 1/sr.
@@ -131,28 +125,4 @@ vec3 reflection_brdf(MattLobes lobes, MattCover cover, MattFilm film, LayerAlbed
 float reflection_density(Surface surface, Lobes lobes, vec3 wo, vec3 wi)
 {
     return lobes.reflection_chance * weigh_reflection(base_facets(surface), wo, wi).density;
-}
-
-// BRDF times cosine of what rays follow that is no delta, beside which a light sample of this density counts in part.
-vec3 sharp_reflection(Surface surface, Lobes lobes, LayerAlbedos lit, vec3 wo, vec3 wi, float light_density)
-{
-    Layers layers = surface.layers;
-    if (layers.alpha < DELTA_ALPHA || lobes.reflection_chance <= 0.0 || is_matt_reflection(lobes, layers)) {
-        return vec3(0.0);
-    }
-    Weighed found = weigh_reflection(base_facets(surface), wo, wi);
-    if (found.density <= 0.0) {
-        return vec3(0.0);
-    }
-    vec3 colour = reflection_colour(lobes.base, layers.is_solid, found.along) * below_cover(lobes.cover, lit);
-    return colour * (found.value * light_share(light_density, lobes.reflection_chance * found.density));
-}
-
-Scatter sample_reflection(Surface surface, Lobes lobes, Facets facets, SampledFacet facet, vec3 wo, float chance)
-{
-    Scatter scatter = reflect_at_facet(facets, facet, wo, surface.ng, chance);
-    LayerAlbedos lit = albedos_towards(surface, lobes.cover, scatter.direction);
-    scatter.weight *= reflection_colour(lobes.base, surface.layers.is_solid, facet.along) * below_cover(lobes.cover, lit);
-    scatter.is_specular = !is_matt_reflection(lobes, surface.layers);
-    return scatter;
 }

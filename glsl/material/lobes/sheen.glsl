@@ -47,11 +47,3 @@ vec3 sheen_brdf(MattCover cover, LayerAlbedos lit, vec3 n, vec3 wo, vec3 wi)
     }
     return sheen;
 }
-
-// As the diffuse lobe.
-Scatter sample_sheen(Surface surface, Lobes lobes, vec3 wo, vec2 u, float chance)
-{
-    vec3 wi = to_frame(sample_cosine_hemisphere(u.x, u.y), surface.ns);
-    vec3 brdf = sheen_brdf(lobes.cover, albedos_towards(surface, lobes.cover, wi), surface.ns, wo, wi);
-    return Scatter(wi, brdf * divide(3.14159265358979324, chance), dot(wi, surface.ng) > 0.0, false, false, 0.0);
-}

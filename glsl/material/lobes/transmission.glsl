@@ -28,17 +28,16 @@ bool is_smooth_transmission(Layers layers, Lobes lobes)
     return lobes.transmission_chance > 0.0 && (layers.alpha < DELTA_ALPHA || goes_straight(layers, lobes));
 }
 
-// At v.h.
-vec3 transmission_colour(Lobes lobes, bool is_solid, float cosine)
+vec3 transmission_colour(Lobes lobes, vec3 exact)
 {
-    return lobes.transmitted * (1.0 - dielectric_reflectance(lobes.base, is_solid, cosine));
+    return lobes.transmitted * (1.0 - exact);
 }
 
-// Share of light from wo that is transmitted, as far as coat and sheen leave it, whose reflectance is `exact`.
+// Share of light from wo that is transmitted, as far as coat and sheen leave it.
 vec3 transmission_along(Lobes lobes, Layers layers, vec3 exact)
 {
     if (HAS_TRANSMISSION && layers.transmission > 0.0) {
-        vec3 transmitted = lobes.transmitted * (1.0 - exact);
+        vec3 transmitted = transmission_colour(lobes, exact);
         // Facets let light through where the surface as a whole would not.
         return layers.alpha >= DELTA_ALPHA ? max(transmitted, 0.125 * lobes.transmitted) : transmitted;
     }
@@ -69,54 +68,29 @@ Weighed weigh_refraction(Facets facets, float eta, vec3 wo, vec3 wi)
     return Weighed(value, both * facet_masking(facets, wo, cos_v), v_h);
 }
 
-// BTDF times cosine where it is no delta, beside which a light sample of this density counts in part.
-vec3 sharp_transmission(Surface surface, Lobes lobes, LayerAlbedos lit, vec3 wo, vec3 wi, float light_density)
+Weighed weigh_transmission(Surface surface, Lobes lobes, vec3 wo, vec3 wi)
 {
-    Layers layers = surface.layers;
-    if (layers.alpha < DELTA_ALPHA || lobes.transmission_chance <= 0.0) {
-        return vec3(0.0);
+    if (surface.layers.is_solid) {
+        return weigh_refraction(base_facets(surface), lobes.base.eta, wo, wi);
     }
-    Weighed found;
-    if (layers.is_solid) {
-        found = weigh_refraction(base_facets(surface), lobes.base.eta, wo, wi);
-    } else {
-        // A thin wall transmits as it would reflect the mirrored direction.
-        found = weigh_reflection(base_facets(surface), wo, wi - 2.0 * dot(wi, surface.ns) * surface.ns);
-    }
-    if (found.density <= 0.0) {
-        return vec3(0.0);
-    }
-    vec3 colour = transmission_colour(lobes, layers.is_solid, found.along) * below_cover(lobes.cover, lit);
-    return colour * (found.value * light_share(light_density, lobes.transmission_chance * found.density));
+    // A thin wall transmits as it would reflect the mirrored direction.
+    return weigh_reflection(base_facets(surface), wo, wi - 2.0 * dot(wi, surface.ns) * surface.ns);
 }
 
-Scatter sample_transmission(Surface surface, Lobes lobes, Facets facets, SampledFacet facet, vec3 wo, float chance, bool carries_radiance)
+// Where it goes on that is transmitted; nowhere in total reflection.
+vec3 transmit_at_facet(Surface surface, Lobes lobes, inout SampledFacet facet, vec3 wo)
 {
-    Layers layers = surface.layers;
+    if (!surface.layers.is_solid) {
+        vec3 wi = reflect_at_facet(facet, wo);
+        return wi - 2.0 * dot(wi, surface.ns) * surface.ns;
+    }
     float eta = lobes.base.eta;
-    vec3 wi = 2.0 * facet.along * facet.normal - wo;
-    bool is_total = false;
-    if (layers.is_solid) {
-        float cos_t_squared = refracted_cosine_squared(facet.along, eta);
-        float l_h = sqrt(max(cos_t_squared, 0.0));
-        float spread = eta * facet.along - l_h;
-        is_total = cos_t_squared <= 0.0;
-        wi = normalize(spread * facet.normal - eta * wo);
-        facet.density *= facet.along * divide(l_h, max(spread * spread, 1e-12));
-    } else {
-        wi = wi - 2.0 * dot(wi, facets.n) * facets.n;
-        facet.density *= 0.25;
+    float cos_t_squared = refracted_cosine_squared(facet.along, eta);
+    float l_h = sqrt(max(cos_t_squared, 0.0));
+    float spread = eta * facet.along - l_h;
+    facet.density *= facet.along * divide(l_h, max(spread * spread, 1e-12));
+    if (goes_straight(surface.layers, lobes)) {
+        return -wo;
     }
-    Scatter scatter = leave_facet(facets, facet, wo, wi, -dot(wi, facets.n), -surface.ng, chance);
-    if (goes_straight(layers, lobes)) {
-        scatter.direction = -wo;
-        scatter.alive = true;
-    }
-    scatter.alive = scatter.alive && !is_total;
-    if (carries_radiance && layers.is_solid) {
-        scatter.weight *= eta * eta;
-    }
-    LayerAlbedos lit = albedos_towards(surface, lobes.cover, scatter.direction);
-    scatter.weight *= transmission_colour(lobes, layers.is_solid, facet.along) * below_cover(lobes.cover, lit);
-    return scatter;
+    return cos_t_squared > 0.0 ? normalize(spread * facet.normal - eta * wo) : vec3(0.0);
 }

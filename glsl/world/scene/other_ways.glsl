@@ -70,7 +70,7 @@ float part_at_layers(Surface surface, Lobes lobes, vec3 wo, ChosenLobe chosen, b
     }
     for (uint lobe = LOBE_REFLECTION; lobe <= LOBE_TRANSMISSION; lobe++) {
         if ((passes || lobe != chosen.lobe) && is_smooth_lobe(surface.layers, lobes, lobe)) {
-            Scatter other = sample_lobe_of_facets(surface, lobes, wo, vec2(0.5), ChosenLobe(lobe, 1.0, 1.0), true);
+            Scatter other = sample_facet_lobe(surface, lobes, wo, vec2(0.5), ChosenLobe(lobe, 1.0, 1.0), true);
             uint media = chain.media;
             if (HAS_MEDIA && surface.layers.medium != 0 && dot(other.direction, surface.ng) < 0.0) {
                 media = media_beyond(surface, media);
