@@ -1,4 +1,4 @@
-//! Parameters of layered materials: what glTF's metallic-roughness model and its extensions have, a field and a row of [`PARAMETERS`] each.
+//! Parameters of layered materials: what glTF's metallic-roughness model and its extensions have. Each stands in one place, in `layers!`.
 
 use glam::{DVec2, Vec3};
 
