@@ -122,7 +122,7 @@ pub enum Error {
 }
 
 /// A field in backticks, for whoever writes it in another way; all other names as they are: `-o`, `FILE`.
-fn named(option: &str) -> String {
+pub(crate) fn named(option: &str) -> String {
     if option.starts_with(|letter: char| letter.is_ascii_lowercase()) { format!("`{option}`") } else { option.to_owned() }
 }
 

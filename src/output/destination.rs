@@ -11,7 +11,7 @@ use std::sync::{Mutex, PoisonError};
 
 use tempfile::NamedTempFile;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, named};
 use crate::text;
 
 /// A file that will be written.
@@ -156,10 +156,10 @@ pub fn check_distinct(destinations: &[Destination]) -> Result<()> {
     for destination in destinations {
         if let Some(first) = seen.insert(destination.file(), destination) {
             return Err(if destination.is_standard_output() {
-                let allowed = format!("{} - already is standard output; name a file for one of the two", first.option);
+                let allowed = format!("{} - already is standard output; name a file for one of the two", named(first.option));
                 Error::setting(destination.option, "-", allowed)
             } else {
-                destination.refuse(format!("{} writes it too", first.option))
+                destination.refuse(format!("{} writes it too", named(first.option)))
             });
         }
     }

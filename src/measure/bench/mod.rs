@@ -19,10 +19,11 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, named};
 use crate::gpu::Gpu;
 use crate::measure::compaction::{self, Map};
 use crate::output::destination::{Folder, write_all};
+use crate::render::names::{as_option, spelled};
 use crate::scene::Scene;
 use experiments::Experiment;
 use pass::Pass;
@@ -161,7 +162,8 @@ fn measure(lab: &mut Lab, bench: &mut Bench) -> Result<()> {
             Ok(()) => {}
             // What this device cannot do is no reason to end.
             Err(Error::Setting { option, value, allowed }) => {
-                bench.left_out.push(format!("{}: {option} {value} {allowed}", experiment.name));
+                let line = format!("{}: {} {value} {allowed}", experiment.name, named(option));
+                bench.left_out.push(spelled(&line, as_option));
             }
             Err(error) => return Err(error),
         }

@@ -23,10 +23,11 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-use crate::error::{Error, Result, require, within};
+use crate::error::{Error, Result, named, require, within};
 use crate::gpu::{Gpu, clock};
 use crate::measure::compaction;
 use crate::output::destination::{Folder, write_all};
+use crate::render::names::{as_option, spelled};
 use crate::scene::Scene;
 use axes::{Axis, Group};
 use peers::Peer;
@@ -309,7 +310,9 @@ impl Measuring<'_> {
                     }
                     Ok(shot) => shots[which].push((shot, began.elapsed())),
                     // What this device cannot do is no reason to end the study.
-                    Err(Error::Setting { option, allowed, .. }) => curves[which].left_out = Some(format!("{option} {allowed}")),
+                    Err(Error::Setting { option, allowed, .. }) => {
+                        curves[which].left_out = Some(spelled(&format!("{} {allowed}", named(option)), as_option))
+                    }
                     Err(error) => return Err(error),
                 }
             }
