@@ -84,7 +84,7 @@ pub fn on_scene(subcommand: &str, settings: &SceneSettings) -> String {
     line.differing("samples", settings.samples, usual.samples);
     line.differing("shadow-rays", settings.shadow_rays, usual.shadow_rays);
     if settings.final_gather {
-        line.0.push_str(" `final_gather`");
+        line.0.push_str(" --final-gather");
     }
     line.differing("aim", switch(settings.aim), switch(usual.aim));
     line.named("illumination", settings.illumination, usual.illumination);

@@ -37,7 +37,7 @@ fn nodes_stand_where_the_animation_puts_them() {
         near(found.2, DVec3::X * if at.is_some() { 5.0 } else { 1.0 });
     }
     assert_said(&load_at(&animated(), Some(1.0)).unwrap().warnings, &["animations beside the first", "besides nodes"]);
-    assert_said(&load(&animated()).unwrap().warnings, &["--at"]);
+    assert_said(&load(&animated()).unwrap().warnings, &["`at`"]);
 }
 
 #[test]
@@ -52,7 +52,7 @@ fn faults_of_animations_are_named() {
         ("/animations/0/samplers/0/input", json!(falling_times), &["a key at 10 s before one at 0 s", "must rise"]),
         ("/animations/0/channels/0/sampler", json!(99), &["animations[0].channels[0].sampler", "99"]),
         ("/animations/0/channels/1/target/node", json!(77), &["animations[0].channels[1].target.node is 77", "list nodes has 6 members"]),
-        ("/animations", json!([]), &["--at", "has none"]),
+        ("/animations", json!([]), &["`at`", "has none"]),
     ];
     assert_changes_refused(&value, Some(1.0), &cases);
     value["animations"][0]["samplers"][0]["input"] = json!(two_times);

@@ -140,7 +140,7 @@ fn damaged_files_are_refused() {
         let mut bytes = whole.clone();
         bytes[place] ^= 1 << (place % 8);
         let line = line_of(&outcome(&bytes).expect_err("a changed byte is taken"));
-        assert!(line.starts_with("`map` "), "{line}");
+        assert!(line.starts_with("--map "), "{line}");
         line_of(&outcome(&whole[..place]).expect_err("a file that is cut off is taken"));
     }
     // And before any picture is made of it.

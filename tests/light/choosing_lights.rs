@@ -203,7 +203,7 @@ fn picks(gpu: &Gpu, geometry: &Geometry, plan: &ScenePlan, receivers: &[Receiver
     lights.into_iter().zip(probabilities).map(|(light, probability)| (light as usize, f64::from(probability))).collect()
 }
 
-const PICK: &str = "ChosenLight pick = choose_light(row_of_shares(here.position, here.ng, push.ray_count < 2), here.position, \
+const PICK: &str = "ChosenLight pick = choose_light(row_of_shares(here.surface.position, here.surface.ng, push.ray_count < 2), here.surface.position, \
     stratified(0, 1, words_of(pair, 1, push.draws)).x, mix32(words.w));\n    \
     found[pair] = (push.ray_count & 1) == 0 ? float(pick.emitter) : pick.probability;";
 

@@ -263,7 +263,7 @@ fn commands_that_are_wrong_are_noticed() {
 }
 
 /// Options of the project's other tools, of cargo and of Slurm.
-const OTHER_OPTIONS: &str = "--again --array --dependency --gres --help --hostname --ignored --install --limit --long --open --open-mode --out \
+const OTHER_OPTIONS: &str = "--lib --again --array --dependency --gres --help --hostname --ignored --install --limit --long --open --open-mode --out \
     --parsable --pictures --partition --path --plot --quick --release --requeue --sbatch --sbatch-merge --shards \
     --signal --test --wrap";
 
