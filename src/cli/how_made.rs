@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use super::typed::Typed;
-use crate::engine::error_bound::FilmError;
+use crate::engine::error::bound::FilmError;
 use crate::engine::identity::settings_with_effect;
 use crate::engine::room::RunResult as RoomResult;
 use crate::engine::saved::SavedRun;

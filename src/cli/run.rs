@@ -21,7 +21,7 @@ use super::{End, complain, device_failed, say, say_beside};
 use crate::engine;
 use crate::engine::Control;
 use crate::engine::choose_builder::{Choice, choose_builder};
-use crate::engine::error_bound::ErrorSource;
+use crate::engine::error::bound::ErrorSource;
 use crate::engine::replay::PhotonName;
 use crate::engine::retry::{run_on, until_done};
 use crate::engine::room::film::{RoomFilm, estimate_walls};

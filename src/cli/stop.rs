@@ -4,8 +4,8 @@ use clap::Args;
 
 use super::progress::ProgressReporter;
 use super::values::{parse_percent, parse_seconds, parse_within, value_enum};
-use crate::engine::bias::Bias;
 use crate::engine::blocks::Share;
+use crate::engine::error::bias::Bias;
 use crate::error::{Error, Result, require};
 use crate::settings::stop::{Measure, Stop};
 use crate::text::counted;
@@ -87,7 +87,7 @@ pub(super) fn up_to(stop: &Stop, rounds: u32) -> String {
 
 /// Rounds of a batch after a run of so many: all batches at both radii together do about as many as the run.
 pub(super) fn rounds_after(rounds: u32) -> u32 {
-    rounds.div_ceil(2 * crate::engine::bias_batches::BATCHES).max(1)
+    rounds.div_ceil(2 * crate::engine::error::bias_batches::BATCHES).max(1)
 }
 
 /// Rounds of a batch at first, and how often it is made again with four times as many, as long as the interval leaves
@@ -109,7 +109,7 @@ pub(super) fn bias_before(
     for refinement in 0..=REFINEMENTS {
         reporter.step(&format!(
             "measuring the bias first: {} batches of {} at two radii",
-            crate::engine::bias_batches::BATCHES,
+            crate::engine::error::bias_batches::BATCHES,
             counted(rounds, "round")
         ));
         let Some(bias) = measure(rounds)? else { return Ok(None) };

@@ -6,11 +6,11 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::report::{Intervals, Tail, errors, ledger};
-use crate::engine::bias::Bias;
-use crate::engine::error_bound::{ErrorPlaces, FilmError};
+use crate::engine::error::bias::Bias;
+use crate::engine::error::bound::{ErrorPlaces, FilmError};
+use crate::engine::error::unknown::Unknown;
 use crate::engine::saved::SavedRun;
 use crate::engine::scene::SceneFilm;
-use crate::engine::unknown::Unknown;
 use crate::ledger::{Fates, Ledger};
 use crate::text::counted;
 

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::{Looking, PreparedScene, Run};
 use crate::bake::pages::{Atlas, Pages};
 use crate::bake::{self, IntoFile, Layout, Map, Written};
-use crate::engine::error_bound::ErrorSource;
+use crate::engine::error::bound::ErrorSource;
 use crate::engine::scene::View;
 use crate::engine::watch::Control;
 use crate::error::{Error, Result};

@@ -11,7 +11,7 @@ use super::on_gpu::{SceneOnGpu, constants, modules, task};
 use super::resources::SceneResources;
 use crate::constants::{SHOW_ALL, SHOW_ERROR};
 use crate::engine::Control;
-use crate::engine::error_bound::FilmError;
+use crate::engine::error::bound::FilmError;
 use crate::engine::run::{self, Run, World};
 use crate::error::Result;
 use crate::gpu::kernels::{Display, ShowPhotons, ShowScene};

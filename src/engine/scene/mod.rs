@@ -45,7 +45,7 @@ pub use identity::scene_hash;
 pub use on_gpu::{constants, light, light_from, modules};
 pub use on_several::light_on;
 
-use crate::engine::error_bound::FilmError;
+use crate::engine::error::bound::FilmError;
 use crate::engine::{Control, run};
 use crate::error::Result;
 use crate::gpu::Gpu;

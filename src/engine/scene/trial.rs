@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use super::resources::SceneResources;
 use super::{Round, View, constants, light_trial, modules, points, trace, trial_rays};
 use crate::engine;
-use crate::engine::bias_batches;
+use crate::engine::error::bias_batches;
 use crate::error::Result;
 use crate::gpu::kernels::{Clearance, TrialRays};
 use crate::gpu::{Commands, Extent, Gpu, Kernel, Memory};
