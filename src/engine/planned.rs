@@ -17,7 +17,7 @@ macro_rules! buffers {
         }
 
         impl $name {
-            fn made($($argument: $given),*) -> Result<$name> {
+            pub(super) fn made($($argument: $given),*) -> Result<$name> {
                 Ok($name { $($field: $made),* })
             }
         }

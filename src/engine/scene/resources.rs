@@ -1,5 +1,6 @@
 //! Makes the buffers of a scene that `plan::buffers` lists, and uploads the scene.
 
+use super::film_buffers::FilmBuffers;
 use crate::engine::planned::{Planned, buffers};
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Gpu, kernels};
@@ -62,29 +63,11 @@ buffers! {
         /// Found in the first round.
         radius_classes: Buffer<u32> = planned.one("radius classes")?,
         clearances: Buffer<f32> = planned.one("clearances")?,
-        class_counts: Buffer<u32> = planned.zeroed(commands, "class counts")?,
         /// Of the round under way.
         disc_cuts: Buffer<[u32; 4]> = planned.one("disc cuts")?,
-        /// Of the block under way.
-        sums_of_block: Buffer<u64> = planned.zeroed(commands, "block sums")?,
-        surface_sums_of_block: Buffer<u64> = planned.zeroed(commands, "surface block sums")?,
-        // All rounds.
-        film_sums: Buffer<u64> = planned.zeroed(commands, "film sums")?,
-        film_squares: Buffer<u64> = planned.zeroed(commands, "film squares")?,
-        /// Of light that surfaces scatter; of a picture.
-        surface_sums: Buffer<u64> = planned.zeroed(commands, "surface sums")?,
-        surface_squares: Buffer<u64> = planned.zeroed(commands, "surface squares")?,
         /// Within a smaller radius.
         near_sums: Buffer<u64> = planned.one("near sums")?,
-        differences: Buffer<u64> = planned.zeroed(commands, "differences")?,
-        latest_blocks: Buffer<f32> = planned.zeroed(commands, "latest blocks")?,
-        /// What is known of pixels that some kind of light has not reached; see `glsl/world/scene/one_hit.glsl`.
-        one_hits: Buffer<u32> = planned.zeroed(commands, "one hits")?,
-        part_totals: Buffer<u64> = planned.zeroed(commands, "part totals")?,
-        part_sums: Buffer<u64> = planned.zeroed(commands, "part sums")?,
-        anomalies: Buffer<u32> = planned.zeroed(commands, "anomalies")?,
-        /// What the latest whole block left of the last three.
-        of_blocks: CountsOfBlocks = CountsOfBlocks::made(planned)?,
+        film: FilmBuffers = FilmBuffers::made(planned, commands)?,
         nonfinite_values: Buffer<u32> = planned.zeroed(commands, "nonfinite values")?,
     }
 }
@@ -131,15 +114,6 @@ buffers! {
         /// Both as the latest whole block left them.
         tallies_of_blocks: [Buffer<Tally>; 2] = [planned.zeroed(commands, "global tallies of blocks")?, planned.zeroed(commands, "caustic tallies of blocks")?],
         totals_of_blocks: [Buffer<u32>; 2] = [planned.zeroed(commands, "global totals of blocks")?, planned.zeroed(commands, "caustic totals of blocks")?],
-    }
-}
-
-buffers! {
-    /// Counts as the latest whole block left them: a block that is cut short leaves nothing in the result.
-    pub struct CountsOfBlocks(planned: &Planned) {
-        one_hits: Buffer<u32> = planned.one("one hits of blocks")?,
-        part_totals: Buffer<u64> = planned.one("part totals of blocks")?,
-        anomalies: Buffer<u32> = planned.one("anomalies of blocks")?,
     }
 }
 
