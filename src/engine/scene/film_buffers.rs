@@ -11,7 +11,7 @@ use crate::engine::run::RunState;
 use crate::engine::run::watch::Later;
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands};
-use crate::plan::buffers::{ANOMALY_WORDS, PART_VALUES};
+use crate::plan::buffers::{ANOMALY_WORDS, Declared, PART_VALUES, scene};
 use crate::plan::differences::difference_count;
 use crate::plan::film::BiasPlan;
 use crate::plan::latest_blocks::kept_count;
@@ -19,37 +19,37 @@ use crate::plan::scene::ScenePlan;
 
 buffers! {
     /// Light of pixels, in fixed point.
-    pub struct BlockBuffers(planned: &Planned, commands: &mut Commands, names: [&str; 3]) {
-        under_way: Buffer<u64> = planned.zeroed(commands, names[0])?,
+    pub struct BlockBuffers(planned: &Planned, commands: &mut Commands, declared: [Declared<u64>; 3]) {
+        under_way: Buffer<u64> = planned.zeroed(commands, declared[0])?,
         /// Of all whole blocks, and the squares of these in two halves.
-        sums: Buffer<u64> = planned.zeroed(commands, names[1])?,
-        squares: Buffer<u64> = planned.zeroed(commands, names[2])?,
+        sums: Buffer<u64> = planned.zeroed(commands, declared[1])?,
+        squares: Buffer<u64> = planned.zeroed(commands, declared[2])?,
     }
 }
 
 buffers! {
     /// Counts as the latest whole block left them: a block that is cut short leaves nothing in the result.
     pub struct CountsOfBlocks(planned: &Planned) {
-        one_hits: Buffer<u32> = planned.one("one hits of blocks")?,
-        part_totals: Buffer<u64> = planned.one("part totals of blocks")?,
-        anomalies: Buffer<u32> = planned.one("anomalies of blocks")?,
+        one_hits: Buffer<u32> = planned.one(scene::ONE_HITS_OF_BLOCKS)?,
+        part_totals: Buffer<u64> = planned.one(scene::PART_TOTALS_OF_BLOCKS)?,
+        anomalies: Buffer<u32> = planned.one(scene::ANOMALIES_OF_BLOCKS)?,
     }
 }
 
 buffers! {
     pub struct FilmBuffers(planned: &Planned, commands: &mut Commands) {
-        all: BlockBuffers = BlockBuffers::made(planned, commands, ["block sums", "film sums", "film squares"])?,
+        all: BlockBuffers = BlockBuffers::made(planned, commands, [scene::BLOCK_SUMS, scene::FILM_SUMS, scene::FILM_SQUARES])?,
         /// Of light that surfaces scatter; of a picture.
-        surfaces: BlockBuffers = BlockBuffers::made(planned, commands, ["surface block sums", "surface sums", "surface squares"])?,
+        surfaces: BlockBuffers = BlockBuffers::made(planned, commands, [scene::SURFACE_BLOCK_SUMS, scene::SURFACE_SUMS, scene::SURFACE_SQUARES])?,
         /// What a smaller radius would change.
-        differences: Buffer<u64> = planned.zeroed(commands, "differences")?,
-        latest_blocks: Buffer<f32> = planned.zeroed(commands, "latest blocks")?,
+        differences: Buffer<u64> = planned.zeroed(commands, scene::DIFFERENCES)?,
+        latest_blocks: Buffer<f32> = planned.zeroed(commands, scene::LATEST_BLOCKS)?,
         /// What is known of pixels that some kind of light has not reached; see `glsl/world/scene/one_hit.glsl`.
-        one_hits: Buffer<u32> = planned.zeroed(commands, "one hits")?,
-        part_totals: Buffer<u64> = planned.zeroed(commands, "part totals")?,
-        part_sums: Buffer<u64> = planned.zeroed(commands, "part sums")?,
-        anomalies: Buffer<u32> = planned.zeroed(commands, "anomalies")?,
-        class_counts: Buffer<u32> = planned.zeroed(commands, "class counts")?,
+        one_hits: Buffer<u32> = planned.zeroed(commands, scene::ONE_HITS)?,
+        part_totals: Buffer<u64> = planned.zeroed(commands, scene::PART_TOTALS)?,
+        part_sums: Buffer<u64> = planned.zeroed(commands, scene::PART_SUMS)?,
+        anomalies: Buffer<u32> = planned.zeroed(commands, scene::ANOMALIES)?,
+        class_counts: Buffer<u32> = planned.zeroed(commands, scene::CLASS_COUNTS)?,
         of_blocks: CountsOfBlocks = CountsOfBlocks::made(planned)?,
     }
 }
