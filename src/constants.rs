@@ -28,7 +28,7 @@ constants! {
     /// Blocks of which some places are kept, and places that are.
     KEPT_BLOCKS = 256;
     KEPT_PLACES = 1024;
-    /// Sums of what a smaller radius changes (`engine::differences`): blocks whose numbers differ by a multiple of the first share a
+    /// Sums of what a smaller radius changes (`engine::error::differences`): blocks whose numbers differ by a multiple of the first share a
     /// row, and each row has so many sums a channel.
     DIFFERENCE_ROWS = 32;
     DIFFERENCE_SUMS = 4096;

@@ -1,5 +1,5 @@
 // How light would change if photons counted within a smaller radius, in the row of the block under way: a count sketch
-// (src/engine/differences.rs), in which each pixel goes to one sum of its channel, with a sign of its own.
+// (src/engine/error/differences.rs), in which each pixel goes to one sum of its channel, with a sign of its own.
 
 // Two words a sum, in two's complement; the row under way is the last one.
 layout(set = 1, binding = 20, scalar) buffer Differences { uint differences[]; };

@@ -1,5 +1,5 @@
 // Places of a film of which more is kept: what parts of light a block brings them, and what each of the latest blocks left. How far
-// the errors of places go together, and which part of light they sit in, follows from it (src/engine/degrees_of_freedom.rs). Twin of
+// the errors of places go together, and which part of light they sit in, follows from it (src/engine/error/degrees_of_freedom.rs). Twin of
 // src/plan/latest_blocks.rs.
 
 // One of so many places is kept.

@@ -11,7 +11,7 @@ use super::names::{self, ENDINGS, ERROR, GEOMETRY, IRRADIANCE, LIGHTMAP, LIGHTMA
 use super::original::{self, Extended};
 use super::pages::Pages;
 use super::{Layout, Map, MeshLightmap, Object};
-use crate::engine::error_bound::ErrorSource;
+use crate::engine::error::bound::ErrorSource;
 use crate::error::{Error, Result};
 use crate::output::colour;
 use crate::output::destination::{Folder, write_all};

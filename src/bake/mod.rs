@@ -73,7 +73,7 @@ pub use files::{IntoFile, Written, names, preview, write};
 pub use lighting::{estimates, usual_density, usual_exposure};
 pub use texels::{CoveredTexel, SurfacePoint};
 
-use crate::engine::error_bound::ErrorSource;
+use crate::engine::error::bound::ErrorSource;
 use crate::error::{Error, Result};
 use crate::scene::gltf::source::File;
 use crate::scene::light::{Light, LightKind};

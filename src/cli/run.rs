@@ -11,7 +11,7 @@ use super::progress::{ProgressArgs, ProgressReporter};
 use super::request::{BOX, RequestArgs};
 use super::values::parse_photon_name;
 use super::{End, say, say_beside};
-use crate::engine::error_bound::ErrorSource;
+use crate::engine::error::bound::ErrorSource;
 use crate::engine::replay::PhotonName;
 use crate::engine::room::film::estimate_walls;
 use crate::engine::room::{self, RunResult};

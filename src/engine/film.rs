@@ -1,7 +1,7 @@
 //! The core of all films: exact sums over blocks of rounds and of the squares of what each block left, whose spread tells the
 //! error. Sums are integers, so that it does not matter in which order photons, chunks, blocks or devices add to them.
 
-use super::degrees_of_freedom::{DegreesOfFreedom, concentration};
+use super::error::degrees_of_freedom::{DegreesOfFreedom, concentration};
 use crate::constants::KEPT_BLOCKS;
 use crate::plan::latest_blocks::{kept_count, kept_place};
 

@@ -4,7 +4,7 @@ use bytemuck::Pod;
 
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Gpu, Memory};
-use crate::plan::buffers::PlannedBuffer;
+use crate::plan::buffers::{Declared, PlannedBuffer};
 
 /// Structs of buffers, each field with its type and how it is made of the constructor's arguments.
 macro_rules! buffers {
@@ -17,7 +17,7 @@ macro_rules! buffers {
         }
 
         impl $name {
-            fn made($($argument: $given),*) -> Result<$name> {
+            pub(super) fn made($($argument: $given),*) -> Result<$name> {
                 Ok($name { $($field: $made),* })
             }
         }
@@ -33,56 +33,55 @@ pub struct Planned<'a> {
 }
 
 impl Planned<'_> {
-    fn listed<T>(&self, name: &str) -> impl Iterator<Item = &PlannedBuffer> {
-        self.buffers.iter().filter(move |planned| planned.name == name).inspect(|planned| {
-            assert_eq!(planned.element, std::any::type_name::<T>(), "elements of {}", planned.name);
-        })
+    fn listed<T>(&self, declared: Declared<T>) -> impl Iterator<Item = &PlannedBuffer> {
+        self.buffers.iter().filter(move |planned| planned.name == declared.name)
     }
 
-    /// All buffers of a name, in the plan's order.
-    pub fn all<T: Pod>(&self, name: &str) -> Result<Vec<Buffer<T>>> {
-        self.listed::<T>(name).map(|planned| self.gpu.buffer(name, planned.count, Memory::Device)).collect()
+    /// All that are listed, in the plan's order.
+    pub fn all<T: Pod>(&self, declared: Declared<T>) -> Result<Vec<Buffer<T>>> {
+        self.listed(declared).map(|planned| self.gpu.buffer(planned.name, planned.count, Memory::Device)).collect()
     }
 
-    /// The only one of a name.
-    pub fn one<T: Pod>(&self, name: &str) -> Result<Buffer<T>> {
-        let [buffer] = self.several(name)?;
+    /// The only one that is listed.
+    pub fn one<T: Pod>(&self, declared: Declared<T>) -> Result<Buffer<T>> {
+        let [buffer] = self.several(declared)?;
         Ok(buffer)
     }
 
-    pub fn several<T: Pod, const N: usize>(&self, name: &str) -> Result<[Buffer<T>; N]> {
-        let found = self.all(name)?;
+    pub fn several<T: Pod, const N: usize>(&self, declared: Declared<T>) -> Result<[Buffer<T>; N]> {
+        let found = self.all(declared)?;
         Ok(found
             .try_into()
-            .unwrap_or_else(|found: Vec<_>| panic!("the plan has {} buffers of the name {name} instead of {N}", found.len())))
+            .unwrap_or_else(|found: Vec<_>| panic!("the plan has {} buffers of the name {} instead of {N}", found.len(), declared.name)))
     }
 
     /// As many as the content has parts, each with its own, of which the plan keeps all or nothing.
-    pub fn filled_parts<T: Pod, const N: usize>(&self, commands: &mut Commands, name: &str, parts: [&[T]; N]) -> Result<[Buffer<T>; N]> {
-        let buffers = self.several(name)?;
-        for ((buffer, part), planned) in buffers.iter().zip(parts).zip(self.listed::<T>(name)) {
+    pub fn filled_parts<T: Pod, const N: usize>(
+        &self,
+        commands: &mut Commands,
+        declared: Declared<T>,
+        parts: [&[T]; N],
+    ) -> Result<[Buffer<T>; N]> {
+        let buffers = self.several(declared)?;
+        for ((buffer, part), planned) in buffers.iter().zip(parts).zip(self.listed(declared)) {
             if planned.count > 0 {
-                assert_eq!(part.len() as u64, buffer.count(), "elements of {name}");
+                assert_eq!(part.len() as u64, buffer.count(), "elements of {}", declared.name);
                 commands.upload(buffer, part)?;
             }
         }
         Ok(buffers)
     }
 
-    /// The only one of a name, set to zero.
-    pub fn zeroed<T: Pod>(&self, commands: &mut Commands, name: &str) -> Result<Buffer<T>> {
-        let buffer = self.one(name)?;
+    /// The only one that is listed, set to zero.
+    pub fn zeroed<T: Pod>(&self, commands: &mut Commands, declared: Declared<T>) -> Result<Buffer<T>> {
+        let buffer = self.one(declared)?;
         commands.clear(&buffer);
         Ok(buffer)
     }
 
-    /// The only one of a name with its content, of which the plan keeps all or nothing.
-    pub fn filled<T: Pod>(&self, commands: &mut Commands, name: &str, content: &[T]) -> Result<Buffer<T>> {
-        let buffer = self.one(name)?;
-        if self.listed::<T>(name).any(|planned| planned.count > 0) {
-            assert_eq!(content.len() as u64, buffer.count(), "elements of {name}");
-            commands.upload(&buffer, content)?;
-        }
+    /// The only one that is listed with its content, of which the plan keeps all or nothing.
+    pub fn filled<T: Pod>(&self, commands: &mut Commands, declared: Declared<T>, content: &[T]) -> Result<Buffer<T>> {
+        let [buffer] = self.filled_parts(commands, declared, [content])?;
         Ok(buffer)
     }
 }

@@ -1,7 +1,7 @@
 //! A recording of dispatches and copies: names every buffer, places barriers by what each kernel
 //! reads and writes, times every scope, and stays within the device's limits.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -10,6 +10,8 @@ use ash::vk;
 use bytemuck::Pod;
 
 use super::clock::{self, LEAST_WARM_UP};
+use super::descriptor_sets::DescriptorSets;
+use super::hazards::{Access, Hazards};
 use super::pace::Pace;
 use super::timestamps::{TimedScope, Timestamps};
 use super::{AnyBuffer, Buffer, Constants, Context, DeviceFacts, Gpu, Kernel, Memory, Work, call};
@@ -28,13 +30,6 @@ pub enum Extent<'a> {
     Indirect(&'a Buffer<DispatchArgs>),
 }
 
-/// What happened to buffers since the last barrier.
-#[derive(Default)]
-struct Hazards {
-    read: HashSet<vk::Buffer>,
-    written: HashSet<vk::Buffer>,
-}
-
 struct OpenScope {
     name: String,
     begin: u32,
@@ -49,9 +44,7 @@ pub struct Commands<'gpu> {
     pool: vk::CommandPool,
     command_buffer: vk::CommandBuffer,
     fence: vk::Fence,
-    descriptor_pools: Vec<vk::DescriptorPool>,
-    descriptor_pool_in_use: usize,
-    descriptor_sets: HashMap<(vk::DescriptorSetLayout, Vec<vk::Buffer>), vk::DescriptorSet>,
+    descriptor_sets: DescriptorSets,
     /// What stands in set 0, if that is a scene: it is bound once and stays for as long as kernels look at it.
     bound_scene: Option<vk::DescriptorSet>,
     timestamps: Timestamps,
@@ -93,10 +86,6 @@ impl Interrupt<'_> {
     }
 }
 
-/// Descriptor sets and storage buffers of one descriptor pool.
-const SETS_PER_POOL: u32 = 256;
-const BUFFERS_PER_POOL: u32 = 8 * SETS_PER_POOL;
-
 impl<'gpu> Commands<'gpu> {
     /// `started` is the zero of all times.
     pub fn new(gpu: &'gpu Gpu, constants: Constants, started: Instant) -> Result<Commands<'gpu>> {
@@ -120,9 +109,7 @@ impl<'gpu> Commands<'gpu> {
             pool,
             command_buffer,
             fence,
-            descriptor_pools: Vec::new(),
-            descriptor_pool_in_use: 0,
-            descriptor_sets: HashMap::new(),
+            descriptor_sets: DescriptorSets::new(gpu.context.clone()),
             bound_scene: None,
             timestamps,
             open_scopes: Vec::new(),
@@ -203,14 +190,14 @@ impl<'gpu> Commands<'gpu> {
         let buffers = kernel.buffers();
         let pipeline = self.gpu.pipeline(&module, &self.constants)?;
         let numbered = module.bindings.iter().map(|binding| binding.binding).zip(&buffers);
-        let own = self.descriptor_set(pipeline.set_layouts[1], numbered.collect())?;
+        let own = self.descriptor_sets.get(pipeline.set_layouts[1], numbered.collect())?;
         let scene = kernel.scene();
         let scene_set =
-            if scene.is_empty() { None } else { Some(self.descriptor_set(pipeline.set_layouts[0], (0..).zip(&scene).collect())?) };
+            if scene.is_empty() { None } else { Some(self.descriptor_sets.get(pipeline.set_layouts[0], (0..).zip(&scene).collect())?) };
         // A kernel without a scene has another layout of set 0, and so disturbs what is bound there.
         let sets: Vec<_> = scene_set.filter(|_| self.bound_scene != scene_set).into_iter().chain([own]).collect();
         self.bound_scene = scene_set;
-        let mut accesses: Vec<(&AnyBuffer, bool, bool)> =
+        let mut accesses: Vec<Access> =
             module.bindings.iter().zip(&buffers).map(|(binding, buffer)| (*buffer, binding.reads, binding.writes)).collect();
         accesses.extend(scene.iter().map(|buffer| (*buffer, true, false)));
         if let Extent::Indirect(args) = &extent {
@@ -417,15 +404,8 @@ impl<'gpu> Commands<'gpu> {
         self.submission_count += 1;
         self.collect_timings(submitted, wall)?;
 
-        // SAFETY: the submission has ended, so its descriptor sets are free.
-        unsafe {
-            for pool in &self.descriptor_pools {
-                call("vkResetDescriptorPool", || device.reset_descriptor_pool(*pool, vk::DescriptorPoolResetFlags::empty()))?;
-            }
-        }
-        self.descriptor_sets.clear();
+        self.descriptor_sets.clear()?;
         self.bound_scene = None;
-        self.descriptor_pool_in_use = 0;
         self.staging.clear();
         self.hazards = Hazards::default();
         self.work = 0;
@@ -498,73 +478,16 @@ impl<'gpu> Commands<'gpu> {
     pub fn submission_count(&self) -> u64 {
         self.submission_count
     }
-
-    fn descriptor_set(&mut self, layout: vk::DescriptorSetLayout, buffers: Vec<(u32, &&AnyBuffer)>) -> Result<vk::DescriptorSet> {
-        let key = (layout, buffers.iter().map(|(_, buffer)| buffer.raw()).collect());
-        if let Some(set) = self.descriptor_sets.get(&key) {
-            return Ok(*set);
-        }
-        let set = self.allocate_set(layout)?;
-        let infos: Vec<[vk::DescriptorBufferInfo; 1]> =
-            buffers.iter().map(|(_, buffer)| [vk::DescriptorBufferInfo::default().buffer(buffer.raw()).range(vk::WHOLE_SIZE)]).collect();
-        let writes: Vec<_> = buffers
-            .iter()
-            .zip(&infos)
-            .map(|((binding, _), info)| {
-                vk::WriteDescriptorSet::default()
-                    .dst_set(set)
-                    .dst_binding(*binding)
-                    .descriptor_type(vk::DescriptorType::STORAGE_BUFFER)
-                    .buffer_info(info)
-            })
-            .collect();
-        // SAFETY: the set was just allocated and is in no submission.
-        unsafe { self.context.device.update_descriptor_sets(&writes, &[]) };
-        self.descriptor_sets.insert(key, set);
-        Ok(set)
-    }
-
-    fn allocate_set(&mut self, layout: vk::DescriptorSetLayout) -> Result<vk::DescriptorSet> {
-        let device = &self.context.device;
-        let layouts = [layout];
-        loop {
-            if let Some(pool) = self.descriptor_pools.get(self.descriptor_pool_in_use) {
-                let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(*pool).set_layouts(&layouts);
-                // SAFETY: pool and layout are alive.
-                match unsafe { device.allocate_descriptor_sets(&info) } {
-                    Ok(sets) => return Ok(sets[0]),
-                    Err(vk::Result::ERROR_OUT_OF_POOL_MEMORY | vk::Result::ERROR_FRAGMENTED_POOL) => self.descriptor_pool_in_use += 1,
-                    Err(code) => return call("vkAllocateDescriptorSets", || Err(code)),
-                }
-                continue;
-            }
-            let sizes = [vk::DescriptorPoolSize::default().ty(vk::DescriptorType::STORAGE_BUFFER).descriptor_count(BUFFERS_PER_POOL)];
-            let info = vk::DescriptorPoolCreateInfo::default().max_sets(SETS_PER_POOL).pool_sizes(&sizes);
-            // SAFETY: `info` is complete; destroyed in Drop.
-            self.descriptor_pools.push(call("vkCreateDescriptorPool", || unsafe { device.create_descriptor_pool(&info, None) })?);
-        }
-    }
 }
 
-/// Barriers: one memory barrier before a command that reads what an earlier one wrote, or writes
-/// what an earlier one read or wrote.
+/// Barriers: one memory barrier before a command that conflicts with an earlier one.
 impl Commands<'_> {
-    /// Takes (buffer, reads, writes) of everything that the next command touches.
-    fn order(&mut self, accesses: &[(&AnyBuffer, bool, bool)]) {
-        let waits = |(buffer, _, writes): &(&AnyBuffer, bool, bool)| {
-            self.hazards.written.contains(&buffer.raw()) || (*writes && self.hazards.read.contains(&buffer.raw()))
-        };
-        if accesses.iter().any(waits) {
+    /// Waits, if it must, before a command that touches this.
+    fn order(&mut self, accesses: &[Access]) {
+        if self.hazards.conflict(accesses) {
             self.barrier();
         }
-        for (buffer, reads, writes) in accesses {
-            if *reads {
-                self.hazards.read.insert(buffer.raw());
-            }
-            if *writes {
-                self.hazards.written.insert(buffer.raw());
-            }
-        }
+        self.hazards.add(accesses);
     }
 
     fn barrier(&mut self) {
@@ -593,9 +516,6 @@ impl Drop for Commands<'_> {
         let device = &self.context.device;
         // SAFETY: every submission was waited for.
         unsafe {
-            for pool in &self.descriptor_pools {
-                device.destroy_descriptor_pool(*pool, None);
-            }
             device.destroy_fence(self.fence, None);
             device.destroy_command_pool(self.pool, None);
         }

@@ -5,7 +5,7 @@ use std::io::Cursor;
 use exr::prelude::*;
 
 use super::metadata::Metadata;
-use crate::engine::error_bound::ErrorSource;
+use crate::engine::error::bound::ErrorSource;
 use crate::scene::linear_picture::check_layers;
 
 /// Of a file that is read: as many as a picture may have.

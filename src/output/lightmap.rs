@@ -7,7 +7,7 @@ use super::colour::Format;
 use super::destination::{Destination, Folder};
 use super::exr_file::{channels, encode_errors};
 use super::image::Picture;
-use crate::engine::error_bound::ErrorSource;
+use crate::engine::error::bound::ErrorSource;
 use crate::engine::room::film::WallEstimate;
 use crate::scene::room::RoomScene;
 

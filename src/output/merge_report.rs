@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::report::{Errors, errors, ledger};
-use crate::engine::error_bound::FilmError;
+use crate::engine::error::bound::FilmError;
 use crate::engine::saved::SavedRun;
 use crate::engine::scene::SceneFilm;
 use crate::ledger::{Fates, Ledger};

@@ -9,7 +9,7 @@ use exr::meta::header::LayerAttributes;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use crate::engine::error_bound::{ErrorSource, FilmError};
+use crate::engine::error::bound::{ErrorSource, FilmError};
 use crate::gpu::DeviceFacts;
 use crate::plan::work_division::Division;
 use crate::settings::tile_samples::TileSamples;

@@ -7,11 +7,11 @@ use serde::Serialize;
 
 use crate::constants::MAX_BOUNCES;
 use crate::constants::PART_COUNT;
-use crate::engine::bias::{Bias, BiasFrom};
-use crate::engine::error_bound::{ErrorPlaces, ErrorSource, FilmError};
+use crate::engine::error::bias::{Bias, BiasFrom};
+use crate::engine::error::bound::{ErrorPlaces, ErrorSource, FilmError};
+use crate::engine::error::unknown::Unknown;
 use crate::engine::nonfinite_values::NonfiniteValues;
 use crate::engine::run::RunResult;
-use crate::engine::unknown::Unknown;
 use crate::engine::watch::End;
 use crate::gpu::DeviceFacts;
 use crate::ledger::{Ledger, Losses};
@@ -330,7 +330,7 @@ pub fn up_to(stop: &Stop, rounds: u32) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::degrees_of_freedom::DegreesOfFreedom;
+    use crate::engine::error::degrees_of_freedom::DegreesOfFreedom;
 
     #[test]
     fn a_report_says_that_the_tail_is_not_known() {

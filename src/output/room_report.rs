@@ -5,7 +5,7 @@ use std::fmt::Write;
 use serde::Serialize;
 
 use super::report::{Common, common, end_in_words, ending, ledger, losses};
-use crate::engine::error_bound::FilmError;
+use crate::engine::error::bound::FilmError;
 use crate::engine::room::RunResult;
 use crate::engine::room::film::{WallEstimate, irradiance_weights};
 use crate::gpu::DeviceFacts;

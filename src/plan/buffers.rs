@@ -1,5 +1,7 @@
 //! The buffers of a plan, each listed once: resources are made from this list, and what a run takes is said and checked by it.
 
+use std::marker::PhantomData;
+
 use bytemuck::Pod;
 use glam::{UVec2, Vec2, Vec4};
 
@@ -28,8 +30,6 @@ pub struct PlannedBuffer {
     pub name: &'static str,
     /// What it holds, and so what it is for.
     pub why: &'static str,
-    /// Rust's name of the type of its elements.
-    pub element: &'static str,
     pub element_bytes: u64,
     /// Elements; 0 where nobody reads any.
     pub count: u64,
@@ -42,8 +42,154 @@ impl PlannedBuffer {
     }
 }
 
-fn buffer<T: Pod>(name: &'static str, count: u64, why: &'static str) -> PlannedBuffer {
-    PlannedBuffer { name, why, element: std::any::type_name::<T>(), element_bytes: size_of::<T>() as u64, count }
+/// A buffer by its name and the type of its elements: declared once below, listed by a plan with its length, and made by the engine.
+#[derive(Debug)]
+pub struct Declared<T> {
+    pub name: &'static str,
+    element: PhantomData<T>,
+}
+
+impl<T> Clone for Declared<T> {
+    fn clone(&self) -> Declared<T> {
+        *self
+    }
+}
+
+impl<T> Copy for Declared<T> {}
+
+impl<T: Pod> Declared<T> {
+    fn listed(self, count: u64, why: &'static str) -> PlannedBuffer {
+        PlannedBuffer { name: self.name, why, element_bytes: size_of::<T>() as u64, count }
+    }
+}
+
+macro_rules! declare {
+    ($($declared:ident: $element:ty = $name:literal),* $(,)?) => {
+        $(pub const $declared: Declared<$element> = Declared { name: $name, element: PhantomData };)*
+    };
+}
+
+/// Buffers of the paper's box.
+pub mod room {
+    use super::*;
+
+    declare! {
+        ROOMS: Room = "rooms",
+        WALLS: Wall = "walls",
+        LIGHTS: DiscLight = "lights",
+        POINTS: Point = "points",
+        STREAM_SEEDS: UVec2 = "stream seeds",
+        EVEN_PATHS: StoredPath = "even paths",
+        ODD_PATHS: StoredPath = "odd paths",
+        PHOTONS: StoredPhoton = "photons",
+        ORIGINS: Origin = "origins",
+        COUNTERS: u32 = "counters",
+        DISPATCH_ARGS: DispatchArgs = "dispatch args",
+        TALLIES: Tally = "tallies",
+        TALLIES_OF_ROUNDS: Tally = "tallies of rounds",
+        FILM: u64 = "film",
+        SURVIVORS: u32 = "survivors",
+        WEIGHTS: f32 = "weights",
+        CELLS: u32 = "cells",
+        RANKS: u32 = "ranks",
+        SORTED_PHOTONS: StoredPhoton = "sorted photons",
+        LONGEST: u32 = "longest",
+        TREE_LIST: UVec2 = "tree list",
+        TREE_RANKS: u32 = "tree ranks",
+        TREE_COUNTS: u32 = "tree counts",
+        ITEM_ARGS: DispatchArgs = "item args",
+        RUN_ARGS: DispatchArgs = "run args",
+        SCAN_ARGS: DispatchArgs = "scan args",
+        WALL_BEGINS: u32 = "wall begins",
+        PLANES: f32 = "planes",
+        TREE_PHOTONS: StoredPhoton = "tree photons",
+        TREE_ORIGINS: Origin = "tree origins",
+        NEAREST_PHOTONS: UVec2 = "nearest photons",
+        SEARCHES: Search = "searches",
+        UNFINISHED: u32 = "unfinished",
+        FILM_TOTALS: u64 = "film totals",
+        LOW_SQUARES: u64 = "low squares",
+        HIGH_SQUARES: u64 = "high squares",
+        LATEST_BLOCKS: f32 = "latest blocks",
+        SUMS_OF_SURVIVORS: u32 = "sums of survivors",
+        SUMS_OF_CELLS: u32 = "sums of cells",
+        SUMS_OF_TREE_COUNTS: u32 = "sums of tree counts",
+    }
+}
+
+/// Buffers of a scene.
+pub mod scene {
+    use super::*;
+
+    declare! {
+        NODES: BvhNode = "nodes",
+        TRIANGLES: Triangle = "triangles",
+        NORMALS: TriangleNormals = "normals",
+        TEXTURE_COORDINATES: TriangleUvs = "texture coordinates",
+        VERTEX_COLOURS: TriangleColours = "vertex colours",
+        MATERIALS: SurfaceMaterial = "materials",
+        LAYERED_MATERIALS: LayeredMaterial = "layered materials",
+        LAYERS_OF_TRIANGLES: TriangleLayers = "layers of triangles",
+        TEXTURES: TextureInfo = "textures",
+        EMITTERS: Emitter = "emitters",
+        OPENINGS: CausticTarget = "openings",
+        CAUSTIC_TARGETS: CausticTarget = "caustic targets",
+        TEXELS: u32 = "texels",
+        PLANES: Vec4 = "planes",
+        ALBEDOS: Vec2 = "albedos",
+        LIGHT_NODES: LightNode = "light nodes",
+        LIGHT_REGIONS: LightRegion = "light regions",
+        LIGHT_SHARES: f32 = "light shares",
+        EXTRA_SAMPLES: u32 = "extra samples",
+        BLOCK_SUMS: u64 = "block sums",
+        FILM_SUMS: u64 = "film sums",
+        FILM_SQUARES: u64 = "film squares",
+        SURFACE_BLOCK_SUMS: u64 = "surface block sums",
+        SURFACE_SUMS: u64 = "surface sums",
+        SURFACE_SQUARES: u64 = "surface squares",
+        PART_TOTALS: u64 = "part totals",
+        PART_SUMS: u64 = "part sums",
+        LATEST_BLOCKS: f32 = "latest blocks",
+        ONE_HITS: u32 = "one hits",
+        ONE_HITS_OF_BLOCKS: u32 = "one hits of blocks",
+        PASS_SUMS: u64 = "pass sums",
+        VISIBLE_POINTS: VisiblePoint = "visible points",
+        MATT_LOBES: MattLobes = "matt lobes",
+        MATT_COVERS: MattCover = "matt covers",
+        ESTIMATES: u64 = "estimates",
+        NEAR_SUMS: u64 = "near sums",
+        DIFFERENCES: u64 = "differences",
+        RADIUS_CLASSES: u32 = "radius classes",
+        CLEARANCES: f32 = "clearances",
+        CLASS_COUNTS: u32 = "class counts",
+        DISC_CUTS: [u32; 4] = "disc cuts",
+        CAMERA_PATHS: CameraPath = "camera paths",
+        RECEIVERS: Receiver = "receivers",
+        EVEN_LIGHT_PATHS: LightPath = "even light paths",
+        ODD_LIGHT_PATHS: LightPath = "odd light paths",
+        MAP: MapPhoton = "map",
+        SORTED_MAP: MapPhoton = "sorted map",
+        COUNTERS: u32 = "counters",
+        DISPATCH_ARGS: DispatchArgs = "dispatch args",
+        CELLS: u32 = "cells",
+        RANKS: u32 = "ranks",
+        CROWDED_POINTS: u32 = "crowded points",
+        GLOBAL_TALLIES: Tally = "global tallies",
+        CAUSTIC_TALLIES: Tally = "caustic tallies",
+        GLOBAL_TOTALS: u32 = "global totals",
+        CAUSTIC_TOTALS: u32 = "caustic totals",
+        GLOBAL_TALLIES_OF_BLOCKS: Tally = "global tallies of blocks",
+        CAUSTIC_TALLIES_OF_BLOCKS: Tally = "caustic tallies of blocks",
+        GLOBAL_TOTALS_OF_BLOCKS: u32 = "global totals of blocks",
+        CAUSTIC_TOTALS_OF_BLOCKS: u32 = "caustic totals of blocks",
+        SURVIVORS: u32 = "survivors",
+        CAMERA_PATH_COUNTS: u32 = "camera path counts",
+        PART_TOTALS_OF_BLOCKS: u64 = "part totals of blocks",
+        ANOMALIES: u32 = "anomalies",
+        ANOMALIES_OF_BLOCKS: u32 = "anomalies of blocks",
+        SUMS_OF_CELLS: u32 = "sums of cells",
+        SUMS_OF_SURVIVORS: u32 = "sums of survivors",
+    }
 }
 
 pub fn bytes_of(buffers: &[PlannedBuffer]) -> u64 {
@@ -53,9 +199,11 @@ pub fn bytes_of(buffers: &[PlannedBuffer]) -> u64 {
 /// Words of a kind of nonfinite values: how many there were, and three for each of the first ones.
 pub const NONFINITE_KIND_WORDS: usize = 1 + 3 * MAX_NONFINITE_VALUES as usize;
 
+pub const NONFINITE_VALUES: Declared<u32> = Declared { name: "nonfinite values", element: PhantomData };
+
 fn nonfinite_values() -> PlannedBuffer {
     let kinds = NONFINITE_ESTIMATE as u64 + 1;
-    buffer::<u32>("nonfinite values", kinds * NONFINITE_KIND_WORDS as u64, "the nonfinite values that `paranoid` found")
+    NONFINITE_VALUES.listed(kinds * NONFINITE_KIND_WORDS as u64, "the nonfinite values that `paranoid` found")
 }
 
 /// Words that kernels count clamped values, lost camera paths, samples of surfaces and what these
@@ -73,8 +221,8 @@ pub fn block_sum_counts(items: u64, group_size: u32) -> Vec<u64> {
 }
 
 /// One buffer a level, from the finest.
-fn block_sums(name: &'static str, items: u64, group_size: u32) -> impl Iterator<Item = PlannedBuffer> {
-    block_sum_counts(items, group_size).into_iter().map(move |count| buffer::<u32>(name, count, "sums of blocks, for prefix sums"))
+fn block_sums(declared: Declared<u32>, items: u64, group_size: u32) -> impl Iterator<Item = PlannedBuffer> {
+    block_sum_counts(items, group_size).into_iter().map(move |count| declared.listed(count, "sums of blocks, for prefix sums"))
 }
 
 /// Work groups of the largest chunk's paths.
@@ -108,73 +256,73 @@ impl RoomPlan {
         let sums = points * u64::from(self.channel_count);
         let states = self.streams().first_state_count(self.path_capacity);
         let mut buffers = vec![
-            buffer::<Room>("rooms", 1, "the room's corners"),
-            buffer::<Wall>("walls", u64::from(FACE_COUNT), "the walls"),
-            buffer::<DiscLight>("lights", self.light_photons.len() as u64, "the lights"),
-            buffer::<Point>("points", points, "the texels of the walls"),
-            buffer::<UVec2>("stream seeds", states, "the first state of each photon's random numbers"),
-            buffer::<StoredPath>("even paths", paths, "paths that enter even bounces"),
-            buffer::<StoredPath>("odd paths", paths, "paths that enter odd bounces"),
-            buffer::<StoredPhoton>("photons", photons, "the photon map"),
-            buffer::<Origin>("origins", origins, "which photon each entry of the photon map is"),
-            buffer::<u32>("counters", self.counter_array_length(), "lengths of the photon map and of the lists of paths"),
-            buffer::<DispatchArgs>("dispatch args", 1, "the size of the next dispatch"),
-            buffer::<Tally>("tallies", bounces * u64::from(TALLY_COPIES), "fates of photons"),
-            buffer::<Tally>("tallies of rounds", bounces * u64::from(TALLY_COPIES), "fates as the latest whole round left them"),
-            buffer::<u64>("film", sums, "sums of the round under way"),
+            room::ROOMS.listed(1, "the room's corners"),
+            room::WALLS.listed(u64::from(FACE_COUNT), "the walls"),
+            room::LIGHTS.listed(self.light_photons.len() as u64, "the lights"),
+            room::POINTS.listed(points, "the texels of the walls"),
+            room::STREAM_SEEDS.listed(states, "the first state of each photon's random numbers"),
+            room::EVEN_PATHS.listed(paths, "paths that enter even bounces"),
+            room::ODD_PATHS.listed(paths, "paths that enter odd bounces"),
+            room::PHOTONS.listed(photons, "the photon map"),
+            room::ORIGINS.listed(origins, "which photon each entry of the photon map is"),
+            room::COUNTERS.listed(self.counter_array_length(), "lengths of the photon map and of the lists of paths"),
+            room::DISPATCH_ARGS.listed(1, "the size of the next dispatch"),
+            room::TALLIES.listed(bounces * u64::from(TALLY_COPIES), "fates of photons"),
+            room::TALLIES_OF_ROUNDS.listed(bounces * u64::from(TALLY_COPIES), "fates as the latest whole round left them"),
+            room::FILM.listed(sums, "sums of the round under way"),
             nonfinite_values(),
         ];
         if self.settings.builder == Builder::Scan {
             let sums = u64::from(group_count(self)) + 1;
             let weights = if self.settings.has_phong() { paths } else { 1 };
             buffers.extend([
-                buffer::<u32>("survivors", sums, "survivors of each work group"),
-                buffer::<f32>("weights", weights, "each path's weight at the eye"),
+                room::SURVIVORS.listed(sums, "survivors of each work group"),
+                room::WEIGHTS.listed(weights, "each path's weight at the eye"),
             ]);
-            buffers.extend(block_sums("sums of survivors", sums, group_size));
+            buffers.extend(block_sums(room::SUMS_OF_SURVIVORS, sums, group_size));
         }
         if self.gathers_by_grid() {
             let cells = u64::from(self.grid.cells()) + 1;
             buffers.extend([
-                buffer::<u32>("cells", cells, "the first photon of each cell"),
-                buffer::<u32>("ranks", photons, "each photon's place in its cell"),
-                buffer::<StoredPhoton>("sorted photons", photons, "the photon map by cells"),
-                buffer::<u32>("longest", 1, "candidates of the busiest point"),
+                room::CELLS.listed(cells, "the first photon of each cell"),
+                room::RANKS.listed(photons, "each photon's place in its cell"),
+                room::SORTED_PHOTONS.listed(photons, "the photon map by cells"),
+                room::LONGEST.listed(1, "candidates of the busiest point"),
             ]);
-            buffers.extend(block_sums("sums of cells", cells, group_size));
+            buffers.extend(block_sums(room::SUMS_OF_CELLS, cells, group_size));
         }
         if self.gathers_by_tree() {
             // A word a photon, up to whole runs of the radix sort.
             let counts = u64::from(self.photon_capacity.next_multiple_of(TREE_RUN));
-            buffers.extend([buffer::<UVec2>("tree list", photons, "photons in the order along an axis"); 3]);
+            buffers.extend([room::TREE_LIST.listed(photons, "photons in the order along an axis"); 3]);
             buffers.extend([
-                buffer::<u32>("tree ranks", photons, "each photon's place in that order"),
-                buffer::<u32>("tree counts", counts, "photons of each digit and run"),
-                buffer::<DispatchArgs>("item args", 1, "the size of a dispatch over photons"),
-                buffer::<DispatchArgs>("run args", 1, "the size of a dispatch over runs"),
-                buffer::<DispatchArgs>("scan args", 1, "the size of a dispatch of a prefix sum"),
-                buffer::<u32>("wall begins", u64::from(FACE_COUNT) + 1, "the first photon of each wall"),
-                buffer::<u32>("longest", 1, "photons of the fullest wall"),
-                buffer::<f32>("planes", photons / u64::from(TREE_LEAF) + 1, "planes that split the tree's nodes"),
-                buffer::<StoredPhoton>("tree photons", photons, "the photon map in the tree's order"),
-                buffer::<Origin>("tree origins", origins, "which photon each of them is"),
+                room::TREE_RANKS.listed(photons, "each photon's place in that order"),
+                room::TREE_COUNTS.listed(counts, "photons of each digit and run"),
+                room::ITEM_ARGS.listed(1, "the size of a dispatch over photons"),
+                room::RUN_ARGS.listed(1, "the size of a dispatch over runs"),
+                room::SCAN_ARGS.listed(1, "the size of a dispatch of a prefix sum"),
+                room::WALL_BEGINS.listed(u64::from(FACE_COUNT) + 1, "the first photon of each wall"),
+                room::LONGEST.listed(1, "photons of the fullest wall"),
+                room::PLANES.listed(photons / u64::from(TREE_LEAF) + 1, "planes that split the tree's nodes"),
+                room::TREE_PHOTONS.listed(photons, "the photon map in the tree's order"),
+                room::TREE_ORIGINS.listed(origins, "which photon each of them is"),
             ]);
-            buffers.extend(block_sums("sums of tree counts", counts, group_size));
+            buffers.extend(block_sums(room::SUMS_OF_TREE_COUNTS, counts, group_size));
             if let Some(nearest) = self.settings.nearest {
                 let at_once = searches_at_once(self, nearest);
                 buffers.extend([
-                    buffer::<UVec2>("nearest photons", at_once * u64::from(nearest), "the nearest photons of points"),
-                    buffer::<Search>("searches", at_once, "searches under way"),
-                    buffer::<u32>("unfinished", 1, "whether some search goes on"),
+                    room::NEAREST_PHOTONS.listed(at_once * u64::from(nearest), "the nearest photons of points"),
+                    room::SEARCHES.listed(at_once, "searches under way"),
+                    room::UNFINISHED.listed(1, "whether some search goes on"),
                 ]);
             }
         }
         if self.keeps_squares() {
             buffers.extend([
-                buffer::<u64>("film totals", sums, "sums of all rounds"),
-                buffer::<u64>("low squares", sums, "lower halves of their squares"),
-                buffer::<u64>("high squares", sums, "upper halves of their squares"),
-                buffer::<f32>("latest blocks", kept_values(self.points.len()) as u64, "some points of the latest rounds"),
+                room::FILM_TOTALS.listed(sums, "sums of all rounds"),
+                room::LOW_SQUARES.listed(sums, "lower halves of their squares"),
+                room::HIGH_SQUARES.listed(sums, "upper halves of their squares"),
+                room::LATEST_BLOCKS.listed(kept_values(self.points.len()) as u64, "some points of the latest rounds"),
             ]);
         }
         buffers
@@ -210,34 +358,39 @@ impl ScenePlan {
 
     /// The scene, written once.
     pub(super) fn scene_buffers(&self, geometry: &Geometry) -> Vec<PlannedBuffer> {
-        fn of<T: Pod>(name: &'static str, content: &[T], is_kept: bool, why: &'static str) -> PlannedBuffer {
-            buffer::<T>(name, if is_kept { content.len() as u64 } else { 0 }, why)
+        fn of<T: Pod>(declared: Declared<T>, content: &[T], is_kept: bool, why: &'static str) -> PlannedBuffer {
+            declared.listed(if is_kept { content.len() as u64 } else { 0 }, why)
         }
         let (textured, layered) = (self.keeps(Effect::Textures), self.keeps(Effect::Layers));
         let has_tangents = textured || self.keeps(Effect::Anisotropy);
         let has_texels = textured || (self.keeps(Effect::Environment) && geometry.has_sky_picture());
         let (nodes, regions, shares) = self.lights().map_or((0, 0, 0), |of| (of.nodes.len(), of.regions.len(), of.shares.len() + 1));
         vec![
-            of("nodes", &geometry.nodes, self.keeps(Effect::Bvh), "the triangles' hierarchy"),
-            of("triangles", &geometry.triangles, true, "triangles"),
-            buffer::<Vec4>("planes", geometry.planes.len() as u64 + 1, "the triangles' planes"),
-            of("normals", &geometry.normals, self.keeps(Effect::SmoothNormals), "the triangles' normals"),
-            of("texture coordinates", &geometry.uvs, textured, "the triangles' texture coordinates"),
-            of("vertex colours", &geometry.colours, self.keeps(Effect::VertexColours), "the triangles' vertex colours"),
-            of("materials", &geometry.materials, true, "materials"),
-            of("layered materials", &geometry.layered_materials, layered, "layers of materials"),
-            of("layers of triangles", &geometry.triangle_layers, layered && has_tangents, "texture coordinates and tangents of layers"),
-            buffer::<Vec2>("albedos", if layered { albedo::TABLE.len() as u64 } else { 0 }, "directional albedos"),
-            of("textures", &geometry.textures, has_texels, "sizes of textures"),
-            of("emitters", &geometry.emitters, true, "emitters"),
-            of("openings", &self.openings(), true, "openings that light comes in through"),
-            of("caustic targets", &self.targets, true, "spheres that photons are aimed at"),
-            buffer::<LightNode>("light nodes", nodes as u64, "the tree of lights"),
-            buffer::<LightRegion>("light regions", regions as u64, "regions in which lights are chosen alike"),
-            buffer::<f32>("light shares", shares as u64, "shares of lights in each region"),
+            of(scene::NODES, &geometry.nodes, self.keeps(Effect::Bvh), "the triangles' hierarchy"),
+            of(scene::TRIANGLES, &geometry.triangles, true, "triangles"),
+            scene::PLANES.listed(geometry.planes.len() as u64 + 1, "the triangles' planes"),
+            of(scene::NORMALS, &geometry.normals, self.keeps(Effect::SmoothNormals), "the triangles' normals"),
+            of(scene::TEXTURE_COORDINATES, &geometry.uvs, textured, "the triangles' texture coordinates"),
+            of(scene::VERTEX_COLOURS, &geometry.colours, self.keeps(Effect::VertexColours), "the triangles' vertex colours"),
+            of(scene::MATERIALS, &geometry.materials, true, "materials"),
+            of(scene::LAYERED_MATERIALS, &geometry.layered_materials, layered, "layers of materials"),
+            of(
+                scene::LAYERS_OF_TRIANGLES,
+                &geometry.triangle_layers,
+                layered && has_tangents,
+                "texture coordinates and tangents of layers",
+            ),
+            scene::ALBEDOS.listed(if layered { albedo::TABLE.len() as u64 } else { 0 }, "directional albedos"),
+            of(scene::TEXTURES, &geometry.textures, has_texels, "sizes of textures"),
+            of(scene::EMITTERS, &geometry.emitters, true, "emitters"),
+            of(scene::OPENINGS, &self.openings(), true, "openings that light comes in through"),
+            of(scene::CAUSTIC_TARGETS, &self.targets, true, "spheres that photons are aimed at"),
+            scene::LIGHT_NODES.listed(nodes as u64, "the tree of lights"),
+            scene::LIGHT_REGIONS.listed(regions as u64, "regions in which lights are chosen alike"),
+            scene::LIGHT_SHARES.listed(shares as u64, "shares of lights in each region"),
         ]
         .into_iter()
-        .chain(geometry.texel_parts().map(|part| of::<u32>("texels", part, has_texels, "textures")))
+        .chain(geometry.texel_parts().map(|part| of(scene::TEXELS, part, has_texels, "textures")))
         .collect()
     }
 
@@ -252,46 +405,39 @@ impl ScenePlan {
         let measures_bias = self.film.bias == BiasPlan::Blocks;
         let difference_words = (difference_count(pixels as usize) + row_length(pixels as usize)) as u64;
         let mut buffers = vec![
-            buffer::<u32>("extra samples", self.extra_samples.table.len() as u64, "samples of tiles that have more"),
-            buffer::<u64>("block sums", 3 * pixels, "sums of the block under way"),
-            buffer::<u64>("film sums", 3 * pixels, "sums of all blocks"),
-            buffer::<u64>("film squares", 6 * pixels, "sums of their squares"),
-            buffer::<u64>("surface block sums", 3 * seen, "the same of light that surfaces scatter"),
-            buffer::<u64>("surface sums", 3 * seen, "sums of all blocks of it"),
-            buffer::<u64>("surface squares", 6 * seen, "sums of their squares"),
-            buffer::<u64>(
-                "part totals",
-                self.part_totals(),
-                "light of each part of a path: in all, in some pixels, and where asked in each",
-            ),
-            buffer::<u64>("part sums", self.part_sums(), "sums of all blocks of parts of each pixel's light"),
-            buffer::<f32>("latest blocks", PART_VALUES * kept_values(pixels as usize) as u64, "some pixels of the latest blocks"),
-            buffer::<u32>("one hits", u64::from(HIT_KINDS) * pixels, "what one hit would add where none has"),
-            buffer::<u32>("one hits of blocks", u64::from(HIT_KINDS) * pixels, "the same as the latest whole block left it"),
-            buffer::<u64>(
-                "pass sums",
-                3 * (if self.film.sees_light { 2 } else { 1 }) * u64::from(self.paths()),
-                "samples of pixels in a round",
-            ),
-            buffer::<VisiblePoint>("visible points", points, "where photons are looked up"),
-            buffer::<MattLobes>("matt lobes", if self.keeps(Effect::Layers) { points } else { 0 }, "how layered points weigh light"),
-            buffer::<MattCover>("matt covers", if self.has_covers() { points } else { 0 }, "coats, sheen and films of visible points"),
-            buffer::<u64>("estimates", 3 * points * u64::from(self.arrival_sets), "what photons add there"),
-            buffer::<u64>("near sums", self.near_sums(), "the same within a smaller radius"),
-            buffer::<u64>("differences", if measures_bias { difference_words } else { 0 }, "sums that tell the bias"),
+            scene::EXTRA_SAMPLES.listed(self.extra_samples.table.len() as u64, "samples of tiles that have more"),
+            scene::BLOCK_SUMS.listed(3 * pixels, "sums of the block under way"),
+            scene::FILM_SUMS.listed(3 * pixels, "sums of all blocks"),
+            scene::FILM_SQUARES.listed(6 * pixels, "sums of their squares"),
+            scene::SURFACE_BLOCK_SUMS.listed(3 * seen, "the same of light that surfaces scatter"),
+            scene::SURFACE_SUMS.listed(3 * seen, "sums of all blocks of it"),
+            scene::SURFACE_SQUARES.listed(6 * seen, "sums of their squares"),
+            scene::PART_TOTALS.listed(self.part_totals(), "light of each part of a path: in all, in some pixels, and where asked in each"),
+            scene::PART_SUMS.listed(self.part_sums(), "sums of all blocks of parts of each pixel's light"),
+            scene::LATEST_BLOCKS.listed(PART_VALUES * kept_values(pixels as usize) as u64, "some pixels of the latest blocks"),
+            scene::ONE_HITS.listed(u64::from(HIT_KINDS) * pixels, "what one hit would add where none has"),
+            scene::ONE_HITS_OF_BLOCKS.listed(u64::from(HIT_KINDS) * pixels, "the same as the latest whole block left it"),
+            scene::PASS_SUMS
+                .listed(3 * (if self.film.sees_light { 2 } else { 1 }) * u64::from(self.paths()), "samples of pixels in a round"),
+            scene::VISIBLE_POINTS.listed(points, "where photons are looked up"),
+            scene::MATT_LOBES.listed(if self.keeps(Effect::Layers) { points } else { 0 }, "how layered points weigh light"),
+            scene::MATT_COVERS.listed(if self.has_covers() { points } else { 0 }, "coats, sheen and films of visible points"),
+            scene::ESTIMATES.listed(3 * points * u64::from(self.arrival_sets), "what photons add there"),
+            scene::NEAR_SUMS.listed(self.near_sums(), "the same within a smaller radius"),
+            scene::DIFFERENCES.listed(if measures_bias { difference_words } else { 0 }, "sums that tell the bias"),
         ];
         let classed = if self.has_classes() { points } else { 0 };
         buffers.extend([
-            buffer::<u32>("radius classes", classed, "which radius each visible point has"),
-            buffer::<f32>("clearances", classed, "how far it is from there to the next wall or edge"),
-            buffer::<u32>("class counts", 2 * u64::from(RADIUS_CLASSES), "visible points of each class"),
+            scene::RADIUS_CLASSES.listed(classed, "which radius each visible point has"),
+            scene::CLEARANCES.listed(classed, "how far it is from there to the next wall or edge"),
+            scene::CLASS_COUNTS.listed(2 * u64::from(RADIUS_CLASSES), "visible points of each class"),
         ]);
         let cuts = if self.cuts_discs() { points * self.maps().count() as u64 } else { 0 };
-        buffers.push(buffer::<[u32; 4]>("disc cuts", cuts, "where walls end what a visible point looks through"));
-        let camera_paths = buffer::<CameraPath>("camera paths", self.camera_path_capacity(), "paths that one dispatch leaves");
+        buffers.push(scene::DISC_CUTS.listed(cuts, "where walls end what a visible point looks through"));
+        let camera_paths = scene::CAMERA_PATHS.listed(self.camera_path_capacity(), "paths that one dispatch leaves");
         buffers.extend([camera_paths; 2]);
         if let Sensor::Receivers { count } = self.sensor {
-            buffers.push(buffer::<Receiver>("receivers", u64::from(count), "points that are asked about"));
+            buffers.push(scene::RECEIVERS.listed(u64::from(count), "points that are asked about"));
         }
         buffers
     }
@@ -307,29 +453,29 @@ impl ScenePlan {
         let tallies = u64::from(self.tally_rows() * TALLY_COPIES);
         let totals = u64::from(TOTAL_WORDS * TALLY_COPIES);
         let mut buffers = vec![
-            buffer::<LightPath>("even light paths", paths, "paths that enter even bounces"),
-            buffer::<LightPath>("odd light paths", paths, "paths that enter odd bounces"),
-            buffer::<MapPhoton>("map", capacity, "the photon map"),
-            buffer::<MapPhoton>("sorted map", capacity, "the photon map by buckets"),
-            buffer::<u32>("counters", counters, "lengths of the photon map and of the lists of paths"),
-            buffer::<DispatchArgs>("dispatch args", 1, "the size of the next dispatch"),
-            buffer::<u32>("cells", buckets + 1, "the first photon of each bucket"),
-            buffer::<u32>("ranks", capacity, "each photon's place in its bucket"),
-            buffer::<u32>("crowded points", 2 + 2 * u64::from(self.points_at_once()), "points with many candidates"),
-            buffer::<Tally>("global tallies", tallies, "fates of the global map's photons"),
-            buffer::<Tally>("caustic tallies", tallies, "fates of the caustic map's photons"),
-            buffer::<u32>("global totals", totals, "what limits cost the global map"),
-            buffer::<u32>("caustic totals", totals, "what limits cost the caustic map"),
-            buffer::<Tally>("global tallies of blocks", tallies, "fates as the latest whole block left them"),
-            buffer::<Tally>("caustic tallies of blocks", tallies, "fates as the latest whole block left them"),
-            buffer::<u32>("global totals of blocks", totals, "what limits cost as the latest whole block left it"),
-            buffer::<u32>("caustic totals of blocks", totals, "what limits cost as the latest whole block left it"),
+            scene::EVEN_LIGHT_PATHS.listed(paths, "paths that enter even bounces"),
+            scene::ODD_LIGHT_PATHS.listed(paths, "paths that enter odd bounces"),
+            scene::MAP.listed(capacity, "the photon map"),
+            scene::SORTED_MAP.listed(capacity, "the photon map by buckets"),
+            scene::COUNTERS.listed(counters, "lengths of the photon map and of the lists of paths"),
+            scene::DISPATCH_ARGS.listed(1, "the size of the next dispatch"),
+            scene::CELLS.listed(buckets + 1, "the first photon of each bucket"),
+            scene::RANKS.listed(capacity, "each photon's place in its bucket"),
+            scene::CROWDED_POINTS.listed(2 + 2 * u64::from(self.points_at_once()), "points with many candidates"),
+            scene::GLOBAL_TALLIES.listed(tallies, "fates of the global map's photons"),
+            scene::CAUSTIC_TALLIES.listed(tallies, "fates of the caustic map's photons"),
+            scene::GLOBAL_TOTALS.listed(totals, "what limits cost the global map"),
+            scene::CAUSTIC_TOTALS.listed(totals, "what limits cost the caustic map"),
+            scene::GLOBAL_TALLIES_OF_BLOCKS.listed(tallies, "fates as the latest whole block left them"),
+            scene::CAUSTIC_TALLIES_OF_BLOCKS.listed(tallies, "fates as the latest whole block left them"),
+            scene::GLOBAL_TOTALS_OF_BLOCKS.listed(totals, "what limits cost as the latest whole block left it"),
+            scene::CAUSTIC_TOTALS_OF_BLOCKS.listed(totals, "what limits cost as the latest whole block left it"),
         ];
-        buffers.extend(block_sums("sums of cells", buckets + 1, self.settings.group_size));
+        buffers.extend(block_sums(scene::SUMS_OF_CELLS, buckets + 1, self.settings.group_size));
         if self.builder() == Builder::Scan {
             let survivors = u64::from(survivor_count(self, most(|map| map.chunk_photons) as u32));
-            buffers.push(buffer::<u32>("survivors", survivors, "survivors and stored photons of each work group"));
-            buffers.extend(block_sums("sums of survivors", survivors, self.settings.group_size));
+            buffers.push(scene::SURVIVORS.listed(survivors, "survivors and stored photons of each work group"));
+            buffers.extend(block_sums(scene::SUMS_OF_SURVIVORS, survivors, self.settings.group_size));
         }
         buffers
     }
@@ -337,17 +483,17 @@ impl ScenePlan {
     /// What kernels count, whatever the sizes.
     fn count_buffers(&self) -> Vec<PlannedBuffer> {
         vec![
-            buffer::<u32>("camera path counts", 1, "how many camera paths a dispatch leaves"),
-            buffer::<u64>("part totals of blocks", u64::from(PART_COUNT), "the same as the latest whole block left it"),
-            buffer::<u32>("anomalies", ANOMALY_WORDS as u64, "clamped values, lost camera paths, and what these cost"),
-            buffer::<u32>("anomalies of blocks", ANOMALY_WORDS as u64, "the same as the latest whole block left them"),
+            scene::CAMERA_PATH_COUNTS.listed(1, "how many camera paths a dispatch leaves"),
+            scene::PART_TOTALS_OF_BLOCKS.listed(u64::from(PART_COUNT), "the same as the latest whole block left it"),
+            scene::ANOMALIES.listed(ANOMALY_WORDS as u64, "clamped values, lost camera paths, and what these cost"),
+            scene::ANOMALIES_OF_BLOCKS.listed(ANOMALY_WORDS as u64, "the same as the latest whole block left them"),
             nonfinite_values(),
         ]
     }
 
     /// Bytes of all buffers of a run that asks `phases` sets of receivers in turn; of a picture there are none.
     pub fn bytes_of(&self, phases: usize) -> u64 {
-        let receivers = self.sensor_buffers().into_iter().find(|buffer| buffer.name == "receivers");
+        let receivers = self.sensor_buffers().into_iter().find(|buffer| buffer.name == scene::RECEIVERS.name);
         self.bytes + (phases as u64).saturating_sub(1) * receivers.map_or(0, |receivers| receivers.bytes())
     }
 }

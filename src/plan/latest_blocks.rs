@@ -1,5 +1,5 @@
 //! What is kept of the latest blocks of a film, from which follows how far errors of its places go together
-//! ([`crate::engine::degrees_of_freedom`]): some places, evenly spread. Twin of `glsl/film/latest_blocks.glsl`.
+//! ([`crate::engine::error::degrees_of_freedom`]): some places, evenly spread. Twin of `glsl/film/latest_blocks.glsl`.
 
 use crate::constants::{KEPT_BLOCKS, KEPT_PLACES};
 use crate::rng::mix32;

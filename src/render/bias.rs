@@ -2,8 +2,8 @@
 
 use super::events::{Event, Observer};
 use super::values::Percent;
-use crate::engine::bias::Bias;
-use crate::engine::bias_batches::BATCHES;
+use crate::engine::error::bias::Bias;
+use crate::engine::error::bias_batches::BATCHES;
 use crate::error::{Error, Result};
 use crate::settings::stop::Stop;
 use crate::text::counted;

@@ -11,7 +11,7 @@ use super::request::RenderRequest;
 use super::scene::PreparedScene;
 use crate::bake::pages::{Atlas, Pages};
 use crate::bake::{self, IntoFile, Layout, Map, Written};
-use crate::engine::error_bound::ErrorSource;
+use crate::engine::error::bound::ErrorSource;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::output::destination::{Destination, Folder, check_distinct};

@@ -10,7 +10,7 @@ use super::image::{command_line, kept, name_in_text};
 use super::request::RenderRequest;
 use super::values::{Shininess, Threads, Variant, Watts};
 use crate::engine::choose_builder::{Choice, choose_builder};
-use crate::engine::error_bound::FilmError;
+use crate::engine::error::bound::FilmError;
 use crate::engine::identity::settings_with_effect;
 use crate::engine::retry::{run_on, until_done};
 use crate::engine::room::film::{RoomFilm, estimate_walls};

@@ -5,8 +5,8 @@ use std::sync::atomic::AtomicBool;
 
 use crate::common::lit::Viewed;
 use crate::common::prelude::*;
-use photonmill::engine::bias::{Bias, BiasFrom};
-use photonmill::engine::bias_batches::{self, Batches};
+use photonmill::engine::error::bias::{Bias, BiasFrom};
+use photonmill::engine::error::bias_batches::{self, Batches};
 use photonmill::engine::room;
 use photonmill::engine::room::film::estimate_walls;
 use photonmill::engine::scene;

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use crate::common::lit::Viewed;
 use crate::common::prelude::*;
-use photonmill::engine::error_bound::error_bound;
+use photonmill::engine::error::bound::error_bound;
 use photonmill::engine::room::film::{estimate_walls, irradiance_weights};
 use photonmill::engine::room::{self, RunResult};
 use photonmill::engine::scene::{self, SceneFilm, pilot};

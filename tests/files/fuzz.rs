@@ -12,7 +12,7 @@ use std::time::Duration;
 use glam::{DVec4, Vec3};
 use image::{ImageFormat, RgbImage};
 use photonmill::engine::Control;
-use photonmill::engine::differences::Differences;
+use photonmill::engine::error::differences::Differences;
 use photonmill::engine::film::{BlockSums, LatestBlocks};
 use photonmill::engine::room;
 use photonmill::engine::saved::{SavedFilm, SavedRun};

@@ -13,26 +13,27 @@ const LINE: &[&[&str]] = &[
     &["cpu", "gpu", "oidn"],
     &[
         "engine",
-        "engine::bias",
-        "engine::blocks",
-        "engine::identity",
-        "engine::measure_of_error",
-        "engine::degrees_of_freedom",
+        "engine::error",
+        "engine::error::bias",
+        "engine::error::degrees_of_freedom",
+        "engine::error::measure",
+        "engine::error::unknown",
+        "engine::nonfinite_values",
         "engine::planned",
         "engine::prefix_sum",
+        "engine::run::blocks",
+        "engine::run::identity",
         "engine::tallies",
         "engine::totals",
-        "engine::unknown",
-        "engine::nonfinite_values",
     ],
-    &["engine::film", "engine::error_bound", "engine::differences"],
+    &["engine::film", "engine::error::bound", "engine::error::differences"],
     &["engine::room::film", "engine::scene::film"],
-    &["engine::saved"],
-    &["engine::watch", "engine::replay"],
-    &["engine::bias_batches"],
+    &["engine::run::saved"],
+    &["engine::run::watch", "engine::replay"],
+    &["engine::error::bias_batches"],
     &["engine::run"],
-    &["engine::several_devices"],
-    &["engine::retry"],
+    &["engine::run::several_devices"],
+    &["engine::run::retry"],
     &["engine::room", "engine::scene"],
     &["engine::choose_builder"],
     &["output"],
@@ -351,7 +352,7 @@ fn the_check_complains_about_arrows_to_the_right() {
     assert!(complains("engine::room::trace", "use crate::{\n    error::Result,\n    output,\n};"));
     assert!(complains("engine::room", "use super::scene::View;"));
     assert!(complains("engine::scene::film", "use super::super::room::film::RoomFilm;"));
-    assert!(complains("engine::watch", "use super::choose_builder::Choice;"));
+    assert!(complains("engine::run::watch", "use crate::engine::choose_builder::Choice;"));
     assert!(complains("engine::run", "use super::room::trace::chunk;"));
 
     assert!(!complains("engine::room::trace", "use crate::{error::{Error, Result}, engine::tallies, plan::{self, RoomPlan}};"));

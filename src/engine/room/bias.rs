@@ -3,8 +3,8 @@
 use crate::settings::stop::Stop;
 use std::sync::atomic::AtomicBool;
 
-use crate::engine::bias::Bias;
-use crate::engine::bias_batches::Batches;
+use crate::engine::error::bias::Bias;
+use crate::engine::error::bias_batches::Batches;
 use crate::engine::room::film::estimate_walls;
 use crate::error::Result;
 use crate::gpu::Gpu;

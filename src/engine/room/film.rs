@@ -4,10 +4,10 @@
 use std::f64::consts::PI;
 use std::ops::{Deref, DerefMut};
 
-use crate::engine::error_bound::FilmError;
+use crate::engine::error::bound::FilmError;
+use crate::engine::error::measure::ErrorMeasure;
+use crate::engine::error::unknown::{Unknown, most_hits};
 use crate::engine::film::{BlockSums, KeptBlock, LatestBlocks, TooLarge, kept_value};
-use crate::engine::measure_of_error::ErrorMeasure;
-use crate::engine::unknown::{Unknown, most_hits};
 use crate::plan::RoomPlan;
 use crate::plan::latest_blocks::{kept_count, kept_place};
 use crate::scene::room::RoomScene;

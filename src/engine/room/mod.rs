@@ -20,12 +20,12 @@ pub use on_gpu::{constants, on_gpu};
 pub use replay::{photons_on_cpu, photons_on_gpu, replay};
 
 use crate::engine::Control;
-use crate::engine::error_bound::FilmError;
-use crate::engine::identity::{Hash, Identity};
+use crate::engine::error::bound::FilmError;
 use crate::engine::room::film::{RoomFilm, irradiance_weights};
+use crate::engine::run::identity::{Hash, Identity};
+use crate::engine::run::saved::SavedFilm;
+use crate::engine::run::watch::Keep;
 use crate::engine::run::{self, Task};
-use crate::engine::saved::SavedFilm;
-use crate::engine::watch::Keep;
 use crate::error::{Result, require};
 use crate::gpu::{DeviceFacts, Gpu};
 use crate::ledger::{Fates, Losses};

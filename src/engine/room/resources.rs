@@ -8,6 +8,7 @@ use crate::gpu::{Buffer, Commands, Gpu, kernels};
 use crate::path::StoredPath;
 use crate::photon::{Origin, StoredPhoton};
 use crate::plan::RoomPlan;
+use crate::plan::buffers::{NONFINITE_VALUES, room};
 use crate::records::{DispatchArgs, Search, Tally};
 use crate::scene::room::RoomScene;
 use crate::settings::Builder;
@@ -16,38 +17,38 @@ buffers! {
     pub struct RoomResources(planned: &Planned, commands: &mut Commands, scene: &RoomScene, plan: &RoomPlan) {
         /// Written once.
         room: kernels::Room = kernels::Room {
-            rooms: planned.filled(commands, "rooms", &[scene.room_record()])?,
-            walls: planned.filled(commands, "walls", &scene.wall_records())?,
-            lights: planned.filled(commands, "lights", &scene.light_records(&plan.relative_flux))?,
-            points: planned.filled(commands, "points", &plan.points)?,
+            rooms: planned.filled(commands, room::ROOMS, &[scene.room_record()])?,
+            walls: planned.filled(commands, room::WALLS, &scene.wall_records())?,
+            lights: planned.filled(commands, room::LIGHTS, &scene.light_records(&plan.relative_flux))?,
+            points: planned.filled(commands, room::POINTS, &plan.points)?,
         },
         stream_seeds: Buffer<UVec2> =
-            planned.filled(commands, "stream seeds", &plan.streams().first_states(plan.path_capacity))?,
+            planned.filled(commands, room::STREAM_SEEDS, &plan.streams().first_states(plan.path_capacity))?,
         // Photons of the chunk under way.
         /// Paths entering even bounces and odd bounces; one element, for a replay, where no bounce hands paths to the next.
-        paths: [Buffer<StoredPath>; 2] = [planned.one("even paths")?, planned.one("odd paths")?],
-        photons: Buffer<StoredPhoton> = planned.one("photons")?,
+        paths: [Buffer<StoredPath>; 2] = [planned.one(room::EVEN_PATHS)?, planned.one(room::ODD_PATHS)?],
+        photons: Buffer<StoredPhoton> = planned.one(room::PHOTONS)?,
         /// Which photon each entry of the photon map is; one empty element where nobody asks.
-        origins: Buffer<Origin> = planned.one("origins")?,
+        origins: Buffer<Origin> = planned.one(room::ORIGINS)?,
         /// Length of the photon map, the paths entering each bounce, and the counters that are taken in turn.
-        counters: Buffer<u32> = planned.one("counters")?,
-        dispatch_args: Buffer<DispatchArgs> = planned.one("dispatch args")?,
+        counters: Buffer<u32> = planned.one(room::COUNTERS)?,
+        dispatch_args: Buffer<DispatchArgs> = planned.one(room::DISPATCH_ARGS)?,
         /// What keeps photons in order; `None` where they come as they do.
         order: Option<OrderBuffers> =
             (plan.settings.builder == Builder::Scan).then(|| OrderBuffers::made(planned)).transpose()?,
         /// Ledger of the submission under way; see `tallies`.
-        tallies: Buffer<Tally> = planned.zeroed(commands, "tallies")?,
+        tallies: Buffer<Tally> = planned.zeroed(commands, room::TALLIES)?,
         /// The same as the latest whole round left it.
-        tallies_of_rounds: Buffer<Tally> = planned.zeroed(commands, "tallies of rounds")?,
+        tallies_of_rounds: Buffer<Tally> = planned.zeroed(commands, room::TALLIES_OF_ROUNDS)?,
         /// The grid; `None` where the gather has another index or none.
         index: Option<IndexBuffers> = plan.gathers_by_grid().then(|| IndexBuffers::made(planned)).transpose()?,
         /// The kd-tree; `None` where the gather has another index or none.
         tree: Option<TreeBuffers> = plan.gathers_by_tree().then(|| TreeBuffers::made(planned, plan)).transpose()?,
         /// What the round under way has left so far; of a single round, the result.
-        film: Buffer<u64> = planned.zeroed(commands, "film")?,
+        film: Buffer<u64> = planned.zeroed(commands, room::FILM)?,
         /// What all rounds left; `None` of a single one.
         rounds: Option<RoundBuffers> = plan.keeps_squares().then(|| RoundBuffers::made(planned, commands)).transpose()?,
-        nonfinite_values: Buffer<u32> = planned.zeroed(commands, "nonfinite values")?,
+        nonfinite_values: Buffer<u32> = planned.zeroed(commands, NONFINITE_VALUES)?,
     }
 }
 
@@ -62,35 +63,35 @@ buffers! {
     /// Survivors of a bounce, for prefix sums over them.
     pub struct OrderBuffers(planned: &Planned) {
         /// Survivors in each work group of paths, then their prefix sums, and the sum of all behind them.
-        survivors: Buffer<u32> = planned.one("survivors")?,
-        block_sums: Vec<Buffer<u32>> = planned.all("sums of survivors")?,
+        survivors: Buffer<u32> = planned.one(room::SURVIVORS)?,
+        block_sums: Vec<Buffer<u32>> = planned.all(room::SUMS_OF_SURVIVORS)?,
         /// Weight at the eye of each path's photon; one element where all weigh 1.
-        weights: Buffer<f32> = planned.one("weights")?,
+        weights: Buffer<f32> = planned.one(room::WEIGHTS)?,
     }
 }
 
 buffers! {
     /// The rounds that have ended, sum by sum of the film.
     pub struct RoundBuffers(planned: &Planned, commands: &mut Commands) {
-        totals: Buffer<u64> = planned.zeroed(commands, "film totals")?,
+        totals: Buffer<u64> = planned.zeroed(commands, room::FILM_TOTALS)?,
         /// Lower and upper 64 bits of the sums of squares.
-        low_squares: Buffer<u64> = planned.zeroed(commands, "low squares")?,
-        high_squares: Buffer<u64> = planned.zeroed(commands, "high squares")?,
-        latest_blocks: Buffer<f32> = planned.zeroed(commands, "latest blocks")?,
+        low_squares: Buffer<u64> = planned.zeroed(commands, room::LOW_SQUARES)?,
+        high_squares: Buffer<u64> = planned.zeroed(commands, room::HIGH_SQUARES)?,
+        latest_blocks: Buffer<f32> = planned.zeroed(commands, room::LATEST_BLOCKS)?,
     }
 }
 
 buffers! {
     pub struct IndexBuffers(planned: &Planned) {
         /// Photons in each cell; after their prefix sums the first photon of each, and behind the last the number of all.
-        cells: Buffer<u32> = planned.one("cells")?,
+        cells: Buffer<u32> = planned.one(room::CELLS)?,
         /// Place of each entry of the photon map among those of its cell.
-        ranks: Buffer<u32> = planned.one("ranks")?,
+        ranks: Buffer<u32> = planned.one(room::RANKS)?,
         /// Sums of blocks of cells, sums of blocks of those, ... down to one.
-        block_sums: Vec<Buffer<u32>> = planned.all("sums of cells")?,
-        sorted_photons: Buffer<StoredPhoton> = planned.one("sorted photons")?,
+        block_sums: Vec<Buffer<u32>> = planned.all(room::SUMS_OF_CELLS)?,
+        sorted_photons: Buffer<StoredPhoton> = planned.one(room::SORTED_PHOTONS)?,
         /// Candidates of the busiest point.
-        longest: Buffer<u32> = planned.one("longest")?,
+        longest: Buffer<u32> = planned.one(room::LONGEST)?,
     }
 }
 
@@ -99,24 +100,24 @@ buffers! {
     pub struct TreeBuffers(planned: &Planned, plan: &RoomPlan) {
         /// (order key, entry of the photon map) in the order along the walls' first axis and along their second, and one
         /// to write into, in changing roles.
-        lists: [Buffer<UVec2>; 3] = planned.several("tree list")?,
+        lists: [Buffer<UVec2>; 3] = planned.several(room::TREE_LIST)?,
         /// Place of each photon in the order along the axis that nodes are split along.
-        ranks: Buffer<u32> = planned.one("tree ranks")?,
+        ranks: Buffer<u32> = planned.one(room::TREE_RANKS)?,
         /// Photons of each digit and run, or that go to the left; then their prefix sums.
-        counts: Buffer<u32> = planned.one("tree counts")?,
-        block_sums: Vec<Buffer<u32>> = planned.all("sums of tree counts")?,
+        counts: Buffer<u32> = planned.one(room::TREE_COUNTS)?,
+        block_sums: Vec<Buffer<u32>> = planned.all(room::SUMS_OF_TREE_COUNTS)?,
         /// Sizes of dispatches of an invocation a photon, a run of them, and a share of a prefix sum.
-        item_args: Buffer<DispatchArgs> = planned.one("item args")?,
-        run_args: Buffer<DispatchArgs> = planned.one("run args")?,
-        scan_args: Buffer<DispatchArgs> = planned.one("scan args")?,
+        item_args: Buffer<DispatchArgs> = planned.one(room::ITEM_ARGS)?,
+        run_args: Buffer<DispatchArgs> = planned.one(room::RUN_ARGS)?,
+        scan_args: Buffer<DispatchArgs> = planned.one(room::SCAN_ARGS)?,
         /// First photon of each wall, and the number of all.
-        wall_begins: Buffer<u32> = planned.one("wall begins")?,
+        wall_begins: Buffer<u32> = planned.one(room::WALL_BEGINS)?,
         /// Photons of the fullest wall.
-        longest: Buffer<u32> = planned.one("longest")?,
-        planes: Buffer<f32> = planned.one("planes")?,
-        tree_photons: Buffer<StoredPhoton> = planned.one("tree photons")?,
+        longest: Buffer<u32> = planned.one(room::LONGEST)?,
+        planes: Buffer<f32> = planned.one(room::PLANES)?,
+        tree_photons: Buffer<StoredPhoton> = planned.one(room::TREE_PHOTONS)?,
         /// Which photon each of them is; one empty element where nobody asks.
-        tree_origins: Buffer<Origin> = planned.one("tree origins")?,
+        tree_origins: Buffer<Origin> = planned.one(room::TREE_ORIGINS)?,
         /// Searches for nearest photons; `None` where the radius alone decides.
         searches: Option<SearchBuffers> = plan.settings.nearest.map(|_| SearchBuffers::made(planned)).transpose()?,
     }
@@ -125,10 +126,10 @@ buffers! {
 buffers! {
     pub struct SearchBuffers(planned: &Planned) {
         /// Nearest photons of each point that is searched for.
-        nearest: Buffer<UVec2> = planned.one("nearest photons")?,
+        nearest: Buffer<UVec2> = planned.one(room::NEAREST_PHOTONS)?,
         /// As many as go on at once.
-        searches: Buffer<Search> = planned.one("searches")?,
+        searches: Buffer<Search> = planned.one(room::SEARCHES)?,
         /// 1: some search has not ended.
-        unfinished: Buffer<u32> = planned.one("unfinished")?,
+        unfinished: Buffer<u32> = planned.one(room::UNFINISHED)?,
     }
 }

@@ -4,8 +4,8 @@ use std::sync::atomic::AtomicBool;
 
 use super::{View, light};
 use crate::engine;
-use crate::engine::bias::Bias;
-use crate::engine::bias_batches::{Batch, Batches};
+use crate::engine::error::bias::Bias;
+use crate::engine::error::bias_batches::{Batch, Batches};
 use crate::engine::{Control, End};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;

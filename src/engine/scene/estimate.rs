@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::Round;
+use super::film_buffers::FilmBuffers;
 use super::points::{in_pieces, rounding};
 use super::radius_class::map_class;
 use super::resources::{PhotonBuffers, SceneResources};
@@ -114,8 +115,19 @@ pub fn gather(
 /// Turns what the maps found at all visible points into light; so many photons of the global and of the caustic map were traced.
 pub fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u32; 2]) -> Result<()> {
     let Round { resources, geometry, plan, .. } = round;
-    let SceneResources { scene, visible_points, estimates, near_sums, differences, radius_classes, disc_cuts, .. } = resources;
-    let SceneResources { one_hits, part_totals, anomalies, nonfinite_values, extra_samples, .. } = resources;
+    let SceneResources {
+        scene,
+        visible_points,
+        estimates,
+        near_sums,
+        radius_classes,
+        disc_cuts,
+        nonfinite_values,
+        extra_samples,
+        film,
+        ..
+    } = resources;
+    let FilmBuffers { differences, one_hits, part_totals, anomalies, .. } = film;
     let radius = |map: &Option<MapPlan>| map.as_ref().map_or(1.0, |map| plan.widest_radius(map, round.number)) as f32;
     let flux =
         |map: &Option<MapPlan>| map.as_ref().map_or(0.0, |map| map.photon_flux_of(geometry, traced[usize::from(map.caustic_only)])) as f32;
@@ -162,8 +174,8 @@ pub fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u32; 2])
 /// Ends a round: light that was found joins its block, and at the end of that the film.
 pub fn resolve(commands: &mut Commands, round: Round, ends_block: bool) -> Result<()> {
     let Round { resources, plan, .. } = round;
-    let SceneResources { extra_samples, pass_sums, estimates, sums_of_block, film_sums, film_squares, .. } = resources;
-    let SceneResources { surface_sums_of_block, surface_sums, surface_squares, part_totals, part_sums, latest_blocks, .. } = resources;
+    let SceneResources { extra_samples, pass_sums, estimates, film, .. } = resources;
+    let FilmBuffers { all, surfaces, part_totals, part_sums, latest_blocks, .. } = film;
     let pixel_count = plan.sensor.pixels();
     let points_per_path = if resources.photons.is_some() { plan.points_per_path } else { 0 };
     let block = round.number / plan.film.rounds_per_block;
@@ -184,12 +196,12 @@ pub fn resolve(commands: &mut Commands, round: Round, ends_block: bool) -> Resul
             extra_samples,
             pass_sums,
             estimates,
-            sums_of_block,
-            film_sums,
-            film_squares,
-            surface_sums_of_block,
-            surface_sums,
-            surface_squares,
+            sums_of_block: &all.under_way,
+            film_sums: &all.sums,
+            film_squares: &all.squares,
+            surface_sums_of_block: &surfaces.under_way,
+            surface_sums: &surfaces.sums,
+            surface_squares: &surfaces.squares,
             part_totals,
             part_sums,
             latest_blocks,
@@ -202,6 +214,6 @@ pub fn resolve(commands: &mut Commands, round: Round, ends_block: bool) -> Resul
 pub fn end_difference(commands: &mut Commands, round: Round) -> Result<()> {
     let Round { resources, plan, .. } = round;
     let (row_length, block) = (row_length(plan.sensor.pixels() as usize) as u32, round.number / plan.film.rounds_per_block);
-    let kernel = EndDifference { differences: &resources.differences };
+    let kernel = EndDifference { differences: &resources.film.differences };
     commands.dispatch(kernel, &EndDifferencePush { row_length, block }, Extent::Items(u64::from(row_length)))
 }

@@ -8,12 +8,12 @@ use crate::constants::{
     HIT_BRIGHT_PHOTON, HIT_CAUSTIC_PHOTON, HIT_GLOBAL_PHOTON, HIT_KINDS, HIT_OFF_SURFACE, HIT_SHADOW_RAY, HIT_UNSEEN_LIGHT, PART_COUNT,
     RADIUS_CLASSES,
 };
-use crate::engine::bias::Bias;
-use crate::engine::differences::Differences;
-use crate::engine::error_bound::{ErrorPlaces, ErrorSource, FilmError};
+use crate::engine::error::bias::Bias;
+use crate::engine::error::bound::{ErrorPlaces, ErrorSource, FilmError};
+use crate::engine::error::differences::Differences;
+use crate::engine::error::measure::ErrorMeasure;
+use crate::engine::error::unknown::{OffSurfaces, Uncounted, Unknown, most_hits};
 use crate::engine::film::{BlockSums, LatestBlocks, TooLarge, add_all};
-use crate::engine::measure_of_error::ErrorMeasure;
-use crate::engine::unknown::{OffSurfaces, Uncounted, Unknown, most_hits};
 use crate::plan::buffers::{ANOMALY_WORDS, PART_VALUES};
 use crate::plan::film::{BiasPlan, FilmPlan, LostOffSurfaces};
 use crate::plan::latest_blocks::kept_place;

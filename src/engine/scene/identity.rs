@@ -1,7 +1,7 @@
 //! What a run on a scene computes: the scene as the kernels read it, who looks at it, and what the trial found.
 
 use super::View;
-use crate::engine::identity::{Hash, Identity};
+use crate::engine::run::identity::{Hash, Identity};
 use crate::gpu::DeviceFacts;
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::scene::geometry::Geometry;

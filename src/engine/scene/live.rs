@@ -6,12 +6,13 @@ use std::time::Instant;
 use glam::DVec3;
 
 use super::film::SceneFilm;
+use super::film_buffers::FilmBuffers;
 use super::kept_maps::KeptMaps;
 use super::on_gpu::{SceneOnGpu, constants, modules, task};
 use super::resources::SceneResources;
 use crate::constants::{SHOW_ALL, SHOW_ERROR};
 use crate::engine::Control;
-use crate::engine::error_bound::FilmError;
+use crate::engine::error::bound::FilmError;
 use crate::engine::run::{self, Run, World};
 use crate::error::Result;
 use crate::gpu::kernels::{Display, ShowPhotons, ShowScene};
@@ -80,7 +81,7 @@ impl<'a> LiveScene<'a> {
     /// Begins anew from another camera. Photons that are kept need not be traced again.
     pub fn look_from(&mut self, camera: &Camera) -> Result<()> {
         let Run { world, recorder, .. } = &mut self.run;
-        world.look_from(recorder, camera.clone())?;
+        world.look_from(recorder, camera.clone());
         self.camera = camera.clone();
         self.run.begin_anew(task(self.plan, self.device), &mut Control::quiet(self.cancelled))
     }
@@ -122,7 +123,8 @@ impl<'a> LiveScene<'a> {
     /// Records what is shown of the film: light or its error, of which `mean` is the mean of the picture.
     pub fn show(&mut self, shows: u32, mean: f64, shown: &Buffer<glam::Vec4>) -> Result<()> {
         let Run { world, recorder, state } = &mut self.run;
-        let SceneResources { film_sums, film_squares, sums_of_block, part_sums, part_totals, .. } = world.resources();
+        let FilmBuffers { all, part_sums, part_totals, .. } = &world.resources.film;
+        let (film_sums, film_squares, sums_of_block) = (&all.sums, &all.squares, &all.under_way);
         let shows = if shows == SHOW_ERROR || self.plan.keeps_parts() { shows } else { SHOW_ALL };
         let push = ShowScenePush {
             pixel_count: self.plan.sensor.pixels(),
@@ -163,7 +165,7 @@ impl<'a> LiveScene<'a> {
                     colour: colours[usize::from(map.caustic_only)],
                     dot_size: DOT,
                 };
-                let kernel = ShowPhotons { map: part, visible_points: &world.resources().visible_points, window_pixels };
+                let kernel = ShowPhotons { map: part, visible_points: &world.resources.visible_points, window_pixels };
                 recorder.dispatch(kernel, &push, Extent::Items(part.count()))?;
             }
         }

@@ -4,38 +4,33 @@ use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
-use rayon::prelude::*;
-
 use super::film::SceneFilm;
 use super::identity::identity;
 use super::kept_maps::KeptMaps;
 use super::losses::losses;
 use super::map_file::MapFile;
-use super::resources::{PhotonBuffers, SceneResources};
+use super::map_in_round::{FIRST_TIMED_CHUNK, MapInRound, StoredPhotons, one_kept_map, one_map, one_stored_map};
+use super::resources::SceneResources;
 use super::{Round, RunResult, View, estimate, index, points, radius_class, trace};
-use crate::constants::{HIT_CAUSTIC_PHOTON, HIT_GLOBAL_PHOTON, HIT_KINDS, KEPT_BLOCKS, PART_COUNT, RADIUS_CLASSES, TALLY_COPIES};
-use crate::engine::differences::Differences;
-use crate::engine::error_bound::FilmError;
-use crate::engine::film::{BlockSums, KeptBlock, LatestBlocks, halves, wide};
+use crate::constants::{PART_COUNT, TALLY_COPIES};
+use crate::engine::error::bound::FilmError;
 use crate::engine::nonfinite_values::NonfiniteValues;
+use crate::engine::run::saved::{SavedFilm, SavedRun};
+use crate::engine::run::watch::Later;
 use crate::engine::run::{self, RunState, Task, World};
-use crate::engine::saved::{SavedFilm, SavedRun};
-use crate::engine::watch::Later;
 use crate::engine::{Control, tallies, totals};
 use crate::error::Result;
 use crate::gpu::kernels::*;
 use crate::gpu::{Commands, Constants, DeviceFacts, Gpu, Interrupt, Kernel, Module};
 use crate::ledger::{Fates, Losses};
-use crate::plan::buffers::{ANOMALY_WORDS, PART_VALUES};
-use crate::plan::differences::difference_count;
+use crate::plan::buffers::PART_VALUES;
 use crate::plan::film::{BiasPlan, FilmPlan};
 use crate::plan::latest_blocks::kept_count;
-use crate::plan::scene::{MapPlan, ScenePlan};
+use crate::plan::scene::ScenePlan;
 use crate::plan::sensor::Sensor;
-use crate::records::CellPush;
 use crate::scene::Camera;
 use crate::scene::geometry::Geometry;
-use crate::timings::{Handled, Span};
+use crate::timings::Span;
 
 /// Kernels that the plan needs, and no others. `go_on` is not among them: few camera paths outlast a dispatch, so its pipeline is
 /// made at its first use.
@@ -73,9 +68,8 @@ pub fn constants(plan: &ScenePlan) -> Constants {
     plan.constants.iter().fold(Constants::new(plan.settings.group_size), |constants, (name, value)| constants.set(name, *value))
 }
 
-/// Timestamps that a round may need, and those that one grid of its maps does.
+/// Timestamps that a round may need.
 const TIMESTAMPS_PER_ROUND: u32 = 64;
-const TIMESTAMPS_PER_GRID: u32 = 32;
 
 pub(super) struct SceneOnGpu<'a> {
     geometry: &'a Geometry,
@@ -95,13 +89,6 @@ pub(super) struct SceneOnGpu<'a> {
     /// A round was cut short, of which parts of light may have come to that of the block under way.
     is_cut: bool,
     cancelled: &'a AtomicBool,
-}
-
-/// A file, and the fates of its photons in rounds that nobody has counted yet: of each map, and those of whole blocks among them.
-struct StoredPhotons<'a> {
-    file: &'a MapFile,
-    open: [Fates; 2],
-    open_of_blocks: [Fates; 2],
 }
 
 /// Runs all rounds of a plan; progress is reported in rounds.
@@ -133,7 +120,7 @@ pub fn light_from(gpu: &Gpu, view: &View, plan: ScenePlan, map: Option<&MapFile>
     }
     if let Some((_, saved)) = &control.keep.resume {
         let SavedFilm::Scene(film) = &saved.film else { unreachable!("identities of two worlds differ") };
-        world.restore(&mut commands, film)?;
+        world.resources.film.restore(&mut commands, film)?;
     }
     run::run(world, commands, &plan, task, control)
 }
@@ -193,10 +180,8 @@ impl<'a> World for SceneOnGpu<'a> {
         if let Some(StoredPhotons { open, open_of_blocks, .. }) = &mut self.stored {
             open_of_blocks.clone_from(open);
         }
-        let SceneResources { one_hits, part_totals, anomalies, of_blocks, photons, .. } = &self.resources;
-        commands.copy(one_hits, &of_blocks.one_hits, one_hits.count());
-        commands.copy(part_totals, &of_blocks.part_totals, PART_COUNT.into());
-        commands.copy(anomalies, &of_blocks.anomalies, anomalies.count());
+        let SceneResources { film, photons, .. } = &self.resources;
+        film.end_block(commands);
         for which in self.plan.maps().map(|map| usize::from(map.caustic_only)) {
             let photons = photons.as_ref().expect("maps have photons");
             commands.copy(&photons.tallies[which], &photons.tallies_of_blocks[which], photons.tallies[which].count());
@@ -243,74 +228,7 @@ impl<'a> World for SceneOnGpu<'a> {
     }
 
     fn film(&mut self, commands: &mut Commands<'a>, state: &RunState) -> Result<Later<SceneFilm>> {
-        let SceneResources { film_sums, film_squares, surface_sums, surface_squares, latest_blocks, class_counts, part_sums, .. } =
-            &self.resources;
-        let SceneResources { differences, sums_of_block, surface_sums_of_block, one_hits, part_totals, anomalies, of_blocks, .. } =
-            &self.resources;
-        let plan = &self.plan.film;
-        let pixels = self.plan.sensor.pixels() as usize;
-        // Where a block is whole, nothing counts of the one under way.
-        let is_whole = state.blocks() > 0;
-        let (sums, of_surfaces) = if is_whole { (film_sums, surface_sums) } else { (sums_of_block, surface_sums_of_block) };
-        // Those of the block under way stand behind all else of their buffer.
-        let parts = match (self.plan.part_sums() as usize, is_whole) {
-            (0, _) => None,
-            (count, true) => Some((commands.copy_out(part_sums, count)?, 0)),
-            (_, false) if self.is_cut => None,
-            (count, false) => {
-                let all = part_totals.count() as usize;
-                Some((commands.copy_out(part_totals, all)?, all - count))
-            }
-        };
-        let (one_hits, part_totals, anomalies) =
-            if is_whole { (&of_blocks.one_hits, &of_blocks.part_totals, &of_blocks.anomalies) } else { (one_hits, part_totals, anomalies) };
-        let seen = if plan.sees_light { pixels } else { 0 };
-        let sums = commands.copy_out(sums, 3 * pixels)?;
-        let squares = commands.copy_out(film_squares, 6 * pixels)?;
-        let of_surfaces = commands.copy_out(of_surfaces, 3 * seen)?;
-        let squares_of_surfaces = commands.copy_out(surface_squares, 6 * seen)?;
-        let kept = PART_VALUES as usize * kept_count(pixels);
-        let latest = commands.copy_out(latest_blocks, latest_blocks.count() as usize)?;
-        let one_hits = commands.copy_out(one_hits, HIT_KINDS as usize * pixels)?;
-        let part_totals = commands.copy_out(part_totals, PART_COUNT as usize)?;
-        let anomalies = commands.copy_out(anomalies, ANOMALY_WORDS)?;
-        let class_counts = commands.copy_out(class_counts, 2 * RADIUS_CLASSES as usize)?;
-        let measured = if plan.bias == BiasPlan::Blocks { difference_count(pixels) } else { 0 };
-        let differences = commands.copy_out(differences, measured)?;
-        commands.submit()?;
-        let mut stored = [0; 3];
-        for map in self.plan.maps() {
-            let fates = &state.fates()[usize::from(map.caustic_only)];
-            stored[if map.caustic_only { HIT_CAUSTIC_PHOTON } else { HIT_GLOBAL_PHOTON } as usize] = fates.ledger().stored;
-        }
-        let (blocks, numbers, plan) = (state.blocks(), state.kept.clone(), plan.clone());
-        let rounds = if is_whole { blocks * plan.rounds_per_block } else { state.rounds() };
-        Ok(Box::new(move || {
-            let of_blocks = |sums: Vec<u64>, squares: Vec<u64>| BlockSums {
-                rounds,
-                blocks,
-                sums,
-                squares: squares.par_chunks_exact(2).map(|words| wide(words[0], words[1])).collect(),
-            };
-            let values = latest.take();
-            let mut latest = LatestBlocks::default();
-            for (slot, number) in numbers {
-                latest.push(KeptBlock { number, values: values[slot as usize * kept..][..kept].to_vec() });
-            }
-            SceneFilm {
-                of_blocks: of_blocks(sums.take(), squares.take()),
-                of_surfaces: plan.sees_light.then(|| of_blocks(of_surfaces.take(), squares_of_surfaces.take())),
-                plan,
-                latest,
-                differences: Differences(differences.take()),
-                one_hits: one_hits.take(),
-                part_totals: part_totals.take(),
-                parts: parts.map(|(values, first)| values.take().split_off(first)),
-                anomalies: anomalies.take().try_into().expect("so many words were read"),
-                class_counts: class_counts.take(),
-                stored,
-            }
-        }))
+        self.resources.film.read(commands, self.plan, state, self.is_cut)
     }
 
     fn error(&self, film: &SceneFilm) -> FilmError {
@@ -340,29 +258,11 @@ impl<'a> SceneOnGpu<'a> {
         SceneOnGpu { geometry, camera, plan, resources, grids, stored: None, kept: None, timed_chunks, is_cut: false, cancelled }
     }
 
-    pub(super) fn resources(&self) -> &SceneResources {
-        &self.resources
-    }
-
     /// Looks from somewhere else, at the light of round 0 first: the film is empty, and the photons that are kept stay.
-    pub(super) fn look_from(&mut self, commands: &mut Commands, camera: Camera) -> Result<()> {
+    pub(super) fn look_from(&mut self, commands: &mut Commands, camera: Camera) {
         self.camera = Some(camera);
         self.grids = self.grids.take().filter(|_| !self.plan.has_classes());
-        let SceneResources { sums_of_block, surface_sums_of_block, film_sums, film_squares, surface_sums, surface_squares, .. } =
-            &self.resources;
-        let SceneResources { differences, part_totals, part_sums, .. } = &self.resources;
-        for sums in [sums_of_block, surface_sums_of_block, film_sums, film_squares, surface_sums, surface_squares] {
-            commands.clear(sums);
-        }
-        for sums in [differences, part_totals, part_sums] {
-            commands.clear(sums);
-        }
-        let SceneResources { latest_blocks, one_hits, anomalies, class_counts, .. } = &self.resources;
-        commands.clear(latest_blocks);
-        for counts in [one_hits, anomalies, class_counts] {
-            commands.clear(counts);
-        }
-        Ok(())
+        self.resources.film.clear(commands);
     }
 
     /// Finds the radii of visible points, which those of round 0 decide, where that round is not the first to be done.
@@ -375,43 +275,8 @@ impl<'a> SceneOnGpu<'a> {
             radius_class::find(commands, round, photons, camera.as_ref())
         })?);
         // Nothing of what was seen counts.
-        commands.clear(&resources.one_hits);
-        commands.clear(&resources.part_totals);
-        commands.clear(&resources.anomalies);
+        resources.film.forget_seen(commands);
         Ok(())
-    }
-
-    /// Goes on with a film.
-    fn restore(&self, commands: &mut Commands, film: &SceneFilm) -> Result<()> {
-        let SceneResources { film_sums, film_squares, surface_sums, surface_squares, latest_blocks, .. } = &self.resources;
-        let SceneResources { differences, one_hits, part_totals, anomalies, of_blocks, .. } = &self.resources;
-        commands.upload(differences, &film.differences.0)?;
-        for (sums, squares, found) in
-            [(film_sums, film_squares, Some(&film.of_blocks)), (surface_sums, surface_squares, film.of_surfaces.as_ref())]
-        {
-            let Some(found) = found else { continue };
-            commands.upload(sums, &found.sums)?;
-            commands.upload(squares, &halves(&found.squares))?;
-        }
-        let kept = PART_VALUES as usize * kept_count(film.pixels());
-        let mut values = vec![0.0; latest_blocks.count() as usize];
-        for block in film.latest.iter() {
-            values[(block.number % KEPT_BLOCKS) as usize * kept..][..kept].copy_from_slice(&block.values);
-        }
-        commands.upload(latest_blocks, &values)?;
-        for one_hits in [one_hits, &of_blocks.one_hits] {
-            commands.upload(one_hits, &film.one_hits)?;
-        }
-        if let Some(parts) = &film.parts {
-            commands.upload(&self.resources.part_sums, parts)?;
-        }
-        for part_totals in [part_totals, &of_blocks.part_totals] {
-            commands.upload(part_totals, &film.part_totals)?;
-        }
-        for anomalies in [anomalies, &of_blocks.anomalies] {
-            commands.upload(anomalies, &film.anomalies)?;
-        }
-        commands.submit()
     }
 
     /// One round. When its time is up, it takes no further chunk of photons.
@@ -457,116 +322,4 @@ impl<'a> SceneOnGpu<'a> {
             estimate::resolve(commands, round, state.ends_block())
         })
     }
-}
-
-/// Photons of the first chunk of a run in which the time may be up, and how long a chunk may take that the next one doubles.
-const FIRST_TIMED_CHUNK: u32 = 1 << 12;
-const TIMED_CHUNK: Duration = Duration::from_millis(40);
-
-/// Photons of a file that are uploaded together.
-const STORED_AT_ONCE: u32 = 1 << 22;
-
-/// A map, and the grids that its points need.
-struct MapInRound<'a> {
-    photons: &'a PhotonBuffers,
-    map: &'a MapPlan,
-    grids: &'a [Range<u32>],
-}
-
-/// The photons of a map that a file holds; says how many were emitted for them.
-fn one_stored_map(
-    commands: &mut Commands,
-    round: Round,
-    in_round: &MapInRound,
-    stored: &mut StoredPhotons,
-    state: &mut RunState,
-) -> Result<u32> {
-    let MapInRound { photons, map, .. } = in_round;
-    if round.plan.cuts_discs() {
-        commands.scope("cuts", |commands| estimate::cut_discs(commands, round, map))?;
-    }
-    let which = usize::from(map.caustic_only);
-    state.hand_out(which, map.photons);
-    stored.open[which].add(&Fates { emitted: 0, ..stored.file.fates(round.number, map.name).clone() });
-    let most = map.capacity.min(STORED_AT_ONCE) as usize;
-    stored.file.photons(round.number, map.name, most, round.geometry.planes.len(), &mut |of_file| {
-        commands.upload(&photons.map, of_file)?;
-        commands.fill(&photons.counters, 0, 1, of_file.len() as u32);
-        gather_in_grids(commands, round, in_round, Some(of_file.len() as u32))?;
-        // What was staged goes.
-        commands.submit()
-    })?;
-    Ok(map.photons)
-}
-
-/// The photons of a map; says how many. Where the time may be up, chunks grow only as long as they take little of it, from round to round.
-fn one_map(
-    commands: &mut Commands,
-    round: Round,
-    in_round: &MapInRound,
-    deadline: Option<Instant>,
-    timed_chunk: &mut u32,
-    mut kept: Option<&mut KeptMaps>,
-    state: &mut RunState,
-) -> Result<u32> {
-    let map = in_round.map;
-    if round.plan.cuts_discs() {
-        commands.scope("cuts", |commands| estimate::cut_discs(commands, round, map))?;
-    }
-    let mut traced = 0;
-    while traced < map.photons {
-        let began = Instant::now();
-        if traced > 0 && deadline.is_some_and(|deadline| began >= deadline) {
-            break;
-        }
-        let most = if deadline.is_some() { *timed_chunk } else { map.chunk_photons };
-        let count = most.min(map.chunk_photons).min(map.photons - traced);
-        state.hand_out(usize::from(map.caustic_only), count);
-        trace::trace(commands, round, in_round.photons, map, (traced, count), &mut |commands, stored| {
-            kept.as_mut().map_or(Ok(()), |kept| kept.keep(commands, in_round.photons, map))?;
-            gather_in_grids(commands, round, in_round, stored)
-        })?;
-        traced += count;
-        if deadline.is_some() {
-            commands.submit()?;
-            let is_short = began.elapsed() < TIMED_CHUNK;
-            *timed_chunk = if is_short { timed_chunk.saturating_mul(2) } else { *timed_chunk };
-        }
-    }
-    Ok(traced)
-}
-
-/// The photons of a map that was kept; says how many were emitted for them.
-fn one_kept_map(commands: &mut Commands, round: Round, in_round: &MapInRound, kept: &KeptMaps, state: &mut RunState) -> Result<u32> {
-    let MapInRound { photons, map, .. } = in_round;
-    if round.plan.cuts_discs() {
-        commands.scope("cuts", |commands| estimate::cut_discs(commands, round, map))?;
-    }
-    state.hand_out(usize::from(map.caustic_only), map.photons);
-    for part in kept.parts(map) {
-        commands.copy(part, &photons.map, part.count());
-        commands.fill(&photons.counters, 0, 1, part.count() as u32);
-        gather_in_grids(commands, round, in_round, Some(part.count() as u32))?;
-    }
-    Ok(map.photons)
-}
-
-/// Adds the photons that are in the map, whose number may be known, to the estimates of all points. Points of radii that differ much look photons up in grids of
-/// their own.
-fn gather_in_grids(commands: &mut Commands, round: Round, map: &MapInRound, stored: Option<u32>) -> Result<()> {
-    let MapInRound { photons, map, grids } = *map;
-    for (grid, classes) in grids.iter().enumerate() {
-        if commands.timestamps_left() < TIMESTAMPS_PER_GRID || commands.is_full(round.plan.work_per_submission) {
-            commands.submit()?;
-        }
-        let radius = radius_class::radius_of_class(round.plan.widest_radius(map, round.number), classes.start);
-        let cells = CellPush { counts_stored: u32::from(grid == 0), ..index::cells(round, map, radius) };
-        commands.scope("index", |commands| index::build(commands, round, photons, map, &cells, stored))?;
-        commands.scope("gather", |commands| {
-            let stored = stored.map_or(0, u64::from);
-            commands.count(Handled { stored, bytes: map.bytes_of_reading(stored), ..Handled::default() });
-            estimate::gather(commands, round, photons, map, classes.clone(), cells)
-        })?;
-    }
-    Ok(())
 }

@@ -3,9 +3,9 @@
 use super::losses::losses;
 use super::map_file::MapFile;
 use super::{RunResult, SceneFilm, View, light_from, trial};
-use crate::engine::retry::{Failed, run_on};
-use crate::engine::saved::SavedFilm;
-use crate::engine::several_devices::Work;
+use crate::engine::run::retry::{Failed, run_on};
+use crate::engine::run::saved::SavedFilm;
+use crate::engine::run::several_devices::Work;
 use crate::engine::{self, Control};
 use crate::error::Result;
 use crate::gpu::Gpu;

@@ -8,7 +8,7 @@
 use std::cell::Cell;
 use std::sync::atomic::AtomicBool;
 
-use super::pilot_rounds::{FEW_SAMPLES, MANY_SAMPLES, OfTile, PIXELS_OF_MAP, Parts, PilotRounds, SAMPLES};
+use super::pilot_rounds::{FEW_SAMPLES, MANY_SAMPLES, OfPicture, OfTile, PIXELS_OF_MAP, Parts, PilotRounds, SAMPLES};
 use super::{View, trial};
 use crate::constants::PART_COUNT;
 use crate::engine;
@@ -97,78 +97,131 @@ pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Fre
         let Some(found) = known(&looks, &of_many, Some(&of_one), kind) else { return Ok(None) };
         rounds = found.1;
     }
-    let limits = engine::limits(gpu.facts());
-    let plan_of =
-        |division: Division| ScenePlan::with_trial(scene, view.geometry, &division.set(settings), plan.sensor, &limits, plan.trial.clone());
-    let is_possible = |division: Division| division == before || plan_of(division).is_ok();
-    // As many photons as are traced at once.
-    let most = Division { photons: MOST_PHOTONS, caustic_photons: MOST_PHOTONS, ..before };
-    let at_once = plan_of(most).map_or(before.photons, |plan| plan.maps().map(|map| map.chunk_photons).min().unwrap_or(before.photons));
+    let choice = Choice::new(&looks, free);
     let mut tiles = None;
     // What is to name each pixel knows of no tiles.
-    if free.samples
-        && !settings.paranoid
-        && let Sensor::Picture { width, .. } = plan.sensor
-    {
-        let mut found = None;
-        // The more a run takes, the more of its pilot is worth its while: that is known better each time. Each look takes its time to begin.
-        let mut least = PICTURE_ROUNDS;
-        while least <= MOST_PICTURE_ROUNDS {
-            let first = best(&rounds, before, free, &settings.stop, (MOST_SAMPLES, at_once));
-            let fits = picture_rounds(plan, first, &rounds, looks.size.photons);
-            if fits * if found.is_none() { LEAST_PICTURE } else { 1.0 } < f64::from(least) {
-                break;
-            }
-            // What few pixels have told may be far off.
-            let most = if found.is_none() { FIRST_PICTURE_ROUNDS } else { MOST_PICTURE_ROUNDS };
-            let count = (fits.min(f64::from(most)) as u32).max(least);
-            let Some(seen) = looks.of_all(first.shadow_rays, count)? else { break };
-            let known = &mut rounds.variance;
-            let of_rays = of_samples(first.shadow_rays);
-            known.shadow_ray = known.shadow_ray.min(seen.paths / of_rays);
-            known.path = seen.paths - known.shadow_ray * of_rays;
-            for (is_caustic, (map, found)) in
-                [false, true].into_iter().zip([&mut known.global, &mut known.caustic].into_iter().zip(seen.maps))
-            {
-                if map.at.photons == 0 {
-                    continue;
-                }
-                (map.of_round, map.sample_power, map.share) = (found.of_round, found.sample_power, found.light);
-                // Little is found of it in few rounds.
-                map.uncertainty = found.over_noise.map_or(USUAL_UNCERTAINTY, |found| (found * USUAL_UNCERTAINTY).sqrt());
-                map.bias = USUAL_BIAS[usize::from(is_caustic)];
-                map.learn_bias(found.bias, found.uncertainty, FOUND_BIAS[usize::from(is_caustic)]);
-            }
-            found = Some(seen.tiles);
-            least = 4 * count;
+    if free.samples && !settings.paranoid && matches!(plan.sensor, Sensor::Picture { .. }) {
+        let found = choice.look_at_all(&mut rounds)?;
+        if let Some((better, found)) = found.and_then(|found| choice.tiles(&rounds, &found)) {
+            (rounds, tiles) = (better, Some(found));
         }
-        // Few samples anywhere may miss rare light, so that the best of several least shares is taken.
-        let even = (rounds.loss(best(&rounds, before, free, &settings.stop, (MOST_SAMPLES, at_once)), &settings.stop), rounds, None);
-        let with_tiles = |found: &[OfTile], least: f64| {
-            let tiles = Tiles::of(found, width.div_ceil(TILE) as usize, least);
-            let rounds = tiles.rounds(&rounds, plan.constant("HAS_SPECULAR_CHAINS") != 0);
-            (rounds.loss(best(&rounds, before, free, &settings.stop, (MOST_SAMPLES, at_once)), &settings.stop), rounds, Some(tiles))
-        };
-        let tried = found.iter().flat_map(|found| LEAST_SHARES.map(|least| with_tiles(found, least)));
-        let best = tried.filter(|tried| tried.0 < LEAST_TILES * even.0).min_by(|one, other| one.0.total_cmp(&other.0)).unwrap_or(even);
-        (rounds, tiles) = (best.1, best.2);
     }
-    let mut most_samples = MOST_SAMPLES;
-    let mut chosen = best(&rounds, before, free, &settings.stop, (most_samples, at_once));
-    // More samples than the device's buffers hold.
-    while !is_possible(chosen) {
-        most_samples = chosen.samples.min(most_samples) / 2;
-        chosen = if most_samples == 0 { before } else { best(&rounds, before, free, &settings.stop, (most_samples, at_once)) };
-    }
-    if rounds.loss(before, &settings.stop) <= LEAST_GAIN * rounds.loss(chosen, &settings.stop) {
-        chosen = before;
-    }
-    let size = plan.sensor.size();
+    let best = choice.possible(&rounds);
+    let is_better = rounds.loss(before, &settings.stop) > LEAST_GAIN * rounds.loss(best, &settings.stop);
+    let chosen = if is_better { best } else { before };
     // Of fewer samples a block takes more rounds, of which a short run has few.
     let is_short = rounds.expected(chosen, &settings.stop) < FEW_BLOCKS * SAMPLES_PER_BLOCK;
     let least_samples = if is_short { chosen.samples.min(SAMPLES_PER_BLOCK) } else { 1 };
-    let tiles = tiles.map(|tiles| tile_samples(chosen.samples, least_samples, &tiles.samples, size)).filter(|(_, tiles)| tiles.most() > 0);
+    let tiles = tiles
+        .map(|tiles| tile_samples(chosen.samples, least_samples, &tiles.samples, plan.sensor.size()))
+        .filter(|(_, tiles)| tiles.most() > 0);
     Ok(Some(Pilot { before, chosen, tiles, rounds, of_parts: parts, spent: looks.spent.get() }))
+}
+
+/// What a division is chosen from.
+struct Choice<'a> {
+    looks: &'a PilotRounds<'a>,
+    before: Division,
+    free: Free,
+    /// As many photons as are traced at once.
+    most_photons: u32,
+}
+
+impl<'a> Choice<'a> {
+    fn new(looks: &'a PilotRounds<'a>, free: Free) -> Choice<'a> {
+        let before = Division::of(&looks.run.settings);
+        let all = Division { photons: MOST_PHOTONS, caustic_photons: MOST_PHOTONS, ..before };
+        let at_once = |plan: ScenePlan| plan.maps().map(|map| map.chunk_photons).min().unwrap_or(before.photons);
+        Choice { looks, before, free, most_photons: plan_of(looks, all).map_or(before.photons, at_once) }
+    }
+
+    fn stop(&self) -> &Stop {
+        &self.looks.run.settings.stop
+    }
+
+    fn best(&self, rounds: &Rounds, most_samples: u32) -> Division {
+        best(rounds, self.before, self.free, self.stop(), (most_samples, self.most_photons))
+    }
+
+    fn least_loss(&self, rounds: &Rounds) -> f64 {
+        rounds.loss(self.best(rounds, MOST_SAMPLES), self.stop())
+    }
+
+    /// The best division of which the device's buffers hold all samples.
+    fn possible(&self, rounds: &Rounds) -> Division {
+        let mut most_samples = MOST_SAMPLES;
+        loop {
+            let chosen = self.best(rounds, most_samples);
+            if chosen == self.before || plan_of(self.looks, chosen).is_ok() {
+                return chosen;
+            }
+            most_samples = chosen.samples.min(most_samples) / 2;
+            if most_samples == 0 {
+                return self.before;
+            }
+        }
+    }
+
+    /// Looks at all pixels, as long as the run is worth it, and says what each tile has shown. The more a run takes, the more of its pilot is
+    /// worth its while: that is known better each time. Each look takes its time to begin.
+    fn look_at_all(&self, rounds: &mut Rounds) -> Result<Option<Vec<OfTile>>> {
+        let mut found = None;
+        let mut least = PICTURE_ROUNDS;
+        while least <= MOST_PICTURE_ROUNDS {
+            let first = self.best(rounds, MOST_SAMPLES);
+            let fits = picture_rounds(self.looks.run, first, rounds, self.looks.size.photons);
+            // What few pixels have told may be far off.
+            let (times, most) = if found.is_none() { (LEAST_PICTURE, FIRST_PICTURE_ROUNDS) } else { (1.0, MOST_PICTURE_ROUNDS) };
+            if fits * times < f64::from(least) {
+                break;
+            }
+            let count = (fits.min(f64::from(most)) as u32).max(least);
+            let Some(seen) = self.looks.of_all(first.shadow_rays, count)? else { break };
+            learn(&mut rounds.variance, &seen, first.shadow_rays);
+            found = Some(seen.tiles);
+            least = 4 * count;
+        }
+        Ok(found)
+    }
+
+    /// Rounds with samples by tiles, where that is worth its while. Few samples anywhere may miss rare light, so that the best of several
+    /// least shares is taken.
+    fn tiles(&self, even: &Rounds, found: &[OfTile]) -> Option<(Rounds, Tiles)> {
+        let run = self.looks.run;
+        let columns = run.sensor.size().0.div_ceil(TILE) as usize;
+        let tried = LEAST_SHARES.map(|least| {
+            let tiles = Tiles::of(found, columns, least);
+            let rounds = tiles.rounds(even, run.constant("HAS_SPECULAR_CHAINS") != 0);
+            (self.least_loss(&rounds), (rounds, tiles))
+        });
+        let enough = LEAST_TILES * self.least_loss(even);
+        let better = tried.into_iter().filter(|(loss, _)| *loss < enough);
+        better.min_by(|one, other| one.0.total_cmp(&other.0)).map(|(_, better)| better)
+    }
+}
+
+/// The plan of the run with this division.
+fn plan_of(looks: &PilotRounds, division: Division) -> Result<ScenePlan> {
+    let PilotRounds { gpu, scene, view, run, .. } = looks;
+    let limits = engine::limits(gpu.facts());
+    ScenePlan::with_trial(scene, view.geometry, &division.set(&run.settings), run.sensor, &limits, run.trial.clone())
+}
+
+/// Takes over what all pixels have shown with so many shadow rays.
+fn learn(known: &mut Variance, seen: &OfPicture, shadow_rays: u32) {
+    let of_rays = of_samples(shadow_rays);
+    known.shadow_ray = known.shadow_ray.min(seen.paths / of_rays);
+    known.path = seen.paths - known.shadow_ray * of_rays;
+    for (which, (map, found)) in [&mut known.global, &mut known.caustic].into_iter().zip(&seen.maps).enumerate() {
+        if map.at.photons == 0 {
+            continue;
+        }
+        (map.of_round, map.sample_power, map.share) = (found.of_round, found.sample_power, found.light);
+        // Little is found of it in few rounds.
+        map.uncertainty = found.over_noise.map_or(USUAL_UNCERTAINTY, |found| (found * USUAL_UNCERTAINTY).sqrt());
+        map.bias = USUAL_BIAS[which];
+        map.learn_bias(found.bias, found.uncertainty, FOUND_BIAS[which]);
+    }
 }
 
 /// What a few pixels tell with many shadow rays, and with one: the parts of the noise, as shares of its square, and rounds. `None` where

@@ -1,6 +1,7 @@
 //! Visible points and direct light, at the start of a round.
 
 use super::Round;
+use super::film_buffers::FilmBuffers;
 use super::resources::SceneResources;
 use crate::constants::{DOMAIN_CAMERA, DOMAIN_RECEIVERS};
 use crate::error::Result;
@@ -51,9 +52,8 @@ pub(super) fn rounding(plan: &ScenePlan, round: u32) -> u32 {
 /// A kernel that follows camera paths: what all of these write to, and its own buffers.
 macro_rules! camera_kernel {
     ($kernel:ident, $resources:ident, $($own:ident: $buffer:expr),*) => {{
-        let SceneResources {
-            scene, visible_points, matt_lobes, matt_covers, pass_sums, one_hits, part_totals, anomalies, nonfinite_values, ..
-        } = $resources;
+        let SceneResources { scene, visible_points, matt_lobes, matt_covers, pass_sums, film, nonfinite_values, .. } = $resources;
+        let FilmBuffers { one_hits, part_totals, anomalies, .. } = film;
         let camera_path_counts = &$resources.camera_path_counts;
         $kernel {
             scene, visible_points, matt_lobes, matt_covers, pass_sums, one_hits, part_totals, anomalies, nonfinite_values,

@@ -46,7 +46,8 @@ pub fn radius_of_class(widest: f64, class: u32) -> f32 {
 /// each by the classes that it serves.
 pub fn find(commands: &mut Commands, round: Round, photons: &PhotonBuffers, camera: Option<&Camera>) -> Result<[Vec<Range<u32>>; 2]> {
     let Round { resources, plan, .. } = round;
-    let SceneResources { scene, visible_points, radius_classes, clearances, class_counts, .. } = resources;
+    let SceneResources { scene, visible_points, radius_classes, clearances, film, .. } = resources;
+    let class_counts = &film.class_counts;
     let point_count = plan.visible_points();
     // All points of a map whose radius is given have class 0.
     let unknown = plan.maps().filter(|map| map.classes.is_some()).map(|map| NO_CLASS << map_class(map)).sum();
@@ -136,7 +137,8 @@ fn of_map(commands: &mut Commands, round: Round, buffers: &PhotonBuffers, map: &
                 pixel_share: pixel_share as f32,
                 cells,
             };
-            let SceneResources { scene, visible_points, radius_classes, clearances, class_counts, .. } = resources;
+            let SceneResources { scene, visible_points, radius_classes, clearances, film, .. } = resources;
+            let class_counts = &film.class_counts;
             let PhotonBuffers { cells, sorted_map, .. } = buffers;
             let kernel = RadiusClass { scene, visible_points, cells, sorted_map, radius_classes, clearances, class_counts };
             commands.dispatch(kernel, &push, Extent::Items(u64::from(end_point - first_point)))

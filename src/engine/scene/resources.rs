@@ -1,9 +1,11 @@
 //! Makes the buffers of a scene that `plan::buffers` lists, and uploads the scene.
 
+use super::film_buffers::FilmBuffers;
 use crate::engine::planned::{Planned, buffers};
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Gpu, kernels};
 use crate::photon::MapPhoton;
+use crate::plan::buffers::{NONFINITE_VALUES, scene};
 use crate::plan::light_choice::LightChoice;
 use crate::plan::scene::ScenePlan;
 use crate::records::*;
@@ -18,74 +20,56 @@ buffers! {
     ) {
         /// Written once; what the plan dropped has one empty element.
         scene: kernels::Scene = {
-            let [texels, texels_1, texels_2, texels_3] = planned.filled_parts(commands, "texels", geometry.texel_parts())?;
+            let [texels, texels_1, texels_2, texels_3] = planned.filled_parts(commands, scene::TEXELS, geometry.texel_parts())?;
             kernels::Scene {
-            nodes: planned.filled(commands, "nodes", &geometry.nodes)?,
-            triangles: planned.filled(commands, "triangles", &geometry.triangles)?,
-            planes: planned.filled(commands, "planes", &geometry.plane_words())?,
-            normals: planned.filled(commands, "normals", &geometry.normals)?,
-            uvs: planned.filled(commands, "texture coordinates", &geometry.uvs)?,
-            colours: planned.filled(commands, "vertex colours", &geometry.colours)?,
-            materials: planned.filled(commands, "materials", &geometry.materials)?,
-            layered_materials: planned.filled(commands, "layered materials", &geometry.layered_materials)?,
-            triangle_layers: planned.filled(commands, "layers of triangles", &geometry.triangle_layers)?,
-            albedos: planned.filled(commands, "albedos", if plan.keeps(Effect::Layers) { &albedo::TABLE } else { &[] })?,
-            textures: planned.filled(commands, "textures", &geometry.textures)?,
+            nodes: planned.filled(commands, scene::NODES, &geometry.nodes)?,
+            triangles: planned.filled(commands, scene::TRIANGLES, &geometry.triangles)?,
+            planes: planned.filled(commands, scene::PLANES, &geometry.plane_words())?,
+            normals: planned.filled(commands, scene::NORMALS, &geometry.normals)?,
+            uvs: planned.filled(commands, scene::TEXTURE_COORDINATES, &geometry.uvs)?,
+            colours: planned.filled(commands, scene::VERTEX_COLOURS, &geometry.colours)?,
+            materials: planned.filled(commands, scene::MATERIALS, &geometry.materials)?,
+            layered_materials: planned.filled(commands, scene::LAYERED_MATERIALS, &geometry.layered_materials)?,
+            triangle_layers: planned.filled(commands, scene::LAYERS_OF_TRIANGLES, &geometry.triangle_layers)?,
+            albedos: planned.filled(commands, scene::ALBEDOS, if plan.keeps(Effect::Layers) { &albedo::TABLE } else { &[] })?,
+            textures: planned.filled(commands, scene::TEXTURES, &geometry.textures)?,
             texels,
             texels_1,
             texels_2,
             texels_3,
-            emitters: planned.filled(commands, "emitters", plan.lights().map_or(&geometry.emitters, |lights| &lights.emitters))?,
-            caustic_targets: planned.filled(commands, "caustic targets", &plan.targets)?,
-            light_nodes: planned.filled(commands, "light nodes", plan.lights().map_or(&[], |lights| &lights.nodes))?,
-            light_regions: planned.filled(commands, "light regions", plan.lights().map_or(&[], |lights| &lights.regions))?,
-            openings: planned.filled(commands, "openings", &plan.openings())?,
-            light_shares: planned.filled(commands, "light shares", &plan.lights().map_or_else(Vec::new, LightChoice::words))?,
+            emitters: planned.filled(commands, scene::EMITTERS, plan.lights().map_or(&geometry.emitters, |lights| &lights.emitters))?,
+            caustic_targets: planned.filled(commands, scene::CAUSTIC_TARGETS, &plan.targets)?,
+            light_nodes: planned.filled(commands, scene::LIGHT_NODES, plan.lights().map_or(&[], |lights| &lights.nodes))?,
+            light_regions: planned.filled(commands, scene::LIGHT_REGIONS, plan.lights().map_or(&[], |lights| &lights.regions))?,
+            openings: planned.filled(commands, scene::OPENINGS, &plan.openings())?,
+            light_shares: planned.filled(commands, scene::LIGHT_SHARES, &plan.lights().map_or_else(Vec::new, LightChoice::words))?,
             }
         },
         /// Points of all phases; empty for a picture.
         receivers: Vec<Buffer<Receiver>> =
-            phases.iter().map(|phase| planned.filled(commands, "receivers", phase)).collect::<Result<_>>()?,
+            phases.iter().map(|phase| planned.filled(commands, scene::RECEIVERS, phase)).collect::<Result<_>>()?,
         // Photons of the chunk under way.
         photons: Option<PhotonBuffers> = plan.maps().next().map(|_| PhotonBuffers::made(planned, commands, plan)).transpose()?,
         // What the sensor sees in the round under way.
-        visible_points: Buffer<VisiblePoint> = planned.one("visible points")?,
+        visible_points: Buffer<VisiblePoint> = planned.one(scene::VISIBLE_POINTS)?,
         /// Written once.
-        extra_samples: Buffer<u32> = planned.filled(commands, "extra samples", &plan.extra_samples.table)?,
-        matt_lobes: Buffer<MattLobes> = planned.one("matt lobes")?,
-        matt_covers: Buffer<MattCover> = planned.one("matt covers")?,
-        pass_sums: Buffer<u64> = planned.one("pass sums")?,
+        extra_samples: Buffer<u32> = planned.filled(commands, scene::EXTRA_SAMPLES, &plan.extra_samples.table)?,
+        matt_lobes: Buffer<MattLobes> = planned.one(scene::MATT_LOBES)?,
+        matt_covers: Buffer<MattCover> = planned.one(scene::MATT_COVERS)?,
+        pass_sums: Buffer<u64> = planned.one(scene::PASS_SUMS)?,
         /// Camera paths that one dispatch leaves to the next, which leaves its own in the other; and how many.
-        camera_paths: [Buffer<CameraPath>; 2] = planned.several("camera paths")?,
-        camera_path_counts: Buffer<u32> = planned.one("camera path counts")?,
-        estimates: Buffer<u64> = planned.one("estimates")?,
+        camera_paths: [Buffer<CameraPath>; 2] = planned.several(scene::CAMERA_PATHS)?,
+        camera_path_counts: Buffer<u32> = planned.one(scene::CAMERA_PATH_COUNTS)?,
+        estimates: Buffer<u64> = planned.one(scene::ESTIMATES)?,
         /// Found in the first round.
-        radius_classes: Buffer<u32> = planned.one("radius classes")?,
-        clearances: Buffer<f32> = planned.one("clearances")?,
-        class_counts: Buffer<u32> = planned.zeroed(commands, "class counts")?,
+        radius_classes: Buffer<u32> = planned.one(scene::RADIUS_CLASSES)?,
+        clearances: Buffer<f32> = planned.one(scene::CLEARANCES)?,
         /// Of the round under way.
-        disc_cuts: Buffer<[u32; 4]> = planned.one("disc cuts")?,
-        /// Of the block under way.
-        sums_of_block: Buffer<u64> = planned.zeroed(commands, "block sums")?,
-        surface_sums_of_block: Buffer<u64> = planned.zeroed(commands, "surface block sums")?,
-        // All rounds.
-        film_sums: Buffer<u64> = planned.zeroed(commands, "film sums")?,
-        film_squares: Buffer<u64> = planned.zeroed(commands, "film squares")?,
-        /// Of light that surfaces scatter; of a picture.
-        surface_sums: Buffer<u64> = planned.zeroed(commands, "surface sums")?,
-        surface_squares: Buffer<u64> = planned.zeroed(commands, "surface squares")?,
+        disc_cuts: Buffer<[u32; 4]> = planned.one(scene::DISC_CUTS)?,
         /// Within a smaller radius.
-        near_sums: Buffer<u64> = planned.one("near sums")?,
-        differences: Buffer<u64> = planned.zeroed(commands, "differences")?,
-        latest_blocks: Buffer<f32> = planned.zeroed(commands, "latest blocks")?,
-        /// What is known of pixels that some kind of light has not reached; see `glsl/world/scene/one_hit.glsl`.
-        one_hits: Buffer<u32> = planned.zeroed(commands, "one hits")?,
-        part_totals: Buffer<u64> = planned.zeroed(commands, "part totals")?,
-        part_sums: Buffer<u64> = planned.zeroed(commands, "part sums")?,
-        anomalies: Buffer<u32> = planned.zeroed(commands, "anomalies")?,
-        /// What the latest whole block left of the last three.
-        of_blocks: CountsOfBlocks = CountsOfBlocks::made(planned)?,
-        nonfinite_values: Buffer<u32> = planned.zeroed(commands, "nonfinite values")?,
+        near_sums: Buffer<u64> = planned.one(scene::NEAR_SUMS)?,
+        film: FilmBuffers = FilmBuffers::made(planned, commands)?,
+        nonfinite_values: Buffer<u32> = planned.zeroed(commands, NONFINITE_VALUES)?,
     }
 }
 
@@ -107,46 +91,37 @@ buffers! {
     /// Photons in flight and their map; both maps of a round use the same ones in turn.
     pub struct PhotonBuffers(planned: &Planned, commands: &mut Commands, plan: &ScenePlan) {
         /// Paths entering even bounces and odd bounces.
-        paths: [Buffer<LightPath>; 2] = [planned.one("even light paths")?, planned.one("odd light paths")?],
-        map: Buffer<MapPhoton> = planned.one("map")?,
-        sorted_map: Buffer<MapPhoton> = planned.one("sorted map")?,
+        paths: [Buffer<LightPath>; 2] = [planned.one(scene::EVEN_LIGHT_PATHS)?, planned.one(scene::ODD_LIGHT_PATHS)?],
+        map: Buffer<MapPhoton> = planned.one(scene::MAP)?,
+        sorted_map: Buffer<MapPhoton> = planned.one(scene::SORTED_MAP)?,
         /// Length of the map, then the paths entering each bounce.
-        counters: Buffer<u32> = planned.one("counters")?,
-        dispatch_args: Buffer<DispatchArgs> = planned.one("dispatch args")?,
+        counters: Buffer<u32> = planned.one(scene::COUNTERS)?,
+        dispatch_args: Buffer<DispatchArgs> = planned.one(scene::DISPATCH_ARGS)?,
         /// Photons in each bucket; after their prefix sums the first photon of each, and behind the last the number of all.
-        cells: Buffer<u32> = planned.one("cells")?,
+        cells: Buffer<u32> = planned.one(scene::CELLS)?,
         /// Place of each photon among those of its bucket.
-        ranks: Buffer<u32> = planned.one("ranks")?,
-        block_sums: Vec<Buffer<u32>> = planned.all("sums of cells")?,
+        ranks: Buffer<u32> = planned.one(scene::RANKS)?,
+        block_sums: Vec<Buffer<u32>> = planned.all(scene::SUMS_OF_CELLS)?,
         /// Points with so many candidates that several invocations share them: how many, the most candidates, and each one
         /// with its candidates.
-        crowded: Buffer<u32> = planned.one("crowded points")?,
+        crowded: Buffer<u32> = planned.one(scene::CROWDED_POINTS)?,
         /// What keeps photons in order; `None` where they come as they do.
         order: Option<OrderBuffers> = (plan.builder() == Builder::Scan).then(|| OrderBuffers::made(planned)).transpose()?,
         /// Fates of the submission under way, one tally a bounce: of the global map's photons, and of the
         /// caustic map's.
-        tallies: [Buffer<Tally>; 2] = [planned.zeroed(commands, "global tallies")?, planned.zeroed(commands, "caustic tallies")?],
+        tallies: [Buffer<Tally>; 2] = [planned.zeroed(commands, scene::GLOBAL_TALLIES)?, planned.zeroed(commands, scene::CAUSTIC_TALLIES)?],
         /// Photons stored and what limits cost, of each map.
-        totals: [Buffer<u32>; 2] = [planned.zeroed(commands, "global totals")?, planned.zeroed(commands, "caustic totals")?],
+        totals: [Buffer<u32>; 2] = [planned.zeroed(commands, scene::GLOBAL_TOTALS)?, planned.zeroed(commands, scene::CAUSTIC_TOTALS)?],
         /// Both as the latest whole block left them.
-        tallies_of_blocks: [Buffer<Tally>; 2] = [planned.zeroed(commands, "global tallies of blocks")?, planned.zeroed(commands, "caustic tallies of blocks")?],
-        totals_of_blocks: [Buffer<u32>; 2] = [planned.zeroed(commands, "global totals of blocks")?, planned.zeroed(commands, "caustic totals of blocks")?],
-    }
-}
-
-buffers! {
-    /// Counts as the latest whole block left them: a block that is cut short leaves nothing in the result.
-    pub struct CountsOfBlocks(planned: &Planned) {
-        one_hits: Buffer<u32> = planned.one("one hits of blocks")?,
-        part_totals: Buffer<u64> = planned.one("part totals of blocks")?,
-        anomalies: Buffer<u32> = planned.one("anomalies of blocks")?,
+        tallies_of_blocks: [Buffer<Tally>; 2] = [planned.zeroed(commands, scene::GLOBAL_TALLIES_OF_BLOCKS)?, planned.zeroed(commands, scene::CAUSTIC_TALLIES_OF_BLOCKS)?],
+        totals_of_blocks: [Buffer<u32>; 2] = [planned.zeroed(commands, scene::GLOBAL_TOTALS_OF_BLOCKS)?, planned.zeroed(commands, scene::CAUSTIC_TOTALS_OF_BLOCKS)?],
     }
 }
 
 buffers! {
     /// Survivors of a bounce, for prefix sums over them.
     pub struct OrderBuffers(planned: &Planned) {
-        survivors: Buffer<u32> = planned.one("survivors")?,
-        block_sums: Vec<Buffer<u32>> = planned.all("sums of survivors")?,
+        survivors: Buffer<u32> = planned.one(scene::SURVIVORS)?,
+        block_sums: Vec<Buffer<u32>> = planned.all(scene::SUMS_OF_SURVIVORS)?,
     }
 }

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use super::resources::SceneResources;
 use super::{Round, View, constants, light_trial, modules, points, trace, trial_rays};
 use crate::engine;
-use crate::engine::bias_batches;
+use crate::engine::error::bias_batches;
 use crate::error::Result;
 use crate::gpu::kernels::{Clearance, TrialRays};
 use crate::gpu::{Commands, Extent, Gpu, Kernel, Memory};
@@ -27,10 +27,10 @@ use crate::plan::light_choice::LightChoice;
 use crate::plan::radius::{RadiusFrom, Trial, TrialPhotons, TrialRadius, area_radius};
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
-use crate::records::{ClearancePush, VisiblePoint};
-use crate::scene::Scene;
+use crate::records::{ClearancePush, Receiver, VisiblePoint};
 use crate::scene::light_tree::{self, LightTree};
 use crate::scene::openings::openings;
+use crate::scene::{Camera, Scene};
 use crate::settings::scene::{Part, SceneSettings};
 use crate::settings::stop::Stop;
 
@@ -77,37 +77,13 @@ pub fn find(gpu: &Gpu, scene: &Scene, view: &View, settings: &SceneSettings, sen
 }
 
 fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, lights: Option<LightTree>, limits: &Limits) -> Result<Trial> {
-    let settings = SceneSettings {
-        photons: PHOTONS,
-        caustic_photons: PHOTONS,
-        rounds: 1,
-        seed: bias_batches::seed(SEED, 0),
-        // Radii and lights are those of places, whatever the paths there.
-        samples: 1,
-        tiles: None,
-        // Parts of a picture have the radii and lights of the whole, so that they add up to it.
-        part: Part::All,
-        stop: Stop::default(),
-        ..run.settings.clone()
-    };
-    // Of the whole too.
+    let settings = settings_of_trial(&run.settings);
+    // Parts of a picture have the points of the whole.
     let points_per_path = match run.settings.part {
         Part::All => run.points_per_path,
         _ => ScenePlan::new(scene, view.geometry, &settings, run.sensor, limits)?.points_per_path,
     };
-    let most_points = POINTS / points_per_path;
-    let (sensor, phases) = match run.sensor {
-        Sensor::Picture { width, height } => {
-            let smaller = (f64::from(most_points) / (f64::from(width) * f64::from(height))).sqrt().min(1.0);
-            let length = |length: u32| ((f64::from(length) * smaller) as u32).max(1);
-            (Sensor::Picture { width: length(width), height: length(height) }, Vec::new())
-        }
-        Sensor::Receivers { .. } => {
-            let all = &view.phases[0];
-            let some: Vec<_> = all.iter().step_by(all.len().div_ceil(most_points as usize)).copied().collect();
-            (Sensor::Receivers { count: some.len() as u32 }, vec![some])
-        }
-    };
+    let (sensor, phases) = few_points(view, run.sensor, POINTS / points_per_path);
     let by_power =
         lights.clone().map(|lights| Trial { lights: Some(Arc::new(LightChoice::by_power(view.geometry, lights))), ..Trial::default() });
     let plan = ScenePlan::with_trial(scene, view.geometry, &settings, sensor, limits, by_power)?;
@@ -123,21 +99,10 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, lights: Option<Li
     let mut commands = Commands::new(gpu, constants(&plan), began)?;
     let resources = SceneResources::new(gpu, &mut commands, view.geometry, &plan, &phases)?;
     let round = Round { resources: &resources, geometry: view.geometry, plan: &plan, number: 0 };
-    points::see(&mut commands, round, view.camera)?;
-    let point_count = plan.visible_points();
-    let clearances = gpu.buffer::<f32>("clearances", u64::from(point_count), Memory::Device)?;
-    let SceneResources { scene, visible_points, .. } = &resources;
-    let kernel = Clearance { scene, visible_points, clearances: &clearances };
-    commands.dispatch(
-        kernel,
-        &ClearancePush { first_point: 0, end_point: point_count, rank: MEDIAN },
-        Extent::Items(u64::from(point_count)),
-    )?;
-    let visible_points = commands.read(visible_points, point_count as usize)?;
-    let clearances = commands.read(&clearances, point_count as usize)?;
+    let seen = see(gpu, &mut commands, round, view.camera)?;
 
     let mut trial = Trial::default();
-    let points = light_trial::points(&phases, &visible_points, &view.geometry.planes);
+    let points = light_trial::points(&phases, &seen.points, &view.geometry.planes);
     let rays = if casts_rays { trial_rays::cast(gpu, &mut commands, round, &points)? } else { Vec::new() };
     if !plan.openings().is_empty() {
         trial.openings = openings(&rays);
@@ -151,35 +116,92 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, lights: Option<Li
         commands.upload(&resources.scene.emitters, &lights.emitters)?;
         trial.lights = Some(Arc::new(lights));
     }
+    find_radii(&mut commands, round, run, &seen, &mut trial)?;
+    gpu.check_validation()?;
+    trial.seconds = began.elapsed().as_secs_f64();
+    Ok(trial)
+}
+
+fn settings_of_trial(of_run: &SceneSettings) -> SceneSettings {
+    SceneSettings {
+        photons: PHOTONS,
+        caustic_photons: PHOTONS,
+        rounds: 1,
+        seed: bias_batches::seed(SEED, 0),
+        // Radii and lights are those of places, whatever the paths there.
+        samples: 1,
+        tiles: None,
+        // Parts of a picture have the radii and lights of the whole, so that they add up to it.
+        part: Part::All,
+        stop: Stop::default(),
+        ..of_run.clone()
+    }
+}
+
+/// What sees at most so many points of those that a run asks about, evenly spread: a smaller picture, or some of the receivers.
+fn few_points(view: &View, sensor: Sensor, most: u32) -> (Sensor, Vec<Vec<Receiver>>) {
+    match sensor {
+        Sensor::Picture { width, height } => {
+            let smaller = (f64::from(most) / (f64::from(width) * f64::from(height))).sqrt().min(1.0);
+            let length = |length: u32| ((f64::from(length) * smaller) as u32).max(1);
+            (Sensor::Picture { width: length(width), height: length(height) }, Vec::new())
+        }
+        Sensor::Receivers { .. } => {
+            let all = &view.phases[0];
+            let some: Vec<_> = all.iter().step_by(all.len().div_ceil(most as usize)).copied().collect();
+            (Sensor::Receivers { count: some.len() as u32 }, vec![some])
+        }
+    }
+}
+
+/// The points of a trial, and how far it is from each to the next wall.
+struct Seen {
+    points: Vec<VisiblePoint>,
+    clearances: Vec<f32>,
+}
+
+fn see(gpu: &Gpu, commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Result<Seen> {
+    points::see(commands, round, camera)?;
+    let count = round.plan.visible_points();
+    let clearances = gpu.buffer::<f32>("clearances", u64::from(count), Memory::Device)?;
+    let SceneResources { scene, visible_points, .. } = round.resources;
+    let kernel = Clearance { scene, visible_points, clearances: &clearances };
+    commands.dispatch(kernel, &ClearancePush { first_point: 0, end_point: count, rank: MEDIAN }, Extent::Items(u64::from(count)))?;
+    Ok(Seen { points: commands.read(visible_points, count as usize)?, clearances: commands.read(&clearances, count as usize)? })
+}
+
+/// Traces photons of each map of the run whose radius is not given, and finds the radius at the points that look that map up.
+fn find_radii(commands: &mut Commands, round: Round, run: &ScenePlan, seen: &Seen, trial: &mut Trial) -> Result<()> {
+    let planes = &round.geometry.planes;
     let mut largest = 0.0;
     for of_run in run.maps() {
-        let Some(map) = plan.maps().find(|map| map.caustic_only == of_run.caustic_only) else { continue };
-        let asked: Vec<usize> = (0..visible_points.len()).filter(|point| visible_points[*point].arrivals & map.stored != 0).collect();
+        let which = usize::from(of_run.caustic_only);
+        let Some(map) = round.plan.maps().find(|map| map.caustic_only == of_run.caustic_only) else { continue };
+        let (asked, clear): (Vec<&VisiblePoint>, Vec<f64>) = seen
+            .points
+            .iter()
+            .zip(&seen.clearances)
+            .filter(|(point, _)| point.arrivals & map.stored != 0)
+            .map(|(point, clear)| (point, f64::from(*clear)))
+            .unzip();
         trial.points = trial.points.max(asked.len() as u32);
         if of_run.radius_from == RadiusFrom::User || asked.is_empty() {
             continue;
         }
-        let found = trace::stored(&mut commands, round, map)?;
-        let own: Vec<f64> = asked
-            .par_iter()
-            .map(|point| own_radius(&visible_points[*point], &found, &view.geometry.planes, of_run.photons, of_run.neighbours))
-            .collect();
-        let clear: Vec<f64> = asked.iter().map(|point| f64::from(clearances[*point])).collect();
+        let found = trace::stored(commands, round, map)?;
+        let own: Vec<f64> = asked.par_iter().map(|point| own_radius(point, &found, planes, of_run.photons, of_run.neighbours)).collect();
         let neighbours = if map.caustic_only { run.settings.caustic_neighbours } else { run.settings.neighbours };
-        let by_area = area_radius(view.geometry, of_run.photons, neighbours, map.caustic_only);
-        let reach = reach(&own, &clear, by_area);
+        let reach = reach(&own, &clear, area_radius(round.geometry, of_run.photons, neighbours, map.caustic_only));
         let radius = reach.radius();
         *(if map.caustic_only { &mut trial.caustic_radius } else { &mut trial.global_radius }) = Some(radius);
-        trial.reach[usize::from(map.caustic_only)] = reach;
-        trial.photons[usize::from(map.caustic_only)] = TrialPhotons::some_of(found);
+        trial.reach[which] = reach;
+        trial.photons[which] = TrialPhotons::some_of(found);
         if radius > largest {
             largest = radius;
             trial.too_wide = clear.iter().filter(|clear| **clear < radius).count() as f64 / clear.len() as f64;
         }
     }
-    gpu.check_validation()?;
-    trial.seconds = began.elapsed().as_secs_f64();
-    Ok(trial)
+    Ok(())
 }
 
 /// The radius around a point within which a round of so many photons is to leave `wanted`; infinite where too few photons are

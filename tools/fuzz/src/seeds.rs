@@ -9,7 +9,7 @@ use glam::Vec3;
 use photonmill::constants::{HIT_KINDS, RADIUS_CLASSES};
 use photonmill::engine::Control;
 use photonmill::engine::blocks::{Blocks, Share};
-use photonmill::engine::differences::Differences;
+use photonmill::engine::error::differences::Differences;
 use photonmill::engine::film::{BlockSums, KeptBlock, LatestBlocks};
 use photonmill::engine::identity::{Hash, Identity};
 use photonmill::engine::room;

@@ -5,8 +5,8 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use super::RunResult;
 use super::identity::Identity;
-use super::run::RunResult;
 use super::saved::SavedRun;
 use super::several_devices::{NOTED_EVERY, Outcome, Together, Work};
 use super::watch::{Control, Keep, Later, SaveRun};

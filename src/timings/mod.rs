@@ -1,10 +1,15 @@
 //! Timings as nested scopes, each with its time on the device, on the host, or both.
 
+mod host_clock;
+mod spread;
+
 use std::collections::HashMap;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
+pub use host_clock::HostClock;
 use serde::Serialize;
+pub use spread::Spread;
 
 /// One line of the timing table: everything that ran under one name.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -133,78 +138,5 @@ impl Timings {
     /// Milliseconds of a scope on the device, else on the host's clock.
     pub fn best_ms(&self, name: &str) -> Option<f64> {
         self.row(name).and_then(|row| row.gpu_ms.or(row.wall_ms))
-    }
-}
-
-/// Median and extremes of repeated runs.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Spread {
-    pub median: f64,
-    pub min: f64,
-    pub max: f64,
-    pub repeats: usize,
-}
-
-impl Spread {
-    /// `None` for no value at all.
-    pub fn of(mut values: Vec<f64>) -> Option<Spread> {
-        values.sort_by(f64::total_cmp);
-        let (min, max) = (*values.first()?, *values.last()?);
-        let middle = values.len() / 2;
-        let median = if values.len() % 2 == 1 { values[middle] } else { 0.5 * (values[middle - 1] + values[middle]) };
-        Some(Spread { median, min, max, repeats: values.len() })
-    }
-}
-
-/// Times nested scopes on the host's clock.
-pub struct HostClock {
-    started: Instant,
-    /// Name of the whole, and of the scopes that are open.
-    whole: &'static str,
-    open: Vec<String>,
-    timings: Timings,
-}
-
-impl HostClock {
-    /// `whole` names the row that spans everything.
-    pub fn start(whole: &'static str) -> HostClock {
-        let mut timings = Timings::default();
-        timings.count(whole);
-        HostClock { started: Instant::now(), whole, open: Vec::new(), timings }
-    }
-
-    /// The zero of all times.
-    pub fn started(&self) -> Instant {
-        self.started
-    }
-
-    pub fn time<T>(&mut self, name: &str, body: impl FnOnce(&mut Self) -> T) -> T {
-        let path = self.open.last().map_or_else(|| name.to_owned(), |outer| format!("{outer}/{name}"));
-        self.timings.count(&path);
-        self.open.push(path);
-        let begin = Instant::now();
-        let result = body(self);
-        let (start, duration) = (begin.duration_since(self.started), begin.elapsed());
-        let name = self.open.pop().expect("pushed above");
-        self.timings.add(Span::of_host(&name, start, duration));
-        result
-    }
-
-    pub fn finish(mut self) -> Timings {
-        self.timings.add(Span::of_host(self.whole, Duration::ZERO, self.started.elapsed()));
-        self.timings
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_median_stands_between_the_extremes() {
-        let spread = |values: &[f64]| Spread::of(values.to_vec());
-        assert_eq!(spread(&[]), None);
-        assert_eq!(spread(&[3.0, 9.0, 1.0]), Some(Spread { median: 3.0, min: 1.0, max: 9.0, repeats: 3 }));
-        assert_eq!(spread(&[4.0, 2.0]), Some(Spread { median: 3.0, min: 2.0, max: 4.0, repeats: 2 }));
     }
 }

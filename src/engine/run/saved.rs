@@ -4,11 +4,11 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::blocks::{Blocks, Share};
-use super::differences::Differences;
-use super::film::{BlockSums, KeptBlock, LatestBlocks, TooLarge};
 use super::identity::Identity;
-use super::room::film::RoomFilm;
-use super::scene::film::SceneFilm;
+use crate::engine::error::differences::Differences;
+use crate::engine::film::{BlockSums, KeptBlock, LatestBlocks, TooLarge};
+use crate::engine::room::film::RoomFilm;
+use crate::engine::scene::film::SceneFilm;
 use crate::ledger::Fates;
 use crate::plan::buffers::PART_VALUES;
 use crate::plan::differences::difference_count;

@@ -12,13 +12,13 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use super::RunResult;
 use super::blocks::Dealer;
-use super::error_bound::FilmError;
 use super::identity::Identity;
-use super::nonfinite_values::NonfiniteValues;
-use super::run::RunResult;
 use super::saved::{SavedFilm, SavedRun};
 use super::watch::{Control, End, Keep, Later, Progress, SaveRun, Watch, looks};
+use crate::engine::error::bound::FilmError;
+use crate::engine::nonfinite_values::NonfiniteValues;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::ledger::{Fates, Ledger, Losses};

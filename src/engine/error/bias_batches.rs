@@ -5,8 +5,8 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use super::bias::{Bias, BiasFrom, Groups, SMALLER};
-use super::watch::{Control, End};
-use crate::engine::measure_of_error::ErrorMeasure;
+use crate::engine::error::measure::ErrorMeasure;
+use crate::engine::run::watch::{Control, End};
 use crate::error::Result;
 use crate::settings::stop::{Measure, Stop};
 

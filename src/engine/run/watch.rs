@@ -5,11 +5,11 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
-use super::bias::Bias;
 use super::blocks::{Dealer, Share};
-use super::error_bound::{FilmError, bound_of_both, error_bound};
 use super::identity::Identity;
 use super::saved::SavedRun;
+use crate::engine::error::bias::Bias;
+use crate::engine::error::bound::{FilmError, bound_of_both, error_bound};
 use crate::error::{Error, Result, require};
 use crate::ledger::{Ledger, Losses};
 use crate::plan::radius::mean_squared_radius;
