@@ -236,7 +236,7 @@ const FAULTS: [Fault; 143] = [
         file: "builder/persistent.glsl", from: "bounce = first_bounce();", to: "bounce = first_bounce() + 1;",
         kernels: &["trace_persistent_scene"], noticed_by: &[(APPENDS, OtherSums)] },
     Fault { what: "a slot of a scene in which nothing landed is taken for a photon",
-        file: "kernels/map_count.comp", from: "is_there = place.w != NONE;", to: "is_there = true;",
+        file: "kernels/map_count.comp", from: "!HAS_SLOTS || place.w != NONE", to: "true",
         kernels: &["map_count"], noticed_by: &[(APPENDS, OtherSums)] },
     Fault { what: "a scene's photon of a later bounce takes the slot of an earlier one",
         file: "world/scene/bounce.glsl", from: "push.list * photon_count + index", to: "(push.list % 2u) * photon_count + index",
@@ -557,8 +557,12 @@ const FAULTS: [Fault; 143] = [
         kernels: &["view"], noticed_by: &[(LAYER_TEXTURES, TooBright)] },
     Fault { what: "unlit surfaces are lit",
         file: "material/bsdf.glsl",
-        from: "        lobes.matt.diffuse = vec3(0.0);\n",
-        to: "",
+        from: " && !layers.is_unlit;\n    lobes.base.film.is_matt = uint(is_in_map);\n    \
+            lobes.matt.f0 = is_in_map ? lobes.base.f0 : vec3(0.0);\n    lobes.matt.f90 = is_in_map ? lobes.base.f90 : 0.0;\n    \
+            if (layers.is_unlit) {\n",
+        to: ";\n    lobes.base.film.is_matt = uint(is_in_map);\n    \
+            lobes.matt.f0 = is_in_map ? lobes.base.f0 : vec3(0.0);\n    lobes.matt.f90 = is_in_map ? lobes.base.f90 : 0.0;\n    \
+            if (false) {\n",
         kernels: &["view"], noticed_by: &[(LAYER_TEXTURES, TooBright)] },
     Fault { what: "panes pass light in the gaps of alpha, too",
         file: "material/bsdf.glsl", from: "passing += layers.coverage * below", to: "passing += below",

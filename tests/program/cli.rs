@@ -59,7 +59,7 @@ fn bad_input_is_refused_in_one_line() {
         ("--confidence", "10%, 0.95%, -5%", "50 %"),
         ("--confidence", "0.95", "did you mean 95% or 0.95%?"),
         ("--time", "0s, -1m, 0.1ms", "1ms"),
-        ("--total-photons", "0, 00", "from 1"),
+        ("--total-photons", "0, 00", "must be 1 or more"),
         ("--gather kdtree --nearest", "1, 1025", "from 2 to 1024"),
         ("--gather kdtree --nearest", "some", "whole number"),
         ("--gather kdtree --nearest 9 --chunk", "100", "--photons 5000 or more"),
