@@ -15,7 +15,7 @@ const USUAL_TEXELS: f64 = 65_536.0;
 pub fn usual_density(scene: &Scene, name: &str) -> Result<f64> {
     let kinds = scene.lobe_kinds();
     let baked = scene.meshes.iter().filter(|mesh| kinds[mesh.material].matt);
-    let area: f64 = baked.map(|mesh| mesh.whole_area()).sum();
+    let area: f64 = baked.map(super::super::scene::mesh::Mesh::whole_area).sum();
     if area == 0.0 {
         let reason =
             "has nothing to bake: every surface is a mirror, lets light through or is unlit, or has no area; add one that scatters light";

@@ -11,7 +11,7 @@ use crate::error::Result;
 pub(super) enum Command {
     /// Measure error against time for every setting on this device, and write a page about it
     #[command(after_help = STUDY, mut_arg("scene", |argument| argument.help(study::scene_help())))]
-    Study(study::StudyArgs),
+    Study(Box<study::StudyArgs>),
     /// Measure the speed of every pass against the limits of the device
     #[command(after_help = BENCH)]
     Bench(bench::BenchArgs),

@@ -86,7 +86,7 @@ fn argument(row: &'static Row, command: u32) -> Arg {
 
 fn parser(row: &'static Row) -> ValueParser {
     match row.form() {
-        Form::File => value_parser!(PathBuf).into(),
+        Form::File => value_parser!(PathBuf),
         Form::Choice(choices) => {
             let value = |(name, meaning): &(&'static str, &'static str)| {
                 let value = PossibleValue::new(*name);

@@ -210,7 +210,7 @@ fn row(effect: Effect) -> Row {
         Effect::Environment => Row {
             constant: Some("HAS_ENVIRONMENT"),
             needed: |facts| facts.lights(&[EMITTER_ENVIRONMENT], "environment light"),
-            remove: |scene| remove_lights(scene, |kind| kind.is_environment()),
+            remove: |scene| remove_lights(scene, LightKind::is_environment),
             cost: of_openings,
             ..PLAIN
         },

@@ -40,7 +40,6 @@ pub struct Image {
     pub scene_hash: String,
     /// Whether the scene is what the request names, so that the request makes the image again.
     is_of_request: bool,
-    denoiser: Option<Arc<Denoiser>>,
     /// The blocks that a resumed run began with have others between them that were not done, up to so many.
     blocks_with_gaps: u32,
 }
@@ -65,7 +64,7 @@ impl Inputs<'_> {
     /// For an image: keeps the parts of each pixel's light apart where they are shown, but not of a run that goes on with one that has none.
     /// Fails where the image is to be denoised and cannot be.
     pub fn for_image(mut self, shows_parts: bool, resumed: Option<&SavedRun>) -> Result<Self> {
-        self.denoiser = self.request.denoise.then(|| denoise::open(&self.settings, resumed).map(Arc::new)).transpose()?;
+        self.denoiser = self.request.denoise.then(|| denoise::open(&self.settings, resumed)).transpose()?;
         self.settings.keeps_parts = (shows_parts || self.request.denoise) && resumed.is_none_or(SavedRun::has_parts);
         Ok(self)
     }
@@ -84,7 +83,6 @@ impl Prepared<'_> {
             size: self.size(),
             scene_hash: self.scene_hash(),
             is_of_request: true,
-            denoiser: self.inputs.denoiser.clone(),
             blocks_with_gaps,
         })
     }
@@ -138,9 +136,13 @@ impl Image {
         let show = show(style, self.size);
         let film = &self.run.film;
         let has_layers = format == Format::Exr && show.shows_surfaces();
-        let surfaces = if has_layers || self.denoiser.is_some() { self.surfaces() } else { Vec::new() };
-        let denoised = self
-            .denoiser
+        // It was there before the run; its device belongs to one thread.
+        let denoiser = self.request.denoise.then(Denoiser::open).transpose().unwrap_or_else(|error| {
+            observer.warn(format!("{error}; the picture is as it was rendered"));
+            None
+        });
+        let surfaces = if has_layers || denoiser.is_some() { self.surfaces() } else { Vec::new() };
+        let denoised = denoiser
             .as_ref()
             .and_then(|denoiser| Some((denoised(denoiser, film, &surfaces, self.size, observer)?, denoise::name(denoiser))));
         let (denoised, denoiser) = denoised.unzip();

@@ -51,7 +51,7 @@ pub struct Inputs<'a> {
     /// What a pilot has chosen before.
     pub(super) tuned: Option<TunedSettings>,
     pub(super) save_settings: Option<Destination>,
-    pub(super) denoiser: Option<Arc<Denoiser>>,
+    pub(super) denoiser: Option<Denoiser>,
 }
 
 impl<'a> Inputs<'a> {

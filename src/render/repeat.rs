@@ -89,8 +89,11 @@ pub fn repeat<Devices: DerefMut<Target = Vec<Gpu>>>(
     let map = request.map.as_ref().map(|path| MapFile::open("map", path)).transpose()?;
     // They are the picture's own, whatever scene they were chosen for.
     let inputs = Inputs { tuned: None, ..Inputs::with(&request, map, Some(tuned))? };
-    let inputs = inputs.for_image(format == Format::Exr && show(&request, (0, 0)).layers.into_iter().any(|layer| layer.is_part()), None)?;
-    if let (Some(before), Some(now)) = (&made.denoiser, inputs.denoiser.as_deref().map(denoise::name))
+    let inputs = inputs.for_image(
+        format == Format::Exr && show(&request, (0, 0)).layers.into_iter().any(super::super::output::show::Layer::is_part),
+        None,
+    )?;
+    if let (Some(before), Some(now)) = (&made.denoiser, inputs.denoiser.as_ref().map(denoise::name))
         && *before != now
     {
         observer.warn(format!("was denoised by {before}, and now by {now}, which may leave other bits"));

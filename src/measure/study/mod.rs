@@ -311,7 +311,7 @@ impl Measuring<'_> {
                     Ok(shot) => shots[which].push((shot, began.elapsed())),
                     // What this device cannot do is no reason to end the study.
                     Err(Error::Setting { option, allowed, .. }) => {
-                        curves[which].left_out = Some(spelled(&format!("{} {allowed}", named(option)), as_option))
+                        curves[which].left_out = Some(spelled(&format!("{} {allowed}", named(option)), as_option));
                     }
                     Err(error) => return Err(error),
                 }

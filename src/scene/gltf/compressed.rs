@@ -327,7 +327,7 @@ fn plain_accessors(json: &Value) -> HashSet<usize> {
         found.extend(index(&primitive["indices"]).filter(|_| compressed.is_none()));
         let is_plain = |name: &String| compressed.is_none_or(|compressed| compressed["attributes"].get(name).is_none());
         found.extend(entries(&primitive["attributes"]).filter(|(name, _)| is_plain(name)).filter_map(|(_, accessor)| index(accessor)));
-        found.extend(items(&primitive["targets"]).flat_map(|target| entries(target)).filter_map(|(_, accessor)| index(accessor)));
+        found.extend(items(&primitive["targets"]).flat_map(entries).filter_map(|(_, accessor)| index(accessor)));
     }
     for sampler in items(&json["animations"]).flat_map(|animation| items(&animation["samplers"])) {
         found.extend(["input", "output"].iter().filter_map(|member| index(&sampler[member])));

@@ -153,10 +153,10 @@ impl Reader<'_> {
                     Parameter::Number(what, range, of) => *of(layers) = self.number(what, range, self.parsed(group, value)?)?,
                     Parameter::Colour(what, most, of) => *of(layers) = self.colour(what, self.parsed(group, value)?, most)?,
                     Parameter::NumberTexture(_, of) => {
-                        *of(layers) = self.texture(self.parsed::<Option<Info>>(group, value)?, Meaning::Numbers)?
+                        *of(layers) = self.texture(self.parsed::<Option<Info>>(group, value)?, Meaning::Numbers)?;
                     }
                     Parameter::ColourTexture(_, of) => {
-                        *of(layers) = self.texture(self.parsed::<Option<Info>>(group, value)?, Meaning::Colours)?
+                        *of(layers) = self.texture(self.parsed::<Option<Info>>(group, value)?, Meaning::Colours)?;
                     }
                     Parameter::NormalMap(_, of) => *of(layers) = self.normal_map(self.parsed::<Option<NormalTexture>>(group, value)?)?,
                 }

@@ -59,7 +59,7 @@ pub struct Film {
 
 impl Film {
     pub fn new(py: Python<'_>, scene: &str, found: Image, warnings: Vec<String>) -> PyResult<Py<Film>> {
-        let run = Run::new(py, scene, Found::Image(found), warnings)?;
+        let run = Run::new(py, scene, Found::Image(Box::new(found)), warnings)?;
         let found = run.found.clone();
         let film =
             Film { found, radiance: Pixels::new(), standard_error: Pixels::new(), parts: PyOnceLock::new(), surfaces: PyOnceLock::new() };

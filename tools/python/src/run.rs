@@ -112,7 +112,7 @@ fn progress_dict<'py>(py: Python<'py>, progress: &Progress) -> PyResult<Bound<'p
 
 /// What a call has found.
 pub enum Found {
-    Image(Image),
+    Image(Box<Image>),
     Points(render::Run),
     Lightmaps(Lightmaps),
 }
