@@ -105,7 +105,7 @@ impl PreparedScene {
         let estimates = bake::estimates(&run);
         let maps = layout.maps(&estimates, run.film.error_source());
         let stops = bake.exposure.unwrap_or_else(|| bake::usual_exposure(&estimates));
-        let is_shown = into_file.is_none() || bake.preview;
+        let (is_built_in, is_shown) = (into_file.is_none(), into_file.is_none() || bake.preview);
         let written = match (&bake.folder, into_file) {
             (Some(folder), Some(into)) => into.write(folder, &maps, bake.preview.then(|| stops.exp2())),
             (Some(folder), None) => bake::write(folder, scene, &layout, &maps, stops.exp2()).map(|()| built_in_files(&layout)),
@@ -116,7 +116,11 @@ impl PreparedScene {
             let unseen = unseen.into_iter().map(|most| most.x).collect();
             Lightmap { name: layout.objects[object].name.clone(), width, height, irradiance, standard_error: error, unseen, source }
         };
-        let files = written.iter().flatten().map(|file| file.name.clone()).collect();
+        let files = match (&bake.folder, &written) {
+            (Some(_), Ok(_)) if is_built_in => bake::names(scene, &layout),
+            (Some(_), Ok(written)) => written.iter().map(|file| file.name.clone()).collect(),
+            _ => Vec::new(),
+        };
         let maps = maps.into_iter().map(lightmap).collect();
         Ok((Lightmaps { run, maps, texels: layout.texel_count(), stops: is_shown.then_some(stops), files }, written))
     }

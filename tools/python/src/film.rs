@@ -105,7 +105,7 @@ fn tone_of(py: Python<'_>, name: &str) -> PyResult<Tone> {
 fn layers_of(py: Python<'_>, names: &[String]) -> PyResult<Vec<Layer>> {
     let known = Layer::ALL.map(Layer::name).join(", ");
     let layer = |name: &String| Layer::ALL.into_iter().find(|layer| layer.name() == name);
-    let refused = |name: &String| error::argument(py, format!("layers '{name}': must be among {known}"));
+    let refused = |name: &String| error::argument(py, format!("layers='{name}': must be among {known}"));
     names.iter().map(|name| layer(name).ok_or_else(|| refused(name))).collect()
 }
 

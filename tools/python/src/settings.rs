@@ -90,6 +90,9 @@ impl Argument<'_, '_> {
 
     fn set(&self, row: &Row, request: &mut RenderRequest) -> PyResult<()> {
         let text = self.text(row)?;
+        if text.is_empty() && matches!(row.form(), Form::Names(_)) {
+            return Ok(());
+        }
         let field = (row.of)(request);
         field.read_os(text.as_ref()).map_err(|allowed| self.refused(&allowed))?;
         // What does not fit was not taken.

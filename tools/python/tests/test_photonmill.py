@@ -101,7 +101,7 @@ def test_the_same_bits_as_the_program(spheres: pm.Scene, film: pm.Film, tmp_path
         for number, letter in enumerate("RGB"):
             np.testing.assert_array_equal(theirs[layer + letter].view(np.uint32), array[..., number].view(np.uint32))
     # Defaults and what a pilot chooses are the same, too.
-    theirs, found = run("defaults.exr", "--size", "16", "--error", "60%"), spheres.render(size=16, error=0.6)
+    theirs, found = run("defaults.exr", "--size", "16", "--error", "60%"), spheres.render(size=16, error="60%")
     for number, letter in enumerate("RGB"):
         np.testing.assert_array_equal(theirs[letter].view(np.uint32), found.radiance[..., number].view(np.uint32))
 
@@ -260,7 +260,7 @@ WRONG: list[tuple[type[Exception], str, dict[str, Any]]] = [
     (pm.ArgumentError, "size=0: must be WIDTH or WIDTHxHEIGHT", {"size": 0}),
     (pm.ArgumentError, "size=4x-4: must be", {"size": (4, -4)}),
     (TypeError, "got an unexpected keyword argument 'eror'. Did you mean 'error'?", {"eror": 0.1}),
-    (TypeError, "got an unexpected keyword argument 'xyz'; the settings are error, ", {"xyz": 0.1}),
+    (TypeError, "got an unexpected keyword argument 'xyz'; the settings are denoise, ", {"xyz": 0.1}),
     (pm.ArgumentError, "error='0.02': did you mean 2% or 0.02%?", {"error": "0.02"}),
     (TypeError, "error must be a number, or a str such as '2%', not list", {"error": [2]}),
     (TypeError, "photons must be an int, not float", {"photons": 1000.5}),
