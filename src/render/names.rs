@@ -6,6 +6,7 @@ use super::options::row;
 /// Fields that are of other requests than that of a scene, or of a command alone.
 const OTHERS: &[&str] = &[
     "atlas",
+    "budget",
     "device",
     "devices",
     "display",
@@ -20,8 +21,11 @@ const OTHERS: &[&str] = &[
     "points",
     "preview",
     "radiosity",
+    "reference_samples",
+    "repeats",
     "replay",
     "scene",
+    "side",
     "snapshot",
     "texels_per_metre",
     "validate",

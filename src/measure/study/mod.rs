@@ -95,23 +95,23 @@ impl Request {
     }
 
     pub fn validate(&self) -> Result<()> {
-        within("--side", self.size, 2..=1024, "pixels or texels along a side")?;
-        within("--photons", self.photons, 64..=1 << 28, "photons per round")?;
-        within("--rounds", self.most_rounds, 1..=MOST_ROUNDS, "rounds of the longest point")?;
-        within("--repeats", self.repeats, 2..=1000, "runs of a point, whose spread is its error")?;
-        within("--reference-samples", self.reference_samples, 16..=1 << 24, "samples per pixel")?;
-        within("--seed", self.seed, 0..=MAX_SEED, "seed of the first run")?;
+        within("side", self.size, 2..=1024, "pixels or texels along a side")?;
+        within("photons", self.photons, 64..=1 << 28, "photons per round")?;
+        within("rounds", self.most_rounds, 1..=MOST_ROUNDS, "rounds of the longest point")?;
+        within("repeats", self.repeats, 2..=1000, "runs of a point, whose spread is its error")?;
+        within("reference_samples", self.reference_samples, 16..=1 << 24, "samples per pixel")?;
+        within("seed", self.seed, 0..=MAX_SEED, "seed of the first run")?;
         let held = 3 * u64::from(self.size).pow(2) * u64::from(self.repeats);
         let most = format!(
-            "3 * side^2 * repeats is {held} numbers in memory for each setting, and {MAX_HELD} is the limit; use fewer, or a smaller --side"
+            "3 * side^2 * repeats is {held} numbers in memory for each setting, and {MAX_HELD} is the limit; use fewer, or a smaller `side`"
         );
-        require(held <= MAX_HELD, "--repeats", self.repeats, most)
+        require(held <= MAX_HELD, "repeats", self.repeats, most)
     }
 }
 
 /// A budget of so many seconds.
 pub fn budget(seconds: f64) -> Result<Duration> {
-    require((1.0..=1e6).contains(&seconds), "--budget", seconds, "must be from 1s to 1000000s")?;
+    require((1.0..=1e6).contains(&seconds), "budget", seconds, "must be from 1s to 1000000s")?;
     Ok(Duration::from_secs_f64(seconds))
 }
 

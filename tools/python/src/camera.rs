@@ -32,7 +32,7 @@ impl Camera {
         name: &str,
     ) -> PyResult<Camera> {
         let check = |is_allowed: bool, name: &str, value: String, allowed: &str| {
-            if is_allowed { Ok(()) } else { Err(error::argument(py, format!("{name} {value}: {allowed}"))) }
+            if is_allowed { Ok(()) } else { Err(error::argument(py, format!("{name}={value}: {allowed}"))) }
         };
         for (name, vector) in [("position", position), ("target", target), ("up", up)] {
             check(vector.iter().all(|value| value.abs() <= 1e15), name, format!("{vector:?}"), "must be three finite numbers, metres")?;
