@@ -9,8 +9,6 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyType};
 
-use crate::settings::keyword;
-
 create_exception!(photonmill, Error, PyException, "What went wrong, in one line: what, which value, what is allowed.");
 create_exception!(photonmill, RunWarning, PyUserWarning, "What the user should know of a scene or a run, in one line.");
 
@@ -55,6 +53,16 @@ pub fn of(py: Python<'_>, failure: &Failure) -> PyErr {
     match failure {
         Failure::Setting { .. } | Failure::DeviceAbsent { .. } => argument(py, message),
         _ => Error::new_err(message),
+    }
+}
+
+/// The keyword that stands for a field: Python has words and names of its own.
+pub fn keyword(field: &str) -> &str {
+    match field {
+        "with" => "with_",
+        "output" => "path",
+        "SCENE" => "scene",
+        other => other,
     }
 }
 

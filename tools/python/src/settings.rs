@@ -9,7 +9,7 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict};
 
-use crate::error;
+use crate::error::{self, keyword};
 
 /// Rows of other calls: those of a scene, which it is read with, and those of a picture's file, which it is written with.
 const ELSEWHERE: [&str; 11] = [
@@ -25,16 +25,6 @@ const ELSEWHERE: [&str; 11] = [
     "tone",
     "layers",
 ];
-
-/// The keyword that stands for a field: Python has words and names of its own.
-pub fn keyword(field: &str) -> &str {
-    match field {
-        "with" => "with_",
-        "output" => "path",
-        "SCENE" => "scene",
-        other => other,
-    }
-}
 
 /// The keyword arguments of a command's call.
 fn rows(command: Command) -> impl Iterator<Item = &'static Row> {
