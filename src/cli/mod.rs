@@ -1,4 +1,4 @@
-//! The command line: clap structs turned into settings, one file per subcommand. Nothing else knows clap.
+//! The command line: arguments become requests, one file per subcommand. Nothing else knows clap.
 
 mod bake;
 #[cfg(feature = "lab")]

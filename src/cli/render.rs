@@ -87,7 +87,7 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     let mut checkpoints = Checkpoints::open(request, &observer)?;
     let shows_parts = format == Some(Format::Exr) && show(request, (0, 0)).layers.into_iter().any(Layer::is_part);
     inputs = inputs.for_image(shows_parts || args.display.is_given(), checkpoints.resumed())?;
-    let files = [picture.clone(), errors.clone(), inputs.save_settings()?].into_iter().flatten().collect();
+    let files = [picture.clone(), errors.clone(), inputs.save_settings.clone()].into_iter().flatten().collect();
     let all: Vec<Destination> = [files, reports.destinations(), checkpoints.destinations()].concat();
     check_distinct(&all)?;
     checkpoints.check_not_read(&all, request.inputs())?;

@@ -329,3 +329,47 @@ impl RenderRequest {
         [self.scene.clone()].into_iter().filter(|scene| !scene.is_empty()).chain(ROWS.iter().filter_map(option)).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::image::kept;
+
+    /// A value of each row, as it is written.
+    fn sample(row: &Row) -> &'static str {
+        match (row.field, row.form()) {
+            ("environment", _) => "1,2,0.5",
+            ("size", _) => "64x48",
+            ("shard", _) => "2/3",
+            ("layers", _) => "direct,depth",
+            ("shininess", _) => "1,2,3,4,5",
+            ("threads", _) => "3",
+            (_, Form::Flag | Form::Switch) => "on",
+            (_, Form::Integer) => "7",
+            (_, Form::Number) => "0.25",
+            (_, Form::Percent) => "2%",
+            (_, Form::Time) => "1.5s",
+            (_, Form::Text | Form::Other | Form::File) => "name",
+            (_, Form::Numbers(2)) => "10,20",
+            (_, Form::Numbers(_)) => "1,-2,0.5",
+            (_, Form::Choice(choices)) => choices[0].0,
+            (_, Form::Names(names)) => names[3],
+        }
+    }
+
+    #[test]
+    fn every_value_is_read_as_it_is_written() {
+        for row in ROWS {
+            let mut request = RenderRequest::of("scene.glb");
+            assert_eq!(row.text(&request), None, "{}", row.field);
+            (row.of)(&mut request).read(sample(row)).unwrap_or_else(|reason| panic!("{}: {reason}", row.field));
+            assert_eq!(row.text(&request).as_deref(), Some(sample(row)), "{}", row.field);
+            // Metadata keep what decides the picture, and give it back.
+            let words = kept(&request).words();
+            assert_eq!(words.len() == 2, row.decides == Decides::Picture, "{words:?}");
+            assert_eq!(RenderRequest::of_words(&words), Ok(kept(&request)), "{words:?}");
+        }
+        let given = |name: &&str| *name == "output" || row(name).is_some();
+        assert!(ROWS.iter().all(|row| row.requires.iter().chain(row.conflicts).all(|name| given(&name))));
+    }
+}

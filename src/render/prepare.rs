@@ -50,7 +50,8 @@ pub struct Inputs<'a> {
     pub(super) map: Option<MapFile>,
     /// What a pilot has chosen before.
     pub(super) tuned: Option<TunedSettings>,
-    pub(super) save_settings: Option<Destination>,
+    /// Where the settings go that a pilot chooses.
+    pub save_settings: Option<Destination>,
     pub(super) denoiser: Option<Denoiser>,
 }
 
@@ -74,19 +75,13 @@ impl<'a> Inputs<'a> {
             None => settings,
         };
         settings.validate()?;
-        Ok(Inputs { request, settings, map, tuned, save_settings: None, denoiser: None })
+        let save_settings = request.save_settings.as_ref().map(|path| Destination::open("save_settings", path)).transpose()?;
+        Ok(Inputs { request, settings, map, tuned, save_settings, denoiser: None })
     }
 
     /// For an image of which nothing says when it ends: an error ends it, or the time that suits the device.
     pub fn ended(self, kind: &str) -> Inputs<'a> {
         Inputs { settings: self.request.ended(self.settings, kind), ..self }
-    }
-
-    /// Where the settings go that a pilot chooses.
-    pub fn save_settings(&mut self) -> Result<Option<Destination>> {
-        let path = self.request.save_settings.as_ref();
-        self.save_settings = path.map(|path| Destination::open("save_settings", path)).transpose()?;
-        Ok(self.save_settings.clone())
     }
 }
 
@@ -144,9 +139,10 @@ pub fn prepare<'a>(inputs: Inputs<'a>, receivers: Receivers, observer: &Observer
 }
 
 impl PreparedScene {
-    /// Makes ready what a request asks of this scene, whatever scene it names.
+    /// Makes ready what a request asks of this scene, whatever the scene's name in it. Refuses another light than the scene was read with.
     pub fn prepare<'a>(&self, inputs: Inputs<'a>, receivers: Receivers, observer: &Observer) -> Result<Prepared<'a>> {
         let (request, settings) = (inputs.request, &inputs.settings);
+        self.check_read_as(request)?;
         // Photons of a file are those of the scene alone.
         let scene = match receivers {
             Receivers::Points(points) if inputs.map.is_none() => match with_sensors(&self.scene, points, settings) {

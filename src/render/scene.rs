@@ -4,8 +4,9 @@ use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
 use super::events::{Event, Observer};
+use super::options::row;
 use super::request::RenderRequest;
-use crate::error::{Result, require};
+use crate::error::{Error, Result, require};
 use crate::scene::geometry::Geometry;
 use crate::scene::{Scene, built_in};
 use crate::settings::scene::Effect;
@@ -65,18 +66,30 @@ impl PreparedScene {
 
     /// A request with the scene as this one was read; `None` where no request reads it.
     pub(super) fn asked(&self, request: &RenderRequest) -> Option<RenderRequest> {
-        self.read_as.as_ref().map(|read_as| RenderRequest {
-            scene: read_as.scene.clone(),
-            radiometric: read_as.radiometric,
-            at: read_as.at,
-            environment: read_as.environment.clone(),
-            sun: read_as.sun,
-            environment_rotate: read_as.environment_rotate,
-            environment_strength: read_as.environment_strength,
-            ..request.clone()
-        })
+        let read_as = self.read_as.as_ref()?;
+        let mut asked = RenderRequest { scene: read_as.scene.clone(), ..request.clone() };
+        for row in READ_WITH.iter().filter_map(|field| row(field)) {
+            if let Some(text) = row.text(read_as) {
+                (row.of)(&mut asked).read(&text).expect("a value is read as it is written");
+            }
+        }
+        Some(asked)
+    }
+
+    /// Refuses what only a scene that is read anew can have.
+    pub(super) fn check_read_as(&self, request: &RenderRequest) -> Result<()> {
+        for row in READ_WITH.iter().filter_map(|field| row(field)) {
+            let (asked, own) = (row.text(request), self.read_as.as_ref().and_then(|read_as| row.text(read_as)));
+            if let Some(value) = asked.filter(|_| row.text(request) != own) {
+                return Err(Error::setting(row.field, value, "is not what this scene was read with; read it anew with this request"));
+            }
+        }
+        Ok(())
     }
 }
+
+/// Fields that a scene is read with.
+pub const READ_WITH: [&str; 6] = ["radiometric", "at", "environment", "sun", "environment_rotate", "environment_strength"];
 
 /// The geometry that is left of a scene without some effects.
 pub(super) fn geometry(scene: &Scene, without: &[Effect], observer: &Observer) -> Result<Geometry> {
@@ -94,5 +107,26 @@ pub fn stages<'a>(what: &'a str, observer: &'a Observer) -> impl FnMut(&'static 
         if reported.replace(step) != Some(step) {
             observer.tell(Event::Status(&format!("{what}: {stage}, {} %", 10 * step.1)));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::{Inputs, Receivers};
+    use crate::scene::surroundings::Environment;
+
+    /// It would be as if it had not been asked for.
+    #[test]
+    fn a_scene_is_not_lit_anew_by_a_later_request() {
+        let scene = PreparedScene::open("sky-over-plane").unwrap();
+        let prepared = |request: &RenderRequest| {
+            let inputs = Inputs::open(request).unwrap();
+            scene.prepare(inputs, Receivers::Image(None), &Observer::default()).map(|prepared| prepared.size())
+        };
+        assert_eq!(prepared(&RenderRequest::default()).unwrap(), (640, 480));
+        let other = RenderRequest { environment: Some(Environment::Colour([2.0; 3])), ..RenderRequest::default() };
+        let refused = prepared(&other).unwrap_err().to_string();
+        assert!(refused.starts_with("`environment` 2,2,2: is not what this scene was read with"), "{refused}");
     }
 }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use photonmill::render::options::{Command, ROWS, Row};
+use photonmill::render::scene::READ_WITH;
 use photonmill::render::values::Form;
 use photonmill::render::{Percent, RenderRequest};
 use pyo3::exceptions::PyTypeError;
@@ -11,24 +12,12 @@ use pyo3::types::{PyBool, PyDict};
 
 use crate::error::{self, keyword};
 
-/// Rows of other calls: those of a scene, which it is read with, and those of a picture's file, which it is written with.
-const ELSEWHERE: [&str; 11] = [
-    "radiometric",
-    "at",
-    "environment",
-    "sun",
-    "environment_rotate",
-    "environment_strength",
-    "camera",
-    "size",
-    "exposure",
-    "tone",
-    "layers",
-];
+/// Rows of other arguments: the camera and the size of its picture, and what a picture's file is written with.
+const ELSEWHERE: [&str; 5] = ["camera", "size", "exposure", "tone", "layers"];
 
 /// The keyword arguments of a command's call.
 fn rows(command: Command) -> impl Iterator<Item = &'static Row> {
-    ROWS.iter().filter(move |row| row.is_of(command as u32) && !ELSEWHERE.contains(&row.field))
+    ROWS.iter().filter(move |row| row.is_of(command as u32) && !ELSEWHERE.contains(&row.field) && !READ_WITH.contains(&row.field))
 }
 
 /// What is asked for.

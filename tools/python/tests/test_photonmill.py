@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import json
 import os
 import re
 import signal
@@ -349,6 +350,9 @@ def test_a_run_goes_on_from_its_checkpoint(spheres: pm.Scene, tmp_path: Path) ->
     spheres.render(rounds=8, checkpoint=tmp_path / "run.pms", **settings)
     resumed = spheres.render(rounds=16, resume=tmp_path / "run.pms", **settings)
     np.testing.assert_array_equal(whole.radiance, resumed.radiance)
+    tuned = tmp_path / "tuned.json"
+    spheres.render(error=0.5, save_settings=tuned, **(settings | {"photons": None}))
+    assert json.loads(tuned.read_text())["scene"] == "cornell-spheres"
     with pytest.raises(pm.ArgumentError, match="shard='3/2': must be K/N"):
         spheres.render(shard="3/2", checkpoint=tmp_path / "part.pms", **settings)
 
