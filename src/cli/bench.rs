@@ -7,7 +7,6 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 
 use super::progress::{ProgressArgs, ProgressReporter};
-use super::values::parse_seconds;
 use super::{DeviceArgs, End, JsonArg, optional_file, say_beside};
 use crate::error::{Result, require};
 use crate::gpu::Gpu;
@@ -25,7 +24,7 @@ pub(super) struct BenchArgs {
     #[command(flatten)]
     json: JsonArg,
     /// Start no further experiment after this time: 90s, 10m
-    #[arg(long, value_name = "TIME", value_parser = parse_seconds, allow_hyphen_values = true, default_value = "10m", help_heading = "When to stop")]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, default_value = "10m", help_heading = "When to stop")]
     time: Seconds,
     /// Run only these experiments, separated by commas: open-box, builders, table-1, index, gather, cornell, mesh,
     /// compaction [default: all]

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::progress::{ProgressArgs, ProgressReporter};
-use super::values::{parse_integer, parse_percent, value_enum};
+use super::values::{parse_integer, value_enum};
 use super::{JsonOrStdoutArg, complain, optional_file, say_beside};
 use crate::error::{Error, Result, require, within};
 use crate::output::destination::{Destination, check_distinct, check_not_read, write_all};
@@ -45,7 +45,7 @@ pub(super) struct CompareArgs {
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Checks")]
     error_blocks: Option<u32>,
     /// End with exit code 1 if the RMSE is above so many per cent of the reference's mean
-    #[arg(long, value_name = "PERCENT", value_parser = parse_percent, allow_hyphen_values = true, help_heading = "Checks")]
+    #[arg(long, value_name = "PERCENT", allow_hyphen_values = true, help_heading = "Checks")]
     fail_above: Option<Percent>,
     #[command(flatten)]
     progress: ProgressArgs,

@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use clap::Args;
 
 use super::progress::{ProgressArgs, ProgressReporter};
-use super::values::{parse_integer, parse_percent, parse_seconds};
+use super::values::parse_integer;
 use super::{DeviceArgs, End, complain, say};
 use crate::error::{Result, require, within};
 use crate::gpu::Gpu;
@@ -24,10 +24,10 @@ pub(super) struct GalleryArgs {
     #[arg(long, value_name = "WIDTH", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Scene")]
     size: Option<u32>,
     /// End each picture at this error [default: 1%; 5% on a CPU]
-    #[arg(long, value_name = "ERROR", value_parser = parse_percent, allow_hyphen_values = true, help_heading = "When to stop")]
+    #[arg(long, value_name = "ERROR", allow_hyphen_values = true, help_heading = "When to stop")]
     error: Option<Percent>,
     /// End each picture after this time, if the error is not reached before [default: 5s; 30s on a CPU]
-    #[arg(long, value_name = "TIME", value_parser = parse_seconds, allow_hyphen_values = true, help_heading = "When to stop")]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, help_heading = "When to stop")]
     time: Option<Seconds>,
     #[command(flatten)]
     progress: ProgressArgs,

@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use clap::Args;
 
 use super::progress::{ProgressArgs, ProgressReporter};
-use super::values::{parse_integer, parse_seconds, parse_threads};
+use super::values::{parse_integer, parse_threads};
 use super::{DeviceArgs, End, complain, say};
 use crate::error::{Error, Result, require};
 use crate::measure::paper::bench::Bench;
@@ -28,7 +28,7 @@ pub(super) struct PaperArgs {
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, default_value = "7", help_heading = "Measurements")]
     repeats: u32,
     /// Leave out rows of table 1 that would take longer than this
-    #[arg(long, value_name = "TIME", value_parser = parse_seconds, allow_hyphen_values = true, default_value = "90s", help_heading = "Measurements")]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, default_value = "90s", help_heading = "Measurements")]
     longest: Seconds,
     /// Also measure the CPU builder on this many threads, or on `all` [default: only on one]
     #[arg(long, value_name = "N|all", value_parser = parse_threads, allow_hyphen_values = true, help_heading = "Implementation")]

@@ -67,8 +67,6 @@ pub(super) struct ProgressReporter {
     is_verbose: bool,
     /// Whether what a pilot chooses is explained.
     explains: bool,
-    /// What progress is counted in.
-    unit: &'static str,
     started: Instant,
 }
 
@@ -124,28 +122,13 @@ impl ProgressReporter {
             });
             (end, thread)
         });
-        ProgressReporter {
-            form,
-            status,
-            ticker: RefCell::new(ticker),
-            is_verbose: args.verbose,
-            explains: false,
-            unit: "round",
-            started: Instant::now(),
-        }
+        ProgressReporter { form, status, ticker: RefCell::new(ticker), is_verbose: args.verbose, explains: false, started: Instant::now() }
     }
 
     /// The same of a command that explains, where asked.
     pub(super) fn explaining(args: &MessageArgs) -> ProgressReporter {
         let mut reporter = ProgressReporter::new(&args.progress);
         reporter.explains = args.explains();
-        reporter
-    }
-
-    /// The same of a run whose progress is counted in photons.
-    pub(super) fn in_photons(args: &ProgressArgs) -> ProgressReporter {
-        let mut reporter = ProgressReporter::new(args);
-        reporter.unit = "photon";
         reporter
     }
 
@@ -163,7 +146,7 @@ impl ProgressReporter {
                     spell(&scene_report::pilot_table(pilot, stop, point)).lines().for_each(|line| self.note(line));
                 }
             }
-            Event::Progress(progress) => self.report(progress, self.unit),
+            Event::Progress(progress, unit) => self.report(progress, unit),
             Event::Interruptible(is_so) => set_interruptible(is_so),
         }
     }

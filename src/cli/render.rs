@@ -11,7 +11,7 @@ use super::display::{DisplayArgs, EVERY};
 use super::options::{DevicesOfRunArgs, ReportArgs};
 use super::progress::{MessageArgs, ProgressReporter};
 use super::request::{RENDER, RequestArgs};
-use super::values::{parse_integer, parse_photon_name, parse_seconds};
+use super::values::{parse_integer, parse_photon_name};
 use super::{End, complain, optional_file, say, say_beside};
 use crate::engine;
 use crate::engine::replay::PhotonName;
@@ -35,7 +35,7 @@ pub(super) struct RenderArgs {
     #[arg(short, long, alias = "out", value_name = "FILE", required_unless_present_any = ["replay", "shard", "save_settings"], help_heading = "Output")]
     output: Option<PathBuf>,
     /// Also write the picture so far at this interval: 10s, 5m
-    #[arg(long, value_name = "TIME", value_parser = parse_seconds, allow_hyphen_values = true, requires = "output", help_heading = "Output")]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, requires = "output", help_heading = "Output")]
     snapshot: Option<Seconds>,
     #[command(flatten)]
     display: DisplayArgs,

@@ -71,7 +71,7 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
     if let Some(name) = args.replay {
         return show_photon(args, &settings, &scene, name);
     }
-    let reporter = ProgressReporter::in_photons(&args.progress);
+    let reporter = ProgressReporter::new(&args.progress);
     let tell = |event: Event| reporter.event(event);
     let observer = Observer { cancelled, tell: &tell };
     let mut checkpoints = Checkpoints::open(request, &observer)?;

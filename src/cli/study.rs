@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::request::{RequestArgs, STUDY};
-use super::values::{parse_integer, parse_seconds, parse_within};
+use super::values::{parse_integer, parse_within};
 use super::{DeviceArgs, End, complain, help, say};
 use crate::error::Result;
 use crate::gpu::Gpu;
@@ -25,7 +25,7 @@ pub(super) struct StudyArgs {
     #[command(flatten)]
     request: RequestArgs<STUDY>,
     /// Time of all measurements together, without a path-traced reference: 90s, 10m
-    #[arg(long, value_name = "TIME", value_parser = parse_seconds, allow_hyphen_values = true, default_value = "4m", help_heading = "When to stop")]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, default_value = "4m", help_heading = "When to stop")]
     budget: Seconds,
     /// Runs of every setting and number of rounds; their spread gives the confidence intervals
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, default_value = "5", help_heading = "Measurements")]

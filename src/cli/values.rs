@@ -6,9 +6,7 @@ use std::str::FromStr;
 
 use crate::engine::replay::PhotonName;
 use crate::gpu::LEAST_MEMORY;
-use crate::render::values::{Threads, Value};
-pub(super) use crate::render::values::{parse_integer, parse_number};
-use crate::render::{Percent, Seconds, Stops};
+pub(super) use crate::render::values::{parse_integer, parse_number, parse_stops, parse_threads};
 
 type Parsed<T> = Result<T, String>;
 
@@ -27,27 +25,6 @@ macro_rules! value_enum {
 }
 
 pub(super) use value_enum;
-
-/// What reads the values of a type.
-fn parse<T>(text: &str) -> Parsed<T>
-where
-    Option<T>: Value,
-{
-    let mut value = None;
-    value.read(text).map(|()| value.expect("it was read"))
-}
-
-pub(super) fn parse_percent(text: &str) -> Parsed<Percent> {
-    parse(text)
-}
-
-pub(super) fn parse_seconds(text: &str) -> Parsed<Seconds> {
-    parse(text)
-}
-
-pub(super) fn parse_stops(text: &str) -> Parsed<Stops> {
-    parse(text)
-}
 
 /// A whole number within a range.
 pub(super) fn parse_within<T>(allowed: RangeInclusive<T>) -> impl Fn(&str) -> Parsed<T> + Clone + Send + Sync
@@ -68,10 +45,6 @@ pub(super) fn parse_bytes(text: &str) -> Parsed<u64> {
     let allowed = format!("must be from {}M to 900000T, as bytes or with K, M, G or T behind the number: 512M, 2G", LEAST_MEMORY >> 20);
     let bytes = number.trim().parse::<f64>().ok().map(|number| number * (1u64 << bits) as f64);
     bytes.filter(|bytes| (LEAST_MEMORY as f64..1e18).contains(bytes)).map(|bytes| bytes as u64).ok_or(allowed)
-}
-
-pub(super) fn parse_threads(text: &str) -> Parsed<Threads> {
-    parse(text)
 }
 
 /// `3:4711`, `3:4711:caustic`.

@@ -8,7 +8,6 @@ use glam::DVec3;
 
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::request::{RequestArgs, VIEW};
-use super::values::{parse_percent, parse_seconds};
 use super::{DeviceArgs, End};
 use crate::error::{Error, Result};
 use crate::render::options::ROWS;
@@ -33,10 +32,10 @@ pub(super) struct ViewArgs {
     #[command(flatten)]
     request: RequestArgs<VIEW>,
     /// Error at which a picture ends that R renders [default: 2 %, or a time that suits the device]
-    #[arg(long, value_name = "PERCENT", value_parser = parse_percent, allow_hyphen_values = true, help_heading = "When to stop")]
+    #[arg(long, value_name = "PERCENT", allow_hyphen_values = true, help_heading = "When to stop")]
     error: Option<Percent>,
     /// Time after which it ends: 30s, 5m
-    #[arg(long, value_name = "TIME", value_parser = parse_seconds, allow_hyphen_values = true, help_heading = "When to stop")]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, help_heading = "When to stop")]
     time: Option<Seconds>,
     #[command(flatten)]
     progress: ProgressArgs,

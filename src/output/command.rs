@@ -4,7 +4,7 @@
 use std::fmt::Display;
 
 use crate::settings::scene::{Effect, SceneSettings};
-use crate::settings::{Gather, Preset, RoomSettings};
+use crate::settings::{Preset, RoomSettings};
 
 struct Line(String);
 
@@ -28,10 +28,6 @@ impl Line {
 /// Options are spelt as the names of the enums' values.
 pub fn lower_case(value: impl std::fmt::Debug) -> String {
     format!("{value:?}").to_lowercase()
-}
-
-pub fn gather_name(gather: Gather) -> String {
-    lower_case(gather)
 }
 
 fn switch(on: bool) -> &'static str {

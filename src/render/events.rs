@@ -22,7 +22,8 @@ pub enum Event<'a> {
     Step(&'a str),
     /// What a pilot has chosen, for a run with these goals; and whether it is of a pixel, a texel or a point.
     Pilot(&'a Pilot, &'a Stop, &'static str),
-    Progress(&'a Progress),
+    /// How far a run has come, in rounds or photons.
+    Progress(&'a Progress, &'static str),
     /// From now on `cancelled` is looked at, or no longer.
     Interruptible(bool),
 }

@@ -47,7 +47,7 @@ impl Prepared<'_> {
         let mut file = output.stage()?;
         let unwritten = |error: std::io::Error| output.failed(&error);
         let mut writer = MapWriter::new(file.file(), &scene.name, geometry, &plan, &gpu.facts().label()).map_err(unwritten)?;
-        let mut progress = |progress: &engine::Progress| observer.tell(Event::Progress(progress));
+        let mut progress = |progress: &engine::Progress| observer.tell(Event::Progress(progress, "round"));
         let mut control = Control { cancelled: observer.cancelled, progress: &mut progress, keep: Keep::default() };
         let mut once = |gpu: &Gpu| fill(gpu, geometry, &plan_of(gpu)?, &mut writer, &unwritten, &mut control);
         let filled = observer.interruptible(|| until_done(gpu, &observer.failed(), &mut once));

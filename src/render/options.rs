@@ -369,7 +369,7 @@ mod tests {
             assert_eq!(words.len() == 2, row.decides == Decides::Picture, "{words:?}");
             assert_eq!(RenderRequest::of_words(&words), Ok(kept(&request)), "{words:?}");
         }
-        let given = |name: &&str| *name == "output" || row(name).is_some();
-        assert!(ROWS.iter().all(|row| row.requires.iter().chain(row.conflicts).all(|name| given(&name))));
+        let given = |name: &&'static str| *name == "output" || row(name).is_some();
+        assert!(ROWS.iter().all(|row| row.requires.iter().chain(row.conflicts).all(given)));
     }
 }

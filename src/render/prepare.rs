@@ -278,12 +278,6 @@ impl Prepared<'_> {
         settings
     }
 
-    /// What will be traced, before it is.
-    fn announce(&self, plan: &ScenePlan, observer: &Observer) {
-        let line = scene_report::plan_line(plan, &self.scene.name, self.geometry.unit, self.point, self.inputs.map.is_some());
-        observer.tell(Event::Note(&line));
-    }
-
     /// Chooses settings by a pilot and radii by a trial round, runs all rounds, and measures the bias where that is asked for.
     pub fn run(&self, gpus: &mut Vec<Gpu>, checkpoints: &mut Checkpoints, observer: &Observer) -> Result<Run> {
         let started = Instant::now();
@@ -302,7 +296,9 @@ impl Prepared<'_> {
         if let Some(warning) = scene_report::radius_warning(&plan, &self.geometry, self.point) {
             observer.warn(warning);
         }
-        self.announce(&plan, observer);
+        let is_of_file = map.is_some();
+        let line = scene_report::plan_line(&plan, &self.scene.name, self.geometry.unit, self.point, is_of_file);
+        observer.tell(Event::Note(&line));
         bias::check(&settings.stop, plan.film.bias)?;
         // The error asked for is noise and bias together, so what blocks do not tell must be known beforehand.
         let takes_extra_runs = self.inputs.request.bias && plan.film.bias == BiasPlan::ExtraRuns;
@@ -318,7 +314,7 @@ impl Prepared<'_> {
         observer.tell(Event::Status("making the pipelines"));
         let keep = checkpoints.keep(&self.scene.name);
         let mut control =
-            Control { cancelled: observer.cancelled, progress: &mut |progress| observer.tell(Event::Progress(progress)), keep };
+            Control { cancelled: observer.cancelled, progress: &mut |progress| observer.tell(Event::Progress(progress, "round")), keep };
         let light = || light_on(gpus, (&self.scene, &view), &plan, map, &observer.failed(), &mut control);
         let mut result = observer.interruptible(light)?;
         if result.is_cancelled() {

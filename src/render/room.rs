@@ -111,7 +111,7 @@ impl PreparedRoom<'_> {
         settings.stop.bias = before.map(|bias| bias.upper);
         observer.tell(Event::Status("making the pipelines"));
         let keep = checkpoints.keep("open-box");
-        let mut control = Control { cancelled, progress: &mut |progress| observer.tell(Event::Progress(progress)), keep };
+        let mut control = Control { cancelled, progress: &mut |progress| observer.tell(Event::Progress(progress, "photon")), keep };
         let mut result = match gpus.len() {
             0 => room::run(None, scene, &settings, &mut control)?,
             _ => light(gpus, scene, &settings, observer, &mut control)?,

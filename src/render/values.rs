@@ -362,7 +362,7 @@ fn parse_shininess(text: &str) -> Parsed<Shininess> {
     }
 }
 
-fn parse_threads(text: &str) -> Parsed<Threads> {
+pub fn parse_threads(text: &str) -> Parsed<Threads> {
     if text == "all" {
         return Ok(Threads(std::thread::available_parallelism().map_or(1, usize::from)));
     }

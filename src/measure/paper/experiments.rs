@@ -144,7 +144,7 @@ impl Case {
             "{} photons, {bounces} bounces, {}, {} gather",
             words::count(u64::from(*photons)),
             implementation.name(),
-            command::gather_name(*gather)
+            command::lower_case(*gather)
         )
     }
 }
@@ -264,7 +264,7 @@ pub fn totals(bench: &mut Bench, found: &mut Reproduction) -> Result<()> {
                 words::count(settings.total_photons()),
                 counted(rounds, "round"),
                 words::count(u64::from(photons)),
-                command::gather_name(gather)
+                command::lower_case(gather)
             );
             bench.begin(&title)?;
             if let Some(predicted_ms) = a_round.map(|ms| ms * f64::from(rounds)).filter(|ms| *ms > found.request.longest_ms) {

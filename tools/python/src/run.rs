@@ -91,7 +91,7 @@ pub fn on_devices<T: Send>(
     beside_python(py, &tell, |cancelled, tell| {
         let (warnings, tell) = (RefCell::new(Vec::new()), RefCell::new(tell));
         let event = |event: Event| match event {
-            Event::Progress(progress) => (tell.borrow_mut())(progress.clone()),
+            Event::Progress(progress, _) => (tell.borrow_mut())(progress.clone()),
             Event::Warning(text) | Event::Remark(text) => warnings.borrow_mut().push(text.to_owned()),
             _ => {}
         };
