@@ -23,6 +23,8 @@ struct GoOnPush {
 
 layout(push_constant, scalar) uniform Push { GoOnPush push; };
 
+// Paths may start at receivers.
+const bool HAS_RECEIVERS = true;
 #include "world/scene/camera_kernel.glsl"
 
 layout(set = 1, binding = 11, scalar) readonly buffer CameraPaths { CameraPath camera_paths[]; };

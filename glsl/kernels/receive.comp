@@ -28,6 +28,8 @@ struct ReceivePush {
 layout(push_constant, scalar) uniform Push { ReceivePush push; };
 layout(set = 1, binding = 12, scalar) readonly buffer Receivers { Receiver receivers[]; };
 
+// Paths may start at receivers.
+const bool HAS_RECEIVERS = true;
 #include "world/scene/camera_kernel.glsl"
 #include "world/scene/box_walk.glsl"
 #include "world/scene/off_walls.glsl"

@@ -40,6 +40,8 @@ struct ViewPush {
 
 layout(push_constant, scalar) uniform Push { ViewPush push; };
 
+// Paths may start at receivers.
+const bool HAS_RECEIVERS = false;
 #include "world/scene/camera_kernel.glsl"
 #include "world/scene/extra_samples.glsl"
 #include "world/scene/seen_sky.glsl"

@@ -176,6 +176,14 @@ impl Material {
         Material { surface: Surface::Layered, layers, ..Material::lambert(name, base_colour) }
     }
 
+    /// Whether a layered one is the same as [`Surface::Lambert`], which costs less: it has the diffuse lobe alone, on both sides (the eye
+    /// does not see the back of a layered surface that has one side).
+    pub fn is_lambertian(&self) -> bool {
+        let Layers { metallic, specular, transmission, diffuse_transmission, coat, sheen_colour, iridescence, is_unlit, .. } = self.layers;
+        let is_diffuse = [metallic, specular, transmission, diffuse_transmission, coat, iridescence] == [0.0; 6] && sheen_colour == Vec3::ZERO;
+        is_diffuse && !is_unlit && self.two_sided && self.coverage == Coverage::Whole && self.normal_map.is_none()
+    }
+
     /// What lies behind the surface, of a solid that light enters.
     pub fn enclosed_medium(&self) -> Option<Medium> {
         self.layers.medium.filter(|_| self.transmits())

@@ -65,9 +65,25 @@ void start_chain(vec3 position, vec3 direction, vec3 weight)
     ways_left = 0;
 }
 
+// Constants say which roles the paths of a kernel may have, so that what belongs to others takes no place in it.
 bool has_gathered()
 {
-    return chain.role >= ROLE_GATHER;
+    return (HAS_RECEIVERS || GATHER_RAYS != GATHER_NONE) && chain.role >= ROLE_GATHER;
+}
+
+bool gathers_in_air()
+{
+    return HAS_RECEIVERS && chain.role == ROLE_GATHER_IN_AIR;
+}
+
+bool is_other_way()
+{
+    return HAS_SPECULAR_CHAINS && chain.role == ROLE_OTHER_WAY;
+}
+
+bool ends_at_light()
+{
+    return HAS_LAYERS && chain.role == ROLE_TO_LIGHT;
 }
 
 // The part of the picture that light of the current vertex belongs to, when it arrived in this way.
@@ -95,7 +111,7 @@ void add_light(vec3 radiance)
 // Whether the eye's ray has met nothing but gaps so far.
 bool is_straight()
 {
-    return !chain.saw_specular && !has_gathered() && chain.role != ROLE_TO_LIGHT;
+    return !chain.saw_specular && !has_gathered() && !ends_at_light();
 }
 
 // What shines by itself at the next vertex. Seen straight it is no light of surfaces.
@@ -218,7 +234,7 @@ struct Vertex {
 // The eye does not see the back of what has one side.
 bool is_culled(Vertex at)
 {
-    return at.is_layered && !at.surface.scatters && chain.role <= ROLE_OTHER_WAY;
+    return at.is_layered && !at.surface.scatters && !has_gathered() && !ends_at_light();
 }
 
 #include "world/scene/other_ways.glsl"
@@ -229,6 +245,20 @@ uint block_at(uint depth)
     return 1 + VERTEX_BLOCKS * depth;
 }
 
+// Samples where the path goes on.
+void sample_way(inout Vertex at, Draws draws, uint depth)
+{
+    vec3 u = stratified_at(own.number, own.pixel, block_at(depth), draws).zxy;
+    at.scatter = sample_surface(at.surface, at.lobes, at.wo, u, depth, true);
+    at.is_smooth = at.scatter.is_specular && at.scatter.density == 0.0;
+    at.chance = chain.chance;
+    if (follows_other_ways(depth) && !is_culled(at)) {
+        at.chance *= leave_other_ways(at, u.x, depth);
+    }
+}
+
+// Of a layered surface the lobe that is sampled says what it is to this path. All others are sampled only once the path leaves them
+// (leave_surface()): few do, and what is sampled would wait in registers for the shadow rays.
 Vertex vertex_at(Hit hit, Draws draws, uint depth)
 {
     Vertex at;
@@ -245,13 +275,10 @@ Vertex vertex_at(Hit hit, Draws draws, uint depth)
         }
         at.lobes = lobes_at(at.surface, at.wo, chain.media, channel, depth);
         at.matt = matt_chance(at.lobes, at.surface.layers);
-    }
-    vec3 u = stratified_at(own.number, own.pixel, block_at(depth), draws).zxy;
-    at.scatter = sample_surface(at.surface, at.lobes, at.wo, u, depth, true);
-    at.is_smooth = at.scatter.is_specular && at.scatter.density == 0.0;
-    at.chance = chain.chance;
-    if (follows_other_ways(depth) && !is_culled(at)) {
-        at.chance *= leave_other_ways(at, u.x, depth);
+        sample_way(at, draws, depth);
+    } else {
+        at.scatter.passes = false;
+        at.scatter.is_specular = at.is_smooth = is_specular(at.surface);
     }
     return at;
 }
@@ -274,7 +301,7 @@ bool add_direct_light(Vertex at, uint emitter_count, Draws draws, uint block)
 {
     bool wants_direct = (PARTS & part_of(ARRIVED_DIRECT)) != 0;
     chain.density = 0.0;
-    if (!HAS_SHADOW_RAYS || chain.role == ROLE_OTHER_WAY || !(at.is_layered || (!at.scatter.is_specular && wants_direct))) {
+    if (!HAS_SHADOW_RAYS || is_other_way() || !(at.is_layered || (!at.scatter.is_specular && wants_direct))) {
         return false;
     }
     vec3 scale = at.is_layered ? vec3(1.0) : at.surface.base_colour * scatter_scale(at.surface.kind, at.surface.parameter);
@@ -284,7 +311,7 @@ bool add_direct_light(Vertex at, uint emitter_count, Draws draws, uint block)
         add_light(light);
     }
     // Of what a gather ray meets the caustic map has counted the light of sharp lobes.
-    if (at.is_layered && chain.role != ROLE_GATHER) {
+    if (at.is_layered && (!has_gathered() || gathers_in_air())) {
         bool saw_specular = chain.saw_specular;
         chain.saw_specular = saw_specular || !has_gathered();
         add_light(sharp_light);
@@ -320,9 +347,36 @@ bool leave_point(Vertex at, bool for_all, uint pixel_count)
     return gathers;
 }
 
+// Leaves a visible point, and says what the path goes on for, if it does.
+bool leave_matt_lobes(Vertex at, bool asked_lights, uint pixel_count)
+{
+    if (at.matt == 0.0) {
+        return false;
+    }
+    // Where it is by chance that a path gets here, each counts for itself.
+    bool for_all = !chain.saw_specular && !has_gathered() && at.matt == 1.0;
+    if (leave_point(at, for_all, pixel_count)) {
+        chain.role = ROLE_GATHER;
+        chain.density = 0.0;
+        chain.weight *= for_all ? float(own.count) : 1.0;
+        // Shadow rays and the caustic map have counted what shines from here on.
+        chain.sees_emission = false;
+        return true;
+    }
+    if (asked_lights && at.is_layered && seeks_light()) {
+        chain.role = ROLE_TO_LIGHT;
+        chain.density = density_of_matt_lobes(at.surface, at.lobes, at.wo, at.scatter.direction);
+        return true;
+    }
+    return false;
+}
+
 // Goes on from a surface. Says whether the path does.
 bool leave_surface(Vertex at, Draws draws, uint depth)
 {
+    if (!at.is_layered) {
+        sample_way(at, draws, depth);
+    }
     Surface surface = at.surface;
     Scatter scatter = at.scatter;
     chain.chance = at.is_smooth ? at.chance : 1.0;
@@ -343,7 +397,7 @@ bool leave_surface(Vertex at, Draws draws, uint depth)
     }
     chain.weight *= scatter.weight;
     // No caustic map holds what reaches a receiver in the air over mirrors and glass.
-    chain.sees_emission = chain.sees_emission || (chain.role == ROLE_GATHER_IN_AIR && scatter.is_specular);
+    chain.sees_emission = chain.sees_emission || (gathers_in_air() && scatter.is_specular);
     chain.saw_specular = chain.saw_specular || (scatter.is_specular && !has_gathered());
     if (HAS_MEDIA && at.is_layered && surface.layers.medium != 0 && dot(scatter.direction, surface.ng) < 0.0) {
         chain.media = media_beyond(surface, chain.media);
@@ -375,42 +429,22 @@ bool step(uint pixel_count, Draws draws, uint emitter_count, uint depth)
         chain.weight *= divide(at.surface.layers.coverage, 1.0 - at.lobes.pass_chance);
     }
     bool is_unlit = at.is_layered && at.surface.layers.is_unlit;
-    if (is_unlit && chain.role <= ROLE_OTHER_WAY) {
+    if (is_unlit && !has_gathered() && !ends_at_light()) {
         add_shining(at.surface.base_colour);
     }
     see_lamp(at.surface, hit, emitter_count);
-    if (!at.surface.scatters || chain.role == ROLE_TO_LIGHT) {
+    if (!at.surface.scatters || ends_at_light()) {
         return false;
     }
     if (HAS_SEEN_LIGHT) {
         chain.met_surface = chain.met_surface || (is_straight() && !is_unlit);
     }
-    if (chain.role == ROLE_OTHER_WAY && !at.is_smooth) {
+    if (is_other_way() && !at.is_smooth) {
         return false;
     }
     bool asked_lights = add_direct_light(at, emitter_count, draws, block_at(depth) + 1);
-    if (at.scatter.is_specular) {
-        return (HAS_SPECULAR_CHAINS || has_gathered()) && leave_surface(at, draws, depth);
-    }
-    if (at.matt == 0.0) {
-        return false;
-    }
-    // Where it is by chance that a path gets here, each counts for itself.
-    bool for_all = !chain.saw_specular && !has_gathered() && at.matt == 1.0;
-    if (leave_point(at, for_all, pixel_count)) {
-        chain.role = ROLE_GATHER;
-        chain.density = 0.0;
-        chain.weight *= for_all ? float(own.count) : 1.0;
-        // Shadow rays and the caustic map have counted what shines from here on.
-        chain.sees_emission = false;
-    } else if (asked_lights && at.is_layered && seeks_light()) {
-        chain.role = ROLE_TO_LIGHT;
-        chain.density = density_of_matt_lobes(at.surface, at.lobes, at.wo, at.scatter.direction);
-    } else {
-        // Matt lobes are followed no further.
-        return false;
-    }
-    return leave_surface(at, draws, depth);
+    bool goes_on = at.scatter.is_specular ? HAS_SPECULAR_CHAINS || has_gathered() : leave_matt_lobes(at, asked_lights, pixel_count);
+    return goes_on && leave_surface(at, draws, depth);
 }
 
 // Camera paths that are under way when their dispatch ends.
@@ -464,7 +498,7 @@ void follow(uint pixel_count, Draws draws, uint emitter_count, uint depth)
         if (goes_on && depth < end) {
             continue;
         }
-        if (goes_on && (chain.role == ROLE_OTHER_WAY || end == MAX_BOUNCES)) {
+        if (goes_on && (is_other_way() || end == MAX_BOUNCES)) {
             note_cut_path(max(chain.weight.x, max(chain.weight.y, chain.weight.z)));
         } else if (goes_on) {
             put_off(depth);

@@ -101,13 +101,10 @@ impl Reader<'_> {
             layers.medium = self.medium(volume)?;
         }
         self.leave_out_of_inside(&mut layers);
-        Ok(Material {
-            emission,
-            emission_texture: self.texture(json.emissive_texture.as_ref(), Meaning::Colours)?,
-            normal_map: self.normal_map(json.normal_texture.as_ref())?,
-            layers,
-            ..read
-        })
+        let normal_map = self.normal_map(json.normal_texture.as_ref())?;
+        let emission_texture = self.texture(json.emissive_texture.as_ref(), Meaning::Colours)?;
+        let material = Material { emission, emission_texture, normal_map, layers, ..read };
+        Ok(if material.is_lambertian() { Material { surface: Surface::Lambert, ..material } } else { material })
     }
 
     /// What KHR_materials_pbrSpecularGlossiness has in place of [`METALLIC_ROUGHNESS`].
