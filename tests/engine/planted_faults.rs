@@ -569,7 +569,7 @@ const FAULTS: [Fault; 143] = [
         kernels: &["view"], noticed_by: &[(FLOOR_THROUGH_SHEETS, TooBright)] },
     Fault { what: "paths that do not pass weigh as if none did",
         file: "world/scene/camera_path.glsl",
-        from: "        chain.weight *= divide(at.surface.layers.coverage, 1.0 - at.lobes.pass_chance);\n",
+        from: "        chain.weight *= divide(vertex.surface.layers.coverage, 1.0 - vertex.lobes.pass_chance);\n",
         to: "",
         kernels: &["view"], noticed_by: &[(Of(Layers, Neither, "clear balls", |gpu| layered::clear_furnace(gpu, true)), TooDark)] },
     Fault { what: "of several sheets shadow rays count the last one",

@@ -231,10 +231,13 @@ struct Vertex {
     float chance; // chain.chance beyond
 };
 
+// Where the path of this thread is. No argument: NVIDIA's compiler copies it for each function (18 % of the time of view.comp on an H100).
+Vertex vertex;
+
 // The eye does not see the back of what has one side.
-bool is_culled(Vertex at)
+bool is_culled()
 {
-    return at.is_layered && !at.surface.scatters && !has_gathered() && !ends_at_light();
+    return vertex.is_layered && !vertex.surface.scatters && !has_gathered() && !ends_at_light();
 }
 
 #include "world/scene/other_ways.glsl"
@@ -246,88 +249,86 @@ uint block_at(uint depth)
 }
 
 // Samples where the path goes on.
-void sample_way(inout Vertex at, Draws draws, uint depth)
+void sample_way(Draws draws, uint depth)
 {
     vec3 u = stratified_at(own.number, own.pixel, block_at(depth), draws).zxy;
-    at.scatter = sample_surface(at.surface, at.lobes, at.wo, u, depth, true);
-    at.is_smooth = at.scatter.is_specular && at.scatter.density == 0.0;
-    at.chance = chain.chance;
-    if (follows_other_ways(depth) && !is_culled(at)) {
-        at.chance *= leave_other_ways(at, u.x, depth);
+    vertex.scatter = sample_surface(vertex.surface, vertex.lobes, vertex.wo, u, depth, true);
+    vertex.is_smooth = vertex.scatter.is_specular && vertex.scatter.density == 0.0;
+    vertex.chance = chain.chance;
+    if (follows_other_ways(depth) && !is_culled()) {
+        vertex.chance *= leave_other_ways(u.x, depth);
     }
 }
 
 // Of a layered surface the lobe that is sampled says what it is to this path. All others are sampled only once the path leaves them
 // (leave_surface()): few do, and what is sampled would wait in registers for the shadow rays.
-Vertex vertex_at(Hit hit, Draws draws, uint depth)
+void meet_surface(Hit hit, Draws draws, uint depth)
 {
-    Vertex at;
-    at.wo = -chain.direction;
-    at.surface = surface_at(hit, at.wo);
-    at.is_layered = has_layers(at.surface.kind);
-    at.matt = 1.0;
-    if (at.is_layered) {
+    vertex.wo = -chain.direction;
+    vertex.surface = surface_at(hit, vertex.wo);
+    vertex.is_layered = has_layers(vertex.surface.kind);
+    vertex.matt = 1.0;
+    if (vertex.is_layered) {
         uint channel = 1;
-        if (HAS_DISPERSION && is_dispersive(at.surface, chain.media)) {
+        if (HAS_DISPERSION && is_dispersive(vertex.surface, chain.media)) {
             // Once a path: of one channel it stays.
             channel = choose_channel(chain.weight, stratified_at(own.number, own.pixel, CHANNEL_BLOCK, draws).x);
             chain.weight = light_of_channel(chain.weight, channel);
         }
-        at.lobes = lobes_at(at.surface, at.wo, chain.media, channel, depth);
-        at.matt = matt_chance(at.lobes, at.surface.layers);
-        sample_way(at, draws, depth);
+        vertex.lobes = lobes_at(vertex.surface, vertex.wo, chain.media, channel, depth);
+        vertex.matt = matt_chance(vertex.lobes, vertex.surface.layers);
+        sample_way(draws, depth);
     } else {
-        at.scatter.passes = false;
-        at.scatter.is_specular = at.is_smooth = is_specular(at.surface);
+        vertex.scatter.passes = false;
+        vertex.scatter.is_specular = vertex.is_smooth = is_specular(vertex.surface);
     }
-    return at;
 }
 
 // Goes straight on as if no surface were there.
-void pass(Vertex at)
+void pass()
 {
-    if (is_culled(at)) {
+    if (is_culled()) {
         // It stops light samples.
         chain.density = 0.0;
     } else {
-        chain.weight *= at.scatter.weight;
+        chain.weight *= vertex.scatter.weight;
     }
-    chain.chance = at.chance;
-    chain.position = offset_origin(at.surface.position, at.surface.error, at.surface.ng, chain.direction);
+    chain.chance = vertex.chance;
+    chain.position = offset_origin(vertex.surface.position, vertex.surface.error, vertex.surface.ng, chain.direction);
 }
 
 // Adds direct light by shadow rays. Says whether any were asked for.
-bool add_direct_light(Vertex at, uint emitter_count, Draws draws, uint block)
+bool add_direct_light(uint emitter_count, Draws draws, uint block)
 {
     bool wants_direct = (PARTS & part_of(ARRIVED_DIRECT)) != 0;
     chain.density = 0.0;
-    if (!HAS_SHADOW_RAYS || is_other_way() || !(at.is_layered || (!at.scatter.is_specular && wants_direct))) {
+    if (!HAS_SHADOW_RAYS || is_other_way() || !(vertex.is_layered || (!vertex.scatter.is_specular && wants_direct))) {
         return false;
     }
-    vec3 scale = at.is_layered ? vec3(1.0) : at.surface.base_colour * scatter_scale(at.surface.kind, at.surface.parameter);
-    Target here = Target(at.surface, at.wo, at.lobes, chain.media, at.is_layered && seeks_light());
+    vec3 scale = vertex.is_layered ? vec3(1.0) : vertex.surface.base_colour * scatter_scale(vertex.surface.kind, vertex.surface.parameter);
+    Target here = Target(vertex.surface, vertex.wo, vertex.lobes, chain.media, vertex.is_layered && seeks_light());
     vec3 light = scale * direct_light(here, emitter_count, draws, own.pixel, own.number, block);
     if (wants_direct) {
         add_light(light);
     }
     // Of what a gather ray meets the caustic map has counted the light of sharp lobes.
-    if (at.is_layered && (!has_gathered() || gathers_in_air())) {
+    if (vertex.is_layered && (!has_gathered() || gathers_in_air())) {
         bool saw_specular = chain.saw_specular;
         chain.saw_specular = saw_specular || !has_gathered();
         add_light(sharp_light);
         chain.saw_specular = saw_specular;
-        chain.density = at.scatter.density;
-        chain.from = at.surface.position;
-        chain.from_normal = at.surface.ns;
+        chain.density = vertex.scatter.density;
+        chain.from = vertex.surface.position;
+        chain.from_normal = vertex.surface.ns;
     }
     note_shadow_rays(own.pixel, divide(chain.weight * scale, float(own.count)));
     return true;
 }
 
 // Leaves a visible point for matt lobes. Says whether a ray leaves it to gather light.
-bool leave_point(Vertex at, bool for_all, uint pixel_count)
+bool leave_point(bool for_all, uint pixel_count)
 {
-    Surface surface = at.surface;
+    Surface surface = vertex.surface;
     bool leads = !for_all || own.number == 0;
     bool gathers = leads && !has_gathered() && gathers_here(surface) && (PARTS & part_of(ARRIVED_INDIRECT)) != 0;
     uint arrivals = arrivals_wanted(gathers);
@@ -336,26 +337,26 @@ bool leave_point(Vertex at, bool for_all, uint pixel_count)
                               : SEEN | (chain.saw_specular ? SEEN_OVER_SPECULAR : 0) | (has_gathered() ? SEEN_BY_GATHER : 0)
                                     | (for_all ? SEEN_FOR_ALL : 0);
     // What light goes on to the eye.
-    vec3 scale = at.is_layered ? vec3(divide(0.31830988618379067, at.matt)) : surface.base_colour * scatter_scale(surface.kind, surface.parameter);
+    vec3 scale = vertex.is_layered ? vec3(divide(0.31830988618379067, vertex.matt)) : surface.base_colour * scatter_scale(surface.kind, surface.parameter);
     uint place = place_of_point(chain.point_count++, own.place, pixel_count);
     visible_points[place] = VisiblePoint(surface.position, surface.plane, divide(chain.weight * scale, float(own.count)),
-                                         surface.ns == surface.ng ? NONE : pack_normal(surface.ns), pack_direction(at.wo, 0), surface.parameter,
+                                         surface.ns == surface.ng ? NONE : pack_normal(surface.ns), pack_direction(vertex.wo, 0), surface.parameter,
                                          surface.kind, arrivals);
     if (HAS_LAYERS) {
-        write_matt_lobes(place, at.lobes);
+        write_matt_lobes(place, vertex.lobes);
     }
     return gathers;
 }
 
 // Leaves a visible point, and says what the path goes on for, if it does.
-bool leave_matt_lobes(Vertex at, bool asked_lights, uint pixel_count)
+bool leave_matt_lobes(bool asked_lights, uint pixel_count)
 {
-    if (at.matt == 0.0) {
+    if (vertex.matt == 0.0) {
         return false;
     }
     // Where it is by chance that a path gets here, each counts for itself.
-    bool for_all = !chain.saw_specular && !has_gathered() && at.matt == 1.0;
-    if (leave_point(at, for_all, pixel_count)) {
+    bool for_all = !chain.saw_specular && !has_gathered() && vertex.matt == 1.0;
+    if (leave_point(for_all, pixel_count)) {
         chain.role = ROLE_GATHER;
         chain.density = 0.0;
         chain.weight *= for_all ? float(own.count) : 1.0;
@@ -363,24 +364,24 @@ bool leave_matt_lobes(Vertex at, bool asked_lights, uint pixel_count)
         chain.sees_emission = false;
         return true;
     }
-    if (asked_lights && at.is_layered && seeks_light()) {
+    if (asked_lights && vertex.is_layered && seeks_light()) {
         chain.role = ROLE_TO_LIGHT;
-        chain.density = density_of_matt_lobes(at.surface, at.lobes, at.wo, at.scatter.direction);
+        chain.density = density_of_matt_lobes(vertex.surface, vertex.lobes, vertex.wo, vertex.scatter.direction);
         return true;
     }
     return false;
 }
 
 // Goes on from a surface. Says whether the path does.
-bool leave_surface(Vertex at, Draws draws, uint depth)
+bool leave_surface(Draws draws, uint depth)
 {
-    if (!at.is_layered) {
-        sample_way(at, draws, depth);
+    if (!vertex.is_layered) {
+        sample_way(draws, depth);
     }
-    Surface surface = at.surface;
-    Scatter scatter = at.scatter;
-    chain.chance = at.is_smooth ? at.chance : 1.0;
-    chain.is_smooth = chain.is_smooth && at.is_smooth;
+    Surface surface = vertex.surface;
+    Scatter scatter = vertex.scatter;
+    chain.chance = vertex.is_smooth ? vertex.chance : 1.0;
+    chain.is_smooth = chain.is_smooth && vertex.is_smooth;
     if (!scatter.alive) {
         return false;
     }
@@ -393,13 +394,13 @@ bool leave_surface(Vertex at, Draws draws, uint depth)
         scatter.weight = divide(scatter.weight, survival);
     }
     if (surface.kind == SURFACE_PAPER_PHONG) {
-        scatter.weight *= lobe_weight(surface.kind, surface.parameter, surface.ns, at.wo, scatter.direction);
+        scatter.weight *= lobe_weight(surface.kind, surface.parameter, surface.ns, vertex.wo, scatter.direction);
     }
     chain.weight *= scatter.weight;
     // No caustic map holds what reaches a receiver in the air over mirrors and glass.
     chain.sees_emission = chain.sees_emission || (gathers_in_air() && scatter.is_specular);
     chain.saw_specular = chain.saw_specular || (scatter.is_specular && !has_gathered());
-    if (HAS_MEDIA && at.is_layered && surface.layers.medium != 0 && dot(scatter.direction, surface.ng) < 0.0) {
+    if (HAS_MEDIA && vertex.is_layered && surface.layers.medium != 0 && dot(scatter.direction, surface.ng) < 0.0) {
         chain.media = media_beyond(surface, chain.media);
     }
     chain.position = offset_origin(surface.position, surface.error, surface.ng, scatter.direction);
@@ -420,31 +421,31 @@ bool step(uint pixel_count, Draws draws, uint emitter_count, uint depth)
     if (HAS_MEDIA) {
         chain.weight *= transmittance(chain.media, hit.t);
     }
-    Vertex at = vertex_at(hit, draws, depth);
-    if (is_culled(at) || at.scatter.passes) {
-        pass(at);
+    meet_surface(hit, draws, depth);
+    if (is_culled() || vertex.scatter.passes) {
+        pass();
         return true;
     }
-    if (HAS_PASSING && at.is_layered) {
-        chain.weight *= divide(at.surface.layers.coverage, 1.0 - at.lobes.pass_chance);
+    if (HAS_PASSING && vertex.is_layered) {
+        chain.weight *= divide(vertex.surface.layers.coverage, 1.0 - vertex.lobes.pass_chance);
     }
-    bool is_unlit = at.is_layered && at.surface.layers.is_unlit;
+    bool is_unlit = vertex.is_layered && vertex.surface.layers.is_unlit;
     if (is_unlit && !has_gathered() && !ends_at_light()) {
-        add_shining(at.surface.base_colour);
+        add_shining(vertex.surface.base_colour);
     }
-    see_lamp(at.surface, hit, emitter_count);
-    if (!at.surface.scatters || ends_at_light()) {
+    see_lamp(vertex.surface, hit, emitter_count);
+    if (!vertex.surface.scatters || ends_at_light()) {
         return false;
     }
     if (HAS_SEEN_LIGHT) {
         chain.met_surface = chain.met_surface || (is_straight() && !is_unlit);
     }
-    if (is_other_way() && !at.is_smooth) {
+    if (is_other_way() && !vertex.is_smooth) {
         return false;
     }
-    bool asked_lights = add_direct_light(at, emitter_count, draws, block_at(depth) + 1);
-    bool goes_on = at.scatter.is_specular ? HAS_SPECULAR_CHAINS || has_gathered() : leave_matt_lobes(at, asked_lights, pixel_count);
-    return goes_on && leave_surface(at, draws, depth);
+    bool asked_lights = add_direct_light(emitter_count, draws, block_at(depth) + 1);
+    bool goes_on = vertex.scatter.is_specular ? HAS_SPECULAR_CHAINS || has_gathered() : leave_matt_lobes(asked_lights, pixel_count);
+    return goes_on && leave_surface(draws, depth);
 }
 
 // Camera paths that are under way when their dispatch ends.

@@ -87,13 +87,13 @@ float part_at_layers(Surface surface, Lobes lobes, vec3 wo, ChosenLobe chosen, b
 }
 
 // The same at any surface, where u has chosen the lobe of the path's own way.
-float leave_other_ways(Vertex at, float u, uint depth)
+float leave_other_ways(float u, uint depth)
 {
-    if (at.is_layered) {
-        return part_at_layers(at.surface, at.lobes, at.wo, choose_lobe(at.lobes, u), at.scatter.passes, depth);
+    if (vertex.is_layered) {
+        return part_at_layers(vertex.surface, vertex.lobes, vertex.wo, choose_lobe(vertex.lobes, u), vertex.scatter.passes, depth);
     }
-    if (HAS_DIELECTRIC && at.surface.kind == SURFACE_DIELECTRIC) {
-        return part_at_glass(at.surface, at.wo, dot(at.scatter.direction, at.surface.ng) > 0.0, depth);
+    if (HAS_DIELECTRIC && vertex.surface.kind == SURFACE_DIELECTRIC) {
+        return part_at_glass(vertex.surface, vertex.wo, dot(vertex.scatter.direction, vertex.surface.ng) > 0.0, depth);
     }
     return 1.0;
 }
