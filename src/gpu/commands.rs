@@ -14,7 +14,7 @@ use super::descriptor_sets::DescriptorSets;
 use super::hazards::{Access, Hazards};
 use super::pace::Pace;
 use super::timestamps::{TimedScope, Timestamps};
-use super::{AnyBuffer, Buffer, Constants, Context, DeviceFacts, Gpu, Kernel, Memory, Work, call};
+use super::{AnyBuffer, Buffer, Constants, Context, DeviceFacts, Gpu, Kernel, Memory, Module, Work, call};
 use crate::error::{Error, Result};
 use crate::records::DispatchArgs;
 use crate::timings::{Clock, Handled, Span, Timings};
@@ -59,6 +59,8 @@ pub struct Commands<'gpu> {
     dispatch_count: u64,
     submission_count: u64,
     timings: Timings,
+    /// Of the device, before these commands.
+    pipelines_before: usize,
     context: Arc<Context>,
 }
 
@@ -122,6 +124,7 @@ impl<'gpu> Commands<'gpu> {
             dispatch_count: 0,
             submission_count: 0,
             timings: Timings::default(),
+            pipelines_before: gpu.work().pipelines,
             context: gpu.context.clone(),
         };
         commands.begin()?;
@@ -461,9 +464,18 @@ impl<'gpu> Commands<'gpu> {
         Ok(())
     }
 
-    /// The zero of all times.
-    pub fn started(&self) -> Instant {
-        self.started
+    /// Makes the pipelines of these kernels.
+    pub fn prepare(&self, modules: &[Module]) -> Result<()> {
+        self.gpu.prepare(modules, &self.constants)
+    }
+
+    /// Pipelines made so far.
+    pub fn pipelines(&self) -> usize {
+        self.gpu.work().pipelines - self.pipelines_before
+    }
+
+    pub fn gpu(&self) -> &Gpu {
+        self.gpu
     }
 
     pub fn facts(&self) -> &DeviceFacts {

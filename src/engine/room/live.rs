@@ -9,7 +9,7 @@ use super::film::{RoomFilm, estimate_walls};
 use super::on_gpu::{RoomOnGpu, constants, modules};
 use super::resources::{RoomResources, RoundBuffers};
 use super::{estimate, task};
-use crate::engine::run::{self, Run, World};
+use crate::engine::run::{self, Run};
 use crate::engine::{self, Control};
 use crate::error::Result;
 use crate::gpu::kernels::{Display, ShowRoom};
@@ -39,11 +39,11 @@ impl<'a> LiveRoom<'a> {
 
     pub fn new(gpu: &'a Gpu, scene: &'a RoomScene, plan: &'a RoomPlan, cancelled: &'a AtomicBool) -> Result<LiveRoom<'a>> {
         let modules = [modules(plan, gpu), vec![ShowRoom::MODULE, Display::MODULE]].concat();
-        let (mut commands, pipelines_before) = run::commands(gpu, &modules, constants(plan), plan.settings.math, Instant::now())?;
+        let mut commands = run::commands(gpu, &modules, constants(plan), plan.settings.math, Instant::now())?;
         let resources = commands.scope("set-up", |commands| RoomResources::new(gpu, commands, scene, plan))?;
         commands.submit()?;
-        let world = RoomOnGpu::new(scene, plan, resources);
-        let run = Run::new(world, commands, task(plan, Some((gpu, pipelines_before)), None), &mut Control::quiet(cancelled))?;
+        let world = RoomOnGpu { plan, resources };
+        let run = Run::new(world, commands, task(scene, plan), &mut Control::quiet(cancelled))?;
         Ok(LiveRoom { run, scene, plan, cancelled })
     }
 
@@ -84,17 +84,16 @@ impl<'a> LiveRoom<'a> {
 
     /// The error over the mean, as far as it is known, and the mean of the illumination.
     pub fn look(&mut self) -> Result<(f64, f64)> {
-        let found = self.film()?;
-        let noise = self.run.world.error(&found).stated().noise;
-        let walls = estimate_walls(&found, self.scene, self.plan);
+        let (film, error) = self.run.look()?;
+        let walls = estimate_walls(&film, self.scene, self.plan);
         let values: Vec<f64> = walls.iter().flat_map(|wall| wall.illumination.iter().copied()).collect();
-        Ok((noise, values.iter().sum::<f64>() / values.len().max(1) as f64))
+        Ok((error.noise, values.iter().sum::<f64>() / values.len().max(1) as f64))
     }
 
     /// Records what a camera sees of the walls.
     pub fn show(&mut self, shows: u32, mean: f64, camera: &Camera, [width, height]: [u32; 2], shown: &Buffer<Vec4>) -> Result<()> {
         let Run { world, recorder, state } = &mut self.run;
-        let RoomResources { room, rounds, .. } = world.resources();
+        let RoomResources { room, rounds, .. } = &world.resources;
         let RoundBuffers { totals: film_totals, low_squares, high_squares, .. } = rounds.as_ref().expect("a plan that is kept has them");
         let half_height = camera.half_height();
         let push = ShowRoomPush {

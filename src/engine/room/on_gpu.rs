@@ -1,34 +1,30 @@
 //! The box on the GPU.
 
-use std::cell::OnceCell;
 use std::time::Instant;
 
 use super::RunResult;
 use crate::constants::{KEPT_BLOCKS, TALLY_COPIES};
 use crate::engine;
-use crate::engine::error::bound::FilmError;
 use crate::engine::film::{KeptBlock, wide};
 use crate::engine::nonfinite_values::NonfiniteValues;
 use crate::engine::room::film::RoomFilm;
 use crate::engine::room::resources::{RoomResources, RoundBuffers};
 use crate::engine::room::{estimate, index, trace};
-use crate::engine::run::saved::SavedFilm;
+use crate::engine::run::saved::WorldFilm;
 use crate::engine::run::watch::Later;
-use crate::engine::run::{self, RunState, World};
+use crate::engine::run::{self, RunState, Task, World};
 use crate::engine::{Control, tallies};
 use crate::error::Result;
 use crate::gpu::{Commands, Constants, Gpu, Module};
-use crate::ledger::{Fates, Losses};
+use crate::ledger::Fates;
 use crate::plan::latest_blocks::kept_count;
 use crate::plan::{RoomPlan, photons_of};
 use crate::scene::room::RoomScene;
 use crate::settings::RoomSettings;
 
 pub(super) struct RoomOnGpu<'a> {
-    scene: &'a RoomScene,
-    plan: &'a RoomPlan,
-    resources: RoomResources,
-    weights: OnceCell<Vec<f64>>,
+    pub(super) plan: &'a RoomPlan,
+    pub(super) resources: RoomResources,
 }
 
 /// Runs on the GPU.
@@ -37,33 +33,22 @@ pub fn on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings, control: &m
     let plan = RoomPlan { is_kept: control.keep.is_used(), ..RoomPlan::new(scene, settings, &engine::limits(gpu.facts()))? };
     let identity = super::identity(&mut control.keep, scene, &plan, Some(gpu.facts()))?;
     estimate::check_sums(&plan, gpu.facts())?;
-    let (mut commands, pipelines_before) = run::commands(gpu, &modules(&plan, gpu), constants(&plan), settings.math, started)?;
+    let mut commands = run::commands(gpu, &modules(&plan, gpu), constants(&plan), settings.math, started)?;
     let resources = commands.scope("set-up", |commands| RoomResources::new(gpu, commands, scene, &plan))?;
     commands.warm_up()?;
     commands.submit()?;
     if let Some((_, saved)) = &control.keep.resume {
-        let SavedFilm::Room(film) = &saved.film else { unreachable!("identities of two worlds differ") };
-        restore(&mut commands, &resources, &plan, film)?;
+        restore(&mut commands, &resources, &plan, RoomFilm::of(&saved.film))?;
     }
-    let world = RoomOnGpu::new(scene, &plan, resources);
-    run::run(world, commands, &plan, super::task(&plan, Some((gpu, pipelines_before)), identity), control)
-}
-
-impl<'a> RoomOnGpu<'a> {
-    pub(super) fn new(scene: &'a RoomScene, plan: &'a RoomPlan, resources: RoomResources) -> RoomOnGpu<'a> {
-        RoomOnGpu { scene, plan, resources, weights: OnceCell::new() }
-    }
-
-    pub(super) fn resources(&self) -> &RoomResources {
-        &self.resources
-    }
+    let world = RoomOnGpu { plan: &plan, resources };
+    run::run(world, commands, &plan, Task { identity, ..super::task(scene, &plan) }, control)
 }
 
 impl<'a> World for RoomOnGpu<'a> {
     type Recorder = Commands<'a>;
     type Film = RoomFilm;
 
-    fn trace(&mut self, commands: &mut Commands<'a>, state: &mut RunState, chunk: u32) -> Result<()> {
+    fn trace(&mut self, commands: &mut Commands<'a>, state: &mut RunState<RoomFilm>, chunk: u32) -> Result<()> {
         let RoomOnGpu { resources, plan, .. } = self;
         let ranges = plan.chunk(chunk);
         trace::chunk(commands, resources, plan, state.round(), &ranges)?;
@@ -77,7 +62,7 @@ impl<'a> World for RoomOnGpu<'a> {
         commands.is_full(self.plan.pair_tests_per_submission) || commands.timestamps_left() < trace::timestamps_per_chunk(self.plan)
     }
 
-    fn end_block(&mut self, commands: &mut Commands<'a>, _: &RunState) -> Result<()> {
+    fn end_block(&mut self, commands: &mut Commands<'a>, _: &RunState<RoomFilm>) -> Result<()> {
         // Of whole rounds alone nothing else is ever read.
         if self.plan.chunks_per_round > 1 {
             let RoomResources { tallies, tallies_of_rounds, .. } = &self.resources;
@@ -86,7 +71,7 @@ impl<'a> World for RoomOnGpu<'a> {
         Ok(())
     }
 
-    fn collect(&mut self, commands: &mut Commands<'a>, state: &mut RunState) -> Result<()> {
+    fn collect(&mut self, commands: &mut Commands<'a>, state: &mut RunState<RoomFilm>) -> Result<()> {
         let RoomResources { tallies, tallies_of_rounds, .. } = &self.resources;
         let copies = (self.plan.settings.bounces * TALLY_COPIES) as usize;
         let of_rounds = commands.copy_out(tallies_of_rounds, if self.plan.chunks_per_round > 1 { copies } else { 0 })?;
@@ -99,7 +84,7 @@ impl<'a> World for RoomOnGpu<'a> {
         Ok(())
     }
 
-    fn film(&mut self, commands: &mut Commands<'a>, state: &RunState) -> Result<Later<RoomFilm>> {
+    fn film(&mut self, commands: &mut Commands<'a>, state: &RunState<RoomFilm>) -> Result<Later<RoomFilm>> {
         let RoomOnGpu { resources, plan, .. } = self;
         let mut film = RoomFilm { emitted: state.emitted(), ..RoomFilm::new(plan) };
         let count = film.sums.len();
@@ -122,14 +107,6 @@ impl<'a> World for RoomOnGpu<'a> {
             film.latest.push(KeptBlock { number: *number, values: values[*slot as usize * kept..][..kept].to_vec() });
         }
         Ok(Box::new(|| film))
-    }
-
-    fn error(&self, film: &RoomFilm) -> FilmError {
-        super::error(film, self.scene, self.plan, &self.weights)
-    }
-
-    fn losses(&self, _: &RoomFilm, fates: &[Fates]) -> Losses {
-        super::losses(self.plan, fates)
     }
 
     fn nonfinite_values(&mut self, commands: &mut Commands<'a>) -> Result<Option<NonfiniteValues>> {

@@ -50,6 +50,26 @@ pub enum NotMerged {
     TooLarge,
 }
 
+/// Of one of the two.
+pub trait WorldFilm: Clone + Into<SavedFilm> + Send + 'static {
+    /// Of what a run saved whose identity is this world's.
+    fn of(saved: &SavedFilm) -> &Self;
+}
+
+impl WorldFilm for RoomFilm {
+    fn of(saved: &SavedFilm) -> &RoomFilm {
+        let SavedFilm::Room(film) = saved else { unreachable!("identities of two worlds differ") };
+        film
+    }
+}
+
+impl WorldFilm for SceneFilm {
+    fn of(saved: &SavedFilm) -> &SceneFilm {
+        let SavedFilm::Scene(film) = saved else { unreachable!("identities of two worlds differ") };
+        film
+    }
+}
+
 impl From<RoomFilm> for SavedFilm {
     fn from(film: RoomFilm) -> SavedFilm {
         SavedFilm::Room(film)

@@ -38,7 +38,7 @@ pub fn fill(
     control: &mut Control,
 ) -> Result<Filled> {
     let started = Instant::now();
-    let (mut commands, _) = commands(gpu, &trace::modules(plan), constants(plan), plan.settings.math, started)?;
+    let mut commands = commands(gpu, &trace::modules(plan), constants(plan), plan.settings.math, started)?;
     let resources = SceneResources::new(gpu, &mut commands, geometry, plan, &[])?;
     commands.set_interrupt(Some(Interrupt { cancelled: control.cancelled, deadline: None }));
     let mut ledger = Ledger::default();

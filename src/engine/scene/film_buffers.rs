@@ -115,7 +115,13 @@ impl FilmBuffers {
 
     /// Copies the film to the host, which makes it of the copies when it is wanted: that of whole blocks, or where there is none, of all
     /// rounds; `is_cut` where the latest of these was cut short.
-    pub(super) fn read(&self, commands: &mut Commands, plan: &ScenePlan, state: &RunState, is_cut: bool) -> Result<Later<SceneFilm>> {
+    pub(super) fn read(
+        &self,
+        commands: &mut Commands,
+        plan: &ScenePlan,
+        state: &RunState<SceneFilm>,
+        is_cut: bool,
+    ) -> Result<Later<SceneFilm>> {
         let pixels = plan.sensor.pixels() as usize;
         // Where a block is whole, nothing counts of the one under way.
         let is_whole = state.blocks() > 0;

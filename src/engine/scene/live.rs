@@ -13,7 +13,7 @@ use super::resources::SceneResources;
 use crate::constants::{SHOW_ALL, SHOW_ERROR};
 use crate::engine::Control;
 use crate::engine::error::bound::FilmError;
-use crate::engine::run::{self, Run, World};
+use crate::engine::run::{self, Run};
 use crate::error::Result;
 use crate::gpu::kernels::{Display, ShowPhotons, ShowScene};
 use crate::gpu::{Buffer, Commands, Extent, Gpu, Kernel};
@@ -35,7 +35,6 @@ pub struct LiveScene<'a> {
     run: Run<'a, SceneOnGpu<'a>>,
     geometry: &'a Geometry,
     plan: &'a ScenePlan,
-    device: (&'a Gpu, usize),
     cancelled: &'a AtomicBool,
     camera: Camera,
 }
@@ -58,15 +57,14 @@ impl<'a> LiveScene<'a> {
     ) -> Result<LiveScene<'a>> {
         let shown = [ShowScene::MODULE, Display::MODULE, ShowPhotons::MODULE];
         let modules = [modules(plan, gpu.facts()), shown.into()].concat();
-        let (mut commands, pipelines_before) = run::commands(gpu, &modules, constants(plan), plan.settings.math, Instant::now())?;
+        let mut commands = run::commands(gpu, &modules, constants(plan), plan.settings.math, Instant::now())?;
         let resources = commands.scope("set-up", |commands| SceneResources::new(gpu, commands, geometry, plan, &[]))?;
         commands.submit()?;
         let most_bytes = gpu.facts().usable_memory_bytes.saturating_sub(plan.bytes) / SHARE_FOR_KEPT_MAPS;
         let mut world = SceneOnGpu::new(geometry, Some(camera.clone()), plan, resources, cancelled);
         world.kept = Some(KeptMaps::new(gpu, most_bytes));
-        let device = (gpu, pipelines_before);
-        let run = Run::new(world, commands, task(plan, device), &mut Control::quiet(cancelled))?;
-        Ok(LiveScene { run, geometry, plan, device, cancelled, camera: camera.clone() })
+        let run = Run::new(world, commands, task(geometry, plan), &mut Control::quiet(cancelled))?;
+        Ok(LiveScene { run, geometry, plan, cancelled, camera: camera.clone() })
     }
 
     /// One more round, unless all have been.
@@ -83,7 +81,7 @@ impl<'a> LiveScene<'a> {
         let Run { world, recorder, .. } = &mut self.run;
         world.look_from(recorder, camera.clone());
         self.camera = camera.clone();
-        self.run.begin_anew(task(self.plan, self.device), &mut Control::quiet(self.cancelled))
+        self.run.begin_anew(task(self.geometry, self.plan), &mut Control::quiet(self.cancelled))
     }
 
     pub fn has_ended(&self) -> bool {
@@ -111,9 +109,7 @@ impl<'a> LiveScene<'a> {
 
     /// The film as far as blocks are whole, and its error as users are told of it.
     pub fn look(&mut self) -> Result<(SceneFilm, FilmError)> {
-        let film = self.run.film()?;
-        let error = self.run.world.error(&film).stated();
-        Ok((film, error))
+        self.run.look()
     }
 
     pub fn commands(&mut self) -> &mut Commands<'a> {

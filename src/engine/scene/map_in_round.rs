@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use super::kept_maps::KeptMaps;
 use super::map_file::MapFile;
 use super::resources::PhotonBuffers;
-use super::{Round, estimate, index, radius_class, trace};
+use super::{Round, SceneFilm, estimate, index, radius_class, trace};
 use crate::engine::run::RunState;
 use crate::error::Result;
 use crate::gpu::Commands;
@@ -45,7 +45,7 @@ pub(super) fn one_stored_map(
     round: Round,
     in_round: &MapInRound,
     stored: &mut StoredPhotons,
-    state: &mut RunState,
+    state: &mut RunState<SceneFilm>,
 ) -> Result<u32> {
     let MapInRound { photons, map, .. } = in_round;
     if round.plan.cuts_discs() {
@@ -73,7 +73,7 @@ pub(super) fn one_map(
     deadline: Option<Instant>,
     timed_chunk: &mut u32,
     mut kept: Option<&mut KeptMaps>,
-    state: &mut RunState,
+    state: &mut RunState<SceneFilm>,
 ) -> Result<u32> {
     let map = in_round.map;
     if round.plan.cuts_discs() {
@@ -108,7 +108,7 @@ pub(super) fn one_kept_map(
     round: Round,
     in_round: &MapInRound,
     kept: &KeptMaps,
-    state: &mut RunState,
+    state: &mut RunState<SceneFilm>,
 ) -> Result<u32> {
     let MapInRound { photons, map, .. } = in_round;
     if round.plan.cuts_discs() {

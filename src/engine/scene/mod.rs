@@ -44,7 +44,7 @@ use glam::DVec3;
 
 pub use film::SceneFilm;
 pub use identity::scene_hash;
-pub use on_gpu::{constants, light, light_from, modules};
+pub use on_gpu::{constants, light, light_from, modules, task};
 pub use on_several::light_on;
 
 use crate::engine::error::bound::FilmError;
