@@ -8,7 +8,6 @@ pub mod commands;
 mod descriptor_sets;
 pub mod device;
 mod faults;
-mod hazards;
 pub mod kernel;
 mod labels;
 mod mapped_file;
