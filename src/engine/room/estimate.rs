@@ -151,10 +151,10 @@ fn gather_grid(commands: &mut Commands, resources: &RoomResources, index: &Index
 
 /// Moves what a round left on the film to the sums and squares of all rounds, of which there are several.
 pub fn end_round(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan, round: u32) -> Result<()> {
-    let RoomResources { film, rounds: Some(RoundBuffers { totals, low_squares, high_squares, latest_blocks }), .. } = resources else {
+    let RoomResources { film, rounds: Some(RoundBuffers { film_totals, low_squares, high_squares, latest_blocks }), .. } = resources else {
         return Ok(());
     };
     let push = EndRoundPush { sum_count: plan.points.len() as u32 * plan.channel_count, channel_count: plan.channel_count, round };
-    let kernel = EndRound { film, film_totals: totals, low_squares, high_squares, latest_blocks };
+    let kernel = EndRound { film, film_totals, low_squares, high_squares, latest_blocks };
     commands.scope("film", |commands| commands.dispatch(kernel, &push, Extent::Items(u64::from(push.sum_count))))
 }

@@ -30,7 +30,7 @@ pub fn build(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan
         return commands.scope("index", |commands| tree::build(commands, resources, buffers, plan, photon_count));
     }
     let RoomResources { room, photons, counters, dispatch_args, index: Some(index), .. } = resources else { return Ok(()) };
-    let IndexBuffers { cells, ranks, block_sums, sorted_photons, .. } = index;
+    let IndexBuffers { cells, ranks, sums_of_cells, sorted_photons, .. } = index;
     let push = plan.grid.index_push(photon_list_capacity(plan, photon_count));
     let extent = || if plan.has_slots() { Extent::Items(u64::from(push.photon_capacity)) } else { Extent::Indirect(dispatch_args) };
     commands.scope("index", |commands| {
@@ -42,7 +42,7 @@ pub fn build(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan
             }
             commands.dispatch(CellCount { room, photons, counters, cells, ranks }, &push, extent())
         })?;
-        commands.scope("scan", |commands| scan(commands, cells, block_sums, plan.grid.cells() + 1, plan.settings.group_size))?;
+        commands.scope("scan", |commands| scan(commands, cells, sums_of_cells, plan.grid.cells() + 1, plan.settings.group_size))?;
         commands.scope("sort", |commands| {
             commands.dispatch(CellScatter { room, photons, counters, cells, sorted_photons, ranks }, &push, extent())
         })

@@ -94,7 +94,7 @@ impl<'a> LiveRoom<'a> {
     pub fn show(&mut self, shows: u32, mean: f64, camera: &Camera, [width, height]: [u32; 2], shown: &Buffer<Vec4>) -> Result<()> {
         let Run { world, recorder, state } = &mut self.run;
         let RoomResources { room, rounds, .. } = &world.resources;
-        let RoundBuffers { totals: film_totals, low_squares, high_squares, .. } = rounds.as_ref().expect("a plan that is kept has them");
+        let RoundBuffers { film_totals, low_squares, high_squares, .. } = rounds.as_ref().expect("a plan that is kept has them");
         let half_height = camera.half_height();
         let push = ShowRoomPush {
             width,

@@ -90,13 +90,13 @@ impl<'a> World for RoomOnGpu<'a> {
         let count = film.sums.len();
         film.rounds = state.rounds();
         film.blocks = state.rounds();
-        let Some(RoundBuffers { totals, low_squares, high_squares, latest_blocks }) =
+        let Some(RoundBuffers { film_totals, low_squares, high_squares, latest_blocks }) =
             resources.rounds.as_ref().filter(|_| state.rounds() > 0)
         else {
             film.sums = commands.read(&resources.film, count)?;
             return Ok(Box::new(|| film));
         };
-        let sums = commands.copy_out(totals, count)?;
+        let sums = commands.copy_out(film_totals, count)?;
         let (low, high) = (commands.copy_out(low_squares, count)?, commands.copy_out(high_squares, count)?);
         let values = commands.copy_out(latest_blocks, latest_blocks.count() as usize)?;
         commands.submit()?;
@@ -116,9 +116,9 @@ impl<'a> World for RoomOnGpu<'a> {
 
 /// Goes on with a film.
 fn restore(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan, film: &RoomFilm) -> Result<()> {
-    let RoundBuffers { totals, low_squares, high_squares, latest_blocks } =
+    let RoundBuffers { film_totals, low_squares, high_squares, latest_blocks } =
         resources.rounds.as_ref().expect("a plan that is kept has them");
-    commands.upload(totals, &film.sums)?;
+    commands.upload(film_totals, &film.sums)?;
     commands.upload(low_squares, &film.squares.iter().map(|square| *square as u64).collect::<Vec<u64>>())?;
     commands.upload(high_squares, &film.squares.iter().map(|square| (*square >> 64) as u64).collect::<Vec<u64>>())?;
     let kept = kept_count(plan.points.len());

@@ -40,7 +40,7 @@ pub fn build(
     handle(commands, stored, 0);
     let plan = round.plan;
     let totals = &photons.totals[usize::from(map_plan.caustic_only)];
-    let PhotonBuffers { map, sorted_map, counters, cells, ranks, block_sums, dispatch_args, .. } = photons;
+    let PhotonBuffers { map, sorted_map, counters, cells, ranks, sums_of_cells, dispatch_args, .. } = photons;
     let buckets = cells_push.bucket_mask + 1;
     commands.scope("count", |commands| {
         // The fill counts itself.
@@ -52,7 +52,7 @@ pub fn build(
     })?;
     commands.scope("scan", |commands| {
         handle(commands, 0, map_plan.bytes_of_scanning());
-        scan(commands, cells, block_sums, buckets + 1, plan.settings.group_size)
+        scan(commands, cells, sums_of_cells, buckets + 1, plan.settings.group_size)
     })?;
     commands.scope("sort", |commands| {
         handle(commands, stored, map_plan.bytes_of_sorting(stored));

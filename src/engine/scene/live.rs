@@ -119,8 +119,7 @@ impl<'a> LiveScene<'a> {
     /// Records what is shown of the film: light or its error, of which `mean` is the mean of the picture.
     pub fn show(&mut self, shows: u32, mean: f64, shown: &Buffer<glam::Vec4>) -> Result<()> {
         let Run { world, recorder, state } = &mut self.run;
-        let FilmBuffers { all, part_sums, part_totals, .. } = &world.resources.film;
-        let (film_sums, film_squares, sums_of_block) = (&all.sums, &all.squares, &all.under_way);
+        let FilmBuffers { sums_of_block, film_sums, film_squares, part_sums, part_totals, .. } = &world.resources.film;
         let shows = if shows == SHOW_ERROR || self.plan.keeps_parts() { shows } else { SHOW_ALL };
         let push = ShowScenePush {
             pixel_count: self.plan.sensor.pixels(),

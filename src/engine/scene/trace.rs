@@ -302,13 +302,13 @@ pub fn trace_flight(
         Builder::Ballot => trace!(TraceSceneBallot { next_paths }),
         Builder::Group => trace!(TraceSceneGroup { next_paths }),
         Builder::Scan => {
-            let Some(OrderBuffers { survivors, block_sums }) = order else { panic!("the plan has no order to keep") };
+            let Some(OrderBuffers { survivors, sums_of_survivors }) = order else { panic!("the plan has no order to keep") };
             // Nobody needs the sorted map before the photons of all bounces are there.
             let landed = sorted_map;
             let item_count = survivor_count(plan, push.path_capacity);
             commands.fill(survivors, 0, u64::from(item_count), 0);
             trace!(TraceSceneScan { paths, survivors, landed })?;
-            scan(commands, survivors, block_sums, item_count, plan.settings.group_size)?;
+            scan(commands, survivors, sums_of_survivors, item_count, plan.settings.group_size)?;
             commands.dispatch(ScanMoveScene { paths, next_paths, map, counters, tallies, totals, survivors, landed }, &push, extent)
         }
         Builder::Persistent | Builder::Cpu => panic!("{} has no flights of all photons", plan.builder().name()),

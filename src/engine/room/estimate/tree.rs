@@ -66,7 +66,7 @@ fn gather_nearest(
 ) -> Result<()> {
     let RoomResources { film, room, .. } = resources;
     let TreeBuffers { wall_begins, planes, tree_photons, tree_origins, .. } = tree;
-    let SearchBuffers { nearest, searches, unfinished, .. } = buffers;
+    let SearchBuffers { nearest_photons, searches, unfinished, .. } = buffers;
     let tests_per_point = plan.work.tests_per_point(photon_count).min(u64::from(GATHER_SLICE));
     in_pieces(commands, plan, tests_per_point, 1, |commands, first, last| {
         for first_point in (first..last).step_by(searches.count() as usize) {
@@ -84,11 +84,21 @@ fn gather_nearest(
                 commands.add_work(u64::from(end_point - first_point) * tests_per_point);
                 let extent = Extent::Items(u64::from(end_point - first_point));
                 if adds_in_one_word(plan, commands.facts()) {
-                    let kernel = NearestU64 { room, film, wall_begins, planes, tree_photons, tree_origins, nearest, searches, unfinished };
+                    let kernel =
+                        NearestU64 { room, film, wall_begins, planes, tree_photons, tree_origins, nearest_photons, searches, unfinished };
                     commands.dispatch(kernel, &push, extent)?;
                 } else {
-                    let kernel =
-                        NearestTwoWords { room, film, wall_begins, planes, tree_photons, tree_origins, nearest, searches, unfinished };
+                    let kernel = NearestTwoWords {
+                        room,
+                        film,
+                        wall_begins,
+                        planes,
+                        tree_photons,
+                        tree_origins,
+                        nearest_photons,
+                        searches,
+                        unfinished,
+                    };
                     commands.dispatch(kernel, &push, extent)?;
                 }
                 if commands.read(unfinished, 1)? == [0] {

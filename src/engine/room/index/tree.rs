@@ -60,7 +60,7 @@ pub(super) fn build(
     photon_count: u32,
 ) -> Result<()> {
     let RoomResources { photons, origins, counters, .. } = resources;
-    let TreeBuffers { lists, wall_begins, item_args, run_args, scan_args, tree_photons, tree_origins, .. } = tree;
+    let TreeBuffers { tree_lists, wall_begins, item_args, run_args, scan_args, tree_photons, tree_origins, .. } = tree;
     let capacity = photon_list_capacity(plan, photon_count);
     let push = TreePush { photon_capacity: capacity, axis: 0, digit: 0, height: 0 };
     let one = Extent::Groups(1, 1);
@@ -69,11 +69,11 @@ pub(super) fn build(
     let step = Step { resources, tree, plan, work: plan.work.tree_pass(photon_count) };
     commands.scope("sort", |commands| {
         // The last pass ends in the first list, then in the second.
-        sort(commands, step, &TreePush { axis: 0, ..push }, [&lists[1], &lists[0]])?;
-        sort(commands, step, &TreePush { axis: 1, ..push }, [&lists[2], &lists[1]])
+        sort(commands, step, &TreePush { axis: 0, ..push }, [&tree_lists[1], &tree_lists[0]])?;
+        sort(commands, step, &TreePush { axis: 1, ..push }, [&tree_lists[2], &tree_lists[1]])
     })?;
     commands.scope("split", |commands| {
-        let (mut along, mut spare) = ([&lists[0], &lists[1]], &lists[2]);
+        let (mut along, mut spare) = ([&tree_lists[0], &tree_lists[1]], &tree_lists[2]);
         for height in (1..=heights(capacity)).rev() {
             let push = TreePush { height, ..push };
             let axis = (height % 2) as usize;
@@ -102,16 +102,16 @@ fn make_room(commands: &mut Commands, Step { plan, work, .. }: Step) -> Result<(
 fn sort(commands: &mut Commands, step: Step, push: &TreePush, [mut keys, mut next_keys]: [&Buffer<UVec2>; 2]) -> Result<()> {
     let Step { resources, tree, plan, .. } = step;
     let RoomResources { photons, counters, .. } = resources;
-    let TreeBuffers { counts, item_args, run_args, wall_begins, longest, .. } = tree;
+    let TreeBuffers { tree_counts, item_args, run_args, wall_begins, longest, .. } = tree;
     commands.dispatch(TreeKeys { photons, counters, keys }, push, Extent::Indirect(item_args))?;
     for digit in 0..=TREE_DIGITS {
         let push = TreePush { digit, ..*push };
-        commands.dispatch(TreeCount { photons, counters, keys, counts }, &push, Extent::Indirect(run_args))?;
+        commands.dispatch(TreeCount { photons, counters, keys, tree_counts }, &push, Extent::Indirect(run_args))?;
         sum_counts(commands, tree, plan)?;
         if digit == TREE_DIGITS {
-            commands.dispatch(TreeWalls { photons, counters, keys, counts, wall_begins, longest }, &push, Extent::Groups(1, 1))?;
+            commands.dispatch(TreeWalls { photons, counters, keys, tree_counts, wall_begins, longest }, &push, Extent::Groups(1, 1))?;
         }
-        commands.dispatch(TreeOrder { photons, counters, keys, counts, next_keys }, &push, Extent::Indirect(run_args))?;
+        commands.dispatch(TreeOrder { photons, counters, keys, tree_counts, next_keys }, &push, Extent::Indirect(run_args))?;
         std::mem::swap(&mut keys, &mut next_keys);
         make_room(commands, step)?;
     }
@@ -120,7 +120,7 @@ fn sort(commands: &mut Commands, step: Step, push: &TreePush, [mut keys, mut nex
 
 fn sum_counts(commands: &mut Commands, tree: &TreeBuffers, plan: &RoomPlan) -> Result<()> {
     let threads = || Extent::Indirect(&tree.scan_args);
-    scan_part(commands, &tree.counts, &tree.block_sums, tree.counts.count() as u32, plan.settings.group_size, &threads)
+    scan_part(commands, &tree.tree_counts, &tree.sums_of_tree_counts, tree.tree_counts.count() as u32, plan.settings.group_size, &threads)
 }
 
 /// Splits the nodes of a height at the middle of the order along one axis; parts the order along the other into
@@ -132,10 +132,10 @@ fn split(
     [along, across]: [&Buffer<UVec2>; 2],
     next_keys: &Buffer<UVec2>,
 ) -> Result<()> {
-    let TreeBuffers { wall_begins, longest, ranks, counts, planes, item_args, .. } = tree;
+    let TreeBuffers { wall_begins, longest, tree_ranks, tree_counts, planes, item_args, .. } = tree;
     let photons = || Extent::Indirect(item_args);
-    commands.dispatch(TreeRanks { wall_begins, longest, keys: along, ranks, planes }, push, photons())?;
-    commands.dispatch(TreeSides { wall_begins, longest, keys: across, ranks, counts }, push, photons())?;
+    commands.dispatch(TreeRanks { wall_begins, longest, keys: along, tree_ranks, planes }, push, photons())?;
+    commands.dispatch(TreeSides { wall_begins, longest, keys: across, tree_ranks, tree_counts }, push, photons())?;
     sum_counts(commands, tree, plan)?;
-    commands.dispatch(TreeSplit { wall_begins, longest, keys: across, ranks, counts, next_keys }, push, photons())
+    commands.dispatch(TreeSplit { wall_begins, longest, keys: across, tree_ranks, tree_counts, next_keys }, push, photons())
 }

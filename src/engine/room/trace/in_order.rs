@@ -19,7 +19,7 @@ pub fn one_bounce<'a>(
     extent: impl Fn() -> Extent<'a>,
 ) -> Result<()> {
     let RoomResources { room, photons, origins, counters, tallies, nonfinite_values, order, .. } = resources;
-    let Some(OrderBuffers { survivors, block_sums, weights }) = order else { panic!("the plan has no order to keep") };
+    let Some(OrderBuffers { survivors, sums_of_survivors, weights }) = order else { panic!("the plan has no order to keep") };
     // Groups that no path is left for count none, and so does the place behind the last, which becomes the sum of all.
     commands.clear(survivors);
     commands.dispatch(
@@ -27,6 +27,6 @@ pub fn one_bounce<'a>(
         push,
         extent(),
     )?;
-    scan(commands, survivors, block_sums, survivors.count() as u32, plan.settings.group_size)?;
+    scan(commands, survivors, sums_of_survivors, survivors.count() as u32, plan.settings.group_size)?;
     commands.dispatch(ScanMoveRoom { paths, next_paths, photons, origins, counters, tallies, survivors, weights }, push, extent())
 }
