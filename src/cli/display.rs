@@ -7,9 +7,9 @@ use std::time::Duration;
 use clap::Args;
 
 use super::complain;
-use crate::engine::saved::{SavedRun, WorldFilm};
+use crate::engine::run::saved::{SavedRun, WorldFilm};
+use crate::engine::run::watch::Later;
 use crate::engine::scene::SceneFilm;
-use crate::engine::watch::Later;
 use crate::error::Result;
 use crate::output::show::{Layer, Show};
 use crate::output::tev::{Address, PORT, Viewer};

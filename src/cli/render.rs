@@ -14,7 +14,7 @@ use super::values::{parse_integer, parse_photon_name};
 use super::{End, complain, optional_file, say, say_beside, say_written};
 use crate::engine;
 use crate::engine::replay::PhotonName;
-use crate::engine::saved::{SavedRun, WorldFilm};
+use crate::engine::run::saved::{SavedRun, WorldFilm};
 use crate::engine::scene::{SceneFilm, replay};
 use crate::error::{Result, require};
 use crate::output::colour::Format;

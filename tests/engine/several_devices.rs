@@ -8,10 +8,10 @@ use std::time::Duration;
 use crate::common::lit::Viewed;
 use crate::common::prelude::*;
 use photonmill::engine::End;
-use photonmill::engine::retry::{Remedy, run_on};
-use photonmill::engine::saved::SavedRun;
+use photonmill::engine::run::retry::{Remedy, run_on};
+use photonmill::engine::run::saved::SavedRun;
+use photonmill::engine::run::watch::{Keep, SaveRun};
 use photonmill::engine::scene::{self, RunResult};
-use photonmill::engine::watch::{Keep, SaveRun};
 use photonmill::settings::stop::Stop;
 
 fn settings() -> SceneSettings {
