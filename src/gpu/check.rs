@@ -7,7 +7,7 @@ use std::time::Instant;
 use glam::Vec2;
 
 use super::kernels::{CheckMath, CheckSampling, StartUpTwoWords, StartUpU64};
-use super::{Commands, Constants, Extent, Gpu, Memory};
+use super::{Commands, Constants, Extent, Gpu, Memory, dispatch_by_sums};
 use crate::constants::{LOOP_LIMIT, TALLY_COPIES};
 use crate::error::{Error, Result};
 use crate::records::{CheckPush, MathResults, Samples, SamplingCase, Tally};
@@ -129,13 +129,13 @@ fn ask(gpu: &Gpu, push: &CheckPush) -> Result<Answers> {
     let counters = gpu.buffer::<u32>("check counters", 1, Memory::Device)?;
     let tallies = gpu.buffer::<Tally>("check tallies", u64::from(TALLY_COPIES), Memory::Device)?;
     commands.clear(&counters);
-    if gpu.facts.int64_atomics {
-        let kernel = StartUpU64 { film: &film, answers: &answers, entries: &entries, counters: &counters, tallies: &tallies };
-        commands.dispatch(kernel, push, Extent::Groups(1, 1))?;
-    } else {
-        let kernel = StartUpTwoWords { film: &film, answers: &answers, entries: &entries, counters: &counters, tallies: &tallies };
-        commands.dispatch(kernel, push, Extent::Groups(1, 1))?;
-    }
+    dispatch_by_sums!(
+        commands,
+        gpu.facts.int64_atomics,
+        [StartUpU64, StartUpTwoWords] { film: &film, answers: &answers, entries: &entries, counters: &counters, tallies: &tallies },
+        push,
+        Extent::Groups(1, 1)
+    )?;
     let words = commands.read(&answers, 5)?;
     let film_sum = commands.read(&film, 1)?[0];
     let stored = commands.read::<u32>(&counters, 1)?[0].min(16 * push.photon_count);

@@ -6,18 +6,18 @@ mod dispatch;
 mod submission;
 mod transfer;
 
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use ash::vk;
 pub use dispatch::Extent;
+pub(crate) use dispatch::dispatch_by_sums;
 pub use submission::Interrupt;
 
 use super::clock::{self, LEAST_WARM_UP};
 use super::descriptor_sets::DescriptorSets;
 use super::pace::Pace;
 use super::timestamps::{TimedScope, Timestamps};
-use super::{AnyBuffer, Constants, Context, DeviceFacts, Gpu, Module, call};
+use super::{AnyBuffer, Constants, DeviceFacts, Gpu, Module, call};
 use crate::error::Result;
 use crate::timings::{Handled, Span, Timings};
 use barriers::Hazards;
@@ -53,7 +53,6 @@ pub struct Commands<'gpu> {
     timings: Timings,
     /// Of the device, before these commands.
     pipelines_before: usize,
-    context: Arc<Context>,
 }
 
 impl<'gpu> Commands<'gpu> {
@@ -93,7 +92,6 @@ impl<'gpu> Commands<'gpu> {
             submission_count: 0,
             timings: Timings::default(),
             pipelines_before: gpu.work().pipelines,
-            context: gpu.context.clone(),
         };
         commands.begin()?;
         Ok(commands)
@@ -102,7 +100,7 @@ impl<'gpu> Commands<'gpu> {
     fn begin(&mut self) -> Result<()> {
         let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
         // SAFETY: the last submission has ended, so the command buffer may be recorded again.
-        call("vkBeginCommandBuffer", || unsafe { self.context.device.begin_command_buffer(self.command_buffer, &info) })?;
+        call("vkBeginCommandBuffer", || unsafe { self.gpu.context.device.begin_command_buffer(self.command_buffer, &info) })?;
         self.timestamps.forget();
         // The fence of the last submission made its writes available; this makes them visible here.
         self.barrier();
@@ -127,7 +125,7 @@ impl<'gpu> Commands<'gpu> {
     }
 
     fn open_scope(&mut self, name: String) {
-        self.context.begin_label(self.command_buffer, name.rsplit('/').next().unwrap_or_default());
+        self.gpu.context.begin_label(self.command_buffer, name.rsplit('/').next().unwrap_or_default());
         let begin = self.timestamps.write(self.command_buffer);
         self.open_scopes.push(OpenScope { name, begin, handled: Handled::default() });
     }
@@ -135,7 +133,7 @@ impl<'gpu> Commands<'gpu> {
     fn close_scope(&mut self) {
         let OpenScope { name, begin, handled } = self.open_scopes.pop().expect("a scope is open");
         let end = self.timestamps.write(self.command_buffer);
-        self.context.end_label(self.command_buffer);
+        self.gpu.context.end_label(self.command_buffer);
         self.timed_scopes.push(TimedScope { name, begin, end, handled });
     }
 
@@ -235,7 +233,7 @@ impl<'gpu> Commands<'gpu> {
 
 impl Drop for Commands<'_> {
     fn drop(&mut self) {
-        let device = &self.context.device;
+        let device = &self.gpu.context.device;
         // SAFETY: every submission was waited for.
         unsafe {
             device.destroy_fence(self.fence, None);

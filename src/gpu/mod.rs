@@ -31,6 +31,7 @@ use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
 pub use buffer::{AnyBuffer, Buffer, HeldMemory, Memory};
+pub(crate) use commands::dispatch_by_sums;
 pub use commands::{Commands, Extent, Interrupt};
 pub use device::{DeviceFacts, Reconvergence};
 pub use kernel::{Constants, Kernel, Module};

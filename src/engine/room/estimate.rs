@@ -8,7 +8,7 @@ use crate::engine::room::resources::{IndexBuffers, RoomResources, RoundBuffers};
 use crate::engine::room::trace::photon_list_capacity;
 use crate::error::{Result, require};
 use crate::gpu::kernels::{CandidateCount, EndRound, GatherBruteTwoWords, GatherBruteU64, GatherGridTwoWords, GatherGridU64, SliceCount};
-use crate::gpu::{Commands, DeviceFacts, Extent, Kernel, Module};
+use crate::gpu::{Commands, DeviceFacts, Extent, Kernel, Module, dispatch_by_sums};
 use crate::plan::RoomPlan;
 use crate::records::{DispatchSizePush, EndRoundPush, GatherPush};
 use crate::settings::Sums;
@@ -108,11 +108,8 @@ fn gather_brute(commands: &mut Commands, resources: &RoomResources, plan: &RoomP
             let slices = slices_at_once.min(slice_count - first_slice);
             let push = GatherPush { first_point, end_point, first_slice, ..whole };
             let extent = Extent::Groups(point_count.div_ceil(plan.settings.group_size), slices);
-            if adds_in_one_word(plan, commands.facts()) {
-                commands.dispatch(GatherBruteU64 { room, film, photons, counters }, &push, extent)?;
-            } else {
-                commands.dispatch(GatherBruteTwoWords { room, film, photons, counters }, &push, extent)?;
-            }
+            let in_one_word = adds_in_one_word(plan, commands.facts());
+            dispatch_by_sums!(commands, in_one_word, [GatherBruteU64, GatherBruteTwoWords] { room, film, photons, counters }, &push, extent)?;
             add_work(commands, plan, u64::from(slices) * tests_per_slice)?;
         }
         Ok(())
@@ -140,11 +137,8 @@ fn gather_grid(commands: &mut Commands, resources: &RoomResources, index: &Index
             Extent::Groups(capacity.div_ceil(group_size), 1)
         };
         let push = GatherPush { first_point, end_point, ..whole };
-        if adds_in_one_word(plan, commands.facts()) {
-            commands.dispatch(GatherGridU64 { room, film, cells, sorted_photons }, &push, extent)?;
-        } else {
-            commands.dispatch(GatherGridTwoWords { room, film, cells, sorted_photons }, &push, extent)?;
-        }
+        let in_one_word = adds_in_one_word(plan, commands.facts());
+        dispatch_by_sums!(commands, in_one_word, [GatherGridU64, GatherGridTwoWords] { room, film, cells, sorted_photons }, &push, extent)?;
         add_work(commands, plan, u64::from(end_point - first_point) * tests_per_point)
     })
 }

@@ -12,7 +12,7 @@ use crate::error::Result;
 use crate::gpu::kernels::{
     CrowdSize, DiscCuts, EndDifference, FluxToRadiance, GatherVisiblePointsTwoWords, GatherVisiblePointsU64, Resolve,
 };
-use crate::gpu::{Commands, Extent};
+use crate::gpu::{Commands, Extent, dispatch_by_sums};
 use crate::plan::differences::row_length;
 use crate::plan::scene::MapPlan;
 use crate::records::{CellPush, CrowdSizePush, DiscCutsPush, EndDifferencePush, FluxToRadiancePush, ResolvePush, SceneGatherPush};
@@ -57,30 +57,17 @@ pub fn gather(
     let point_count = plan.visible_points();
     let lanes = map.lanes;
     let (width, height) = plan.sensor.size();
-    macro_rules! kernel {
-        ($kernel:ident) => {
-            $kernel {
-                scene,
-                visible_points,
-                matt_lobes,
-                matt_covers,
-                film: estimates,
-                near_sums,
-                cells,
-                sorted_map,
-                crowded_points,
-                radius_classes,
-                disc_cuts,
-                nonfinite_values,
-            }
-        };
-    }
     let dispatch = |commands: &mut Commands, push: &SceneGatherPush, extent: Extent| {
-        if commands.facts().int64_atomics {
-            commands.dispatch(kernel!(GatherVisiblePointsU64), push, extent)
-        } else {
-            commands.dispatch(kernel!(GatherVisiblePointsTwoWords), push, extent)
-        }
+        dispatch_by_sums!(
+            commands,
+            commands.facts().int64_atomics,
+            [GatherVisiblePointsU64, GatherVisiblePointsTwoWords] {
+                scene, visible_points, matt_lobes, matt_covers, film: estimates, near_sums, cells, sorted_map, crowded_points,
+                radius_classes, disc_cuts, nonfinite_values,
+            },
+            push,
+            extent
+        )
     };
     in_pieces(commands, plan, point_count, plan.points_at_once(), map.tests_per_point(), |commands, first_point, end_point| {
         let push = SceneGatherPush {

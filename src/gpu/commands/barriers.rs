@@ -61,6 +61,6 @@ impl Commands<'_> {
         let barriers = [barrier];
         let dependency = vk::DependencyInfo::default().memory_barriers(&barriers);
         // SAFETY: the command buffer is recording.
-        unsafe { self.context.device.cmd_pipeline_barrier2(self.command_buffer, &dependency) };
+        unsafe { self.gpu.context.device.cmd_pipeline_barrier2(self.command_buffer, &dependency) };
     }
 }

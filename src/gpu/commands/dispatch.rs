@@ -19,15 +19,28 @@ pub enum Extent<'a> {
     Indirect(&'a Buffer<DispatchArgs>),
 }
 
+/// Runs the first of two forms of a kernel, which adds to sums of 64 bits in one word, or the second one, which adds in two.
+macro_rules! dispatch_by_sums {
+    ($commands:expr, $in_one_word:expr, [$one_word:ident, $two_words:ident] $buffers:tt, $push:expr, $extent:expr) => {
+        if $in_one_word {
+            $commands.dispatch($one_word $buffers, $push, $extent)
+        } else {
+            $commands.dispatch($two_words $buffers, $push, $extent)
+        }
+    };
+}
+
+pub(crate) use dispatch_by_sums;
+
 impl Commands<'_> {
     /// Runs a kernel on its buffers.
     pub fn dispatch<K: Kernel>(&mut self, kernel: K, push: &K::Push, extent: Extent) -> Result<()> {
         if self.gpu.options.time_dispatches {
             return self.scope(K::MODULE.name, |commands| commands.record_dispatch(kernel, push, extent));
         }
-        self.context.begin_label(self.command_buffer, K::MODULE.name);
+        self.gpu.context.begin_label(self.command_buffer, K::MODULE.name);
         let recorded = self.record_dispatch(kernel, push, extent);
-        self.context.end_label(self.command_buffer);
+        self.gpu.context.end_label(self.command_buffer);
         recorded
     }
 
@@ -52,7 +65,7 @@ impl Commands<'_> {
         }
         self.order(&accesses);
 
-        let (device, command_buffer) = (&self.context.device, self.command_buffer);
+        let (device, command_buffer) = (&self.gpu.context.device, self.command_buffer);
         // SAFETY: the command buffer is recording; pipeline, sets and buffers live until the
         // submission has ended; group counts are within the device's limits.
         unsafe {

@@ -45,7 +45,7 @@ impl<'gpu> Commands<'gpu> {
             .dst_access_mask(vk::AccessFlags2::HOST_READ);
         self.record_barrier(host_reads);
 
-        let context = self.context.clone();
+        let context = self.gpu.context.clone();
         let device = &context.device;
         let submitted = Instant::now();
         let command_buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(self.command_buffer)];

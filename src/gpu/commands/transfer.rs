@@ -25,7 +25,7 @@ impl Commands<'_> {
         self.order(&[(buffer.any(), false, true)]);
         assert!(first + count <= buffer.count(), "{}: elements {first} to {}", buffer.any().name(), first + count);
         let element = size_of::<T>() as u64;
-        let (device, raw) = (&self.context.device, buffer.any().raw());
+        let (device, raw) = (&self.gpu.context.device, buffer.any().raw());
         // SAFETY: the buffer outlives the submission; the range is inside it.
         unsafe { device.cmd_fill_buffer(self.command_buffer, raw, element * first, element * count, word) };
         self.count_bytes(element * count);
@@ -59,7 +59,7 @@ impl Commands<'_> {
         let bytes = count * size_of::<T>() as u64;
         let region = [vk::BufferCopy::default().size(bytes)];
         // SAFETY: both buffers outlive the submission and hold so many elements.
-        unsafe { self.context.device.cmd_copy_buffer(self.command_buffer, from.raw(), to.raw(), &region) };
+        unsafe { self.gpu.context.device.cmd_copy_buffer(self.command_buffer, from.raw(), to.raw(), &region) };
         self.count_bytes(2 * bytes);
     }
 

@@ -6,7 +6,7 @@ use crate::engine::room::index::add_work;
 use crate::engine::room::resources::{RoomResources, SearchBuffers, TreeBuffers};
 use crate::error::Result;
 use crate::gpu::kernels::{GatherTreeTwoWords, GatherTreeU64, NearestTwoWords, NearestU64, SliceCount};
-use crate::gpu::{Commands, DeviceFacts, Extent, Kernel, Module};
+use crate::gpu::{Commands, DeviceFacts, Extent, Kernel, Module, dispatch_by_sums};
 use crate::plan::RoomPlan;
 use crate::records::{DispatchSizePush, GatherPush, NearestPush};
 
@@ -44,11 +44,14 @@ fn gather_radius(commands: &mut Commands, resources: &RoomResources, tree: &Tree
         commands.dispatch(SliceCount { longest, dispatch_args }, &size, Extent::Groups(1, 1))?;
         let push = GatherPush { first_point, end_point, ..whole };
         let extent = Extent::Indirect(dispatch_args);
-        if adds_in_one_word(plan, commands.facts()) {
-            commands.dispatch(GatherTreeU64 { room, film, wall_begins, planes, tree_photons }, &push, extent)?;
-        } else {
-            commands.dispatch(GatherTreeTwoWords { room, film, wall_begins, planes, tree_photons }, &push, extent)?;
-        }
+        let in_one_word = adds_in_one_word(plan, commands.facts());
+        dispatch_by_sums!(
+            commands,
+            in_one_word,
+            [GatherTreeU64, GatherTreeTwoWords] { room, film, wall_begins, planes, tree_photons },
+            &push,
+            extent
+        )?;
         add_work(commands, plan, u64::from(end_point - first_point) * tests_per_point)
     })
 }
@@ -68,6 +71,7 @@ fn gather_nearest(
     let TreeBuffers { wall_begins, planes, tree_photons, tree_origins, .. } = tree;
     let SearchBuffers { nearest_photons, searches, unfinished, .. } = buffers;
     let tests_per_point = plan.work.tests_per_point(photon_count).min(u64::from(GATHER_SLICE));
+    let in_one_word = adds_in_one_word(plan, commands.facts());
     in_pieces(commands, plan, tests_per_point, 1, |commands, first, last| {
         for first_point in (first..last).step_by(searches.count() as usize) {
             let end_point = last.min(first_point + searches.count() as u32);
@@ -83,24 +87,15 @@ fn gather_nearest(
                 commands.fill(unfinished, 0, 1, 0);
                 commands.add_work(u64::from(end_point - first_point) * tests_per_point);
                 let extent = Extent::Items(u64::from(end_point - first_point));
-                if adds_in_one_word(plan, commands.facts()) {
-                    let kernel =
-                        NearestU64 { room, film, wall_begins, planes, tree_photons, tree_origins, nearest_photons, searches, unfinished };
-                    commands.dispatch(kernel, &push, extent)?;
-                } else {
-                    let kernel = NearestTwoWords {
-                        room,
-                        film,
-                        wall_begins,
-                        planes,
-                        tree_photons,
-                        tree_origins,
-                        nearest_photons,
-                        searches,
-                        unfinished,
-                    };
-                    commands.dispatch(kernel, &push, extent)?;
-                }
+                dispatch_by_sums!(
+                    commands,
+                    in_one_word,
+                    [NearestU64, NearestTwoWords] {
+                        room, film, wall_begins, planes, tree_photons, tree_origins, nearest_photons, searches, unfinished
+                    },
+                    &push,
+                    extent
+                )?;
                 if commands.read(unfinished, 1)? == [0] {
                     break;
                 }
