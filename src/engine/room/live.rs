@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use glam::Vec4;
 
-use super::film::{RoomFilm, estimate_walls};
+use super::film::estimate_walls;
 use super::on_gpu::{RoomOnGpu, constants, modules};
 use super::resources::{RoomResources, RoundBuffers};
 use super::{estimate, task};
@@ -13,17 +13,15 @@ use crate::engine::run::{self, Run};
 use crate::engine::{self, Control};
 use crate::error::Result;
 use crate::gpu::kernels::{Display, ShowRoom};
-use crate::gpu::{Buffer, Commands, Extent, Gpu, Kernel};
-use crate::ledger::Ledger;
+use crate::gpu::{Buffer, Extent, Gpu, Kernel};
 use crate::plan::RoomPlan;
 use crate::records::ShowRoomPush;
 use crate::scene::Camera;
 use crate::scene::room::RoomScene;
 use crate::settings::RoomSettings;
-use crate::timings::Timings;
 
 pub struct LiveRoom<'a> {
-    run: Run<'a, RoomOnGpu<'a>>,
+    pub run: Run<'a, RoomOnGpu<'a>>,
     scene: &'a RoomScene,
     plan: &'a RoomPlan,
     cancelled: &'a AtomicBool,
@@ -49,37 +47,7 @@ impl<'a> LiveRoom<'a> {
 
     /// One more round, unless all have been.
     pub fn round(&mut self) -> Result<()> {
-        if !self.run.has_ended() {
-            self.run.round(&mut Control::quiet(self.cancelled))?;
-            self.run.collect()?;
-        }
-        Ok(())
-    }
-
-    pub fn has_ended(&self) -> bool {
-        self.run.has_ended()
-    }
-
-    pub fn rounds(&self) -> u32 {
-        self.run.state.rounds()
-    }
-
-    pub fn ledger(&self) -> Ledger {
-        self.run.state.ledger()
-    }
-
-    /// Times since the last call.
-    pub fn take_timings(&mut self) -> Timings {
-        std::mem::take(self.run.recorder.timings())
-    }
-
-    pub fn commands(&mut self) -> &mut Commands<'a> {
-        &mut self.run.recorder
-    }
-
-    /// What all rounds have left.
-    pub fn film(&mut self) -> Result<RoomFilm> {
-        self.run.film()
+        self.run.round_to_look_at(self.cancelled)
     }
 
     /// The error over the mean, as far as it is known, and the mean of the illumination.

@@ -22,7 +22,7 @@ use crate::plan::{RoomPlan, photons_of};
 use crate::scene::room::RoomScene;
 use crate::settings::RoomSettings;
 
-pub(super) struct RoomOnGpu<'a> {
+pub struct RoomOnGpu<'a> {
     pub(super) plan: &'a RoomPlan,
     pub(super) resources: RoomResources,
 }

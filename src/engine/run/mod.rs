@@ -11,7 +11,7 @@ mod state;
 pub mod watch;
 
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 pub use recorder::Recorder;
@@ -135,9 +135,14 @@ impl<'a, W: World> Run<'a, W> {
         Ok(())
     }
 
-    /// Runs what is recorded and counts the fates of its photons, as one must who looks at a run between two of its rounds.
-    pub fn collect(&mut self) -> Result<()> {
-        self.state.collect(&mut self.world, &mut self.recorder, false)
+    /// One more round, unless all have been, of a run that is looked at between two of its rounds: runs what is recorded and counts the
+    /// fates of its photons.
+    pub fn round_to_look_at(&mut self, cancelled: &AtomicBool) -> Result<()> {
+        if !self.has_ended() {
+            self.round(&mut Control::quiet(cancelled))?;
+            self.state.collect(&mut self.world, &mut self.recorder, false)?;
+        }
+        Ok(())
     }
 
     /// What all whole blocks have left.

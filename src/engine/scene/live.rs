@@ -5,25 +5,21 @@ use std::time::Instant;
 
 use glam::DVec3;
 
-use super::film::SceneFilm;
 use super::film_buffers::FilmBuffers;
 use super::kept_maps::KeptMaps;
 use super::on_gpu::{SceneOnGpu, constants, modules, task};
 use super::resources::SceneResources;
 use crate::constants::{SHOW_ALL, SHOW_ERROR};
 use crate::engine::Control;
-use crate::engine::error::bound::FilmError;
 use crate::engine::run::{self, Run};
 use crate::error::Result;
 use crate::gpu::kernels::{Display, ShowPhotons, ShowScene};
-use crate::gpu::{Buffer, Commands, Extent, Gpu, Kernel};
-use crate::ledger::Ledger;
+use crate::gpu::{Buffer, Extent, Gpu, Kernel};
 use crate::plan::scene::ScenePlan;
 use crate::plan::sensor::Sensor;
 use crate::records::{ShowPhotonsPush, ShowScenePush};
 use crate::scene::geometry::Geometry;
 use crate::scene::{Camera, Projection};
-use crate::timings::Timings;
 
 /// Of the device's memory, for photons that need not be traced again when the camera moves.
 const SHARE_FOR_KEPT_MAPS: u64 = 4;
@@ -32,7 +28,7 @@ const SHARE_FOR_KEPT_MAPS: u64 = 4;
 const DOT: u32 = 2;
 
 pub struct LiveScene<'a> {
-    run: Run<'a, SceneOnGpu<'a>>,
+    pub run: Run<'a, SceneOnGpu<'a>>,
     geometry: &'a Geometry,
     plan: &'a ScenePlan,
     cancelled: &'a AtomicBool,
@@ -69,11 +65,7 @@ impl<'a> LiveScene<'a> {
 
     /// One more round, unless all have been.
     pub fn round(&mut self) -> Result<()> {
-        if !self.run.has_ended() {
-            self.run.round(&mut Control::quiet(self.cancelled))?;
-            self.run.collect()?;
-        }
-        Ok(())
+        self.run.round_to_look_at(self.cancelled)
     }
 
     /// Begins anew from another camera. Photons that are kept need not be traced again.
@@ -84,36 +76,9 @@ impl<'a> LiveScene<'a> {
         self.run.begin_anew(task(self.geometry, self.plan), &mut Control::quiet(self.cancelled))
     }
 
-    pub fn has_ended(&self) -> bool {
-        self.run.has_ended()
-    }
-
-    pub fn rounds(&self) -> u32 {
-        self.run.state.rounds()
-    }
-
     /// Rounds whose photons are kept, and the bytes of these.
     pub fn kept(&self) -> (usize, u64) {
         self.run.world.kept.as_ref().map_or((0, 0), |kept| (kept.rounds(), kept.bytes()))
-    }
-
-    /// Of the photons of all rounds, those under way among them.
-    pub fn ledger(&self) -> Ledger {
-        self.run.state.ledger()
-    }
-
-    /// Times since the last call.
-    pub fn take_timings(&mut self) -> Timings {
-        std::mem::take(self.run.recorder.timings())
-    }
-
-    /// The film as far as blocks are whole, and its error as users are told of it.
-    pub fn look(&mut self) -> Result<(SceneFilm, FilmError)> {
-        self.run.look()
-    }
-
-    pub fn commands(&mut self) -> &mut Commands<'a> {
-        &mut self.run.recorder
     }
 
     /// Records what is shown of the film: light or its error, of which `mean` is the mean of the picture.

@@ -70,7 +70,7 @@ pub fn constants(plan: &ScenePlan) -> Constants {
 /// Timestamps that a round may need.
 const TIMESTAMPS_PER_ROUND: u32 = 64;
 
-pub(super) struct SceneOnGpu<'a> {
+pub struct SceneOnGpu<'a> {
     geometry: &'a Geometry,
     /// Of a picture.
     camera: Option<Camera>,
