@@ -169,7 +169,7 @@ fn photons_stored_lie_in_the_map(illumination: Illumination) {
                     stored += u64::from(commands.read(&buffers.counters, 1)?[0]);
                     Ok(())
                 };
-                trace::trace(&mut commands, round, buffers, map, chunk, &mut count).unwrap();
+                trace::trace(&mut commands, round, map, chunk, &mut count).unwrap();
             }
             let fates = &lit.fates[usize::from(map.caustic_only)];
             assert!(stored > 100, "{builder:?}, {illumination:?}, {}: {stored}", map.name);

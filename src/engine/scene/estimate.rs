@@ -42,16 +42,9 @@ pub fn cut_discs(commands: &mut Commands, round: Round, map: &MapPlan) -> Result
 }
 
 /// Adds a chunk of a map to the estimates of all visible points whose class this grid serves, all where radii have no classes.
-pub fn gather(
-    commands: &mut Commands,
-    round: Round,
-    photons: &PhotonBuffers,
-    map: &MapPlan,
-    classes: Range<u32>,
-    cells_push: CellPush,
-) -> Result<()> {
+pub fn gather(commands: &mut Commands, round: Round, map: &MapPlan, classes: Range<u32>, cells_push: CellPush) -> Result<()> {
+    let PhotonBuffers { cells, sorted_map, crowded_points, dispatch_args, .. } = round.photons();
     let Round { resources, plan, number: round, .. } = round;
-    let PhotonBuffers { cells, sorted_map, crowded_points, dispatch_args, .. } = photons;
     let SceneResources { scene, visible_points, matt_lobes, matt_covers, estimates, near_sums, .. } = resources;
     let SceneResources { radius_classes, disc_cuts, nonfinite_values, .. } = resources;
     let point_count = plan.visible_points();

@@ -3,7 +3,7 @@
 
 use std::collections::HashMap;
 
-use super::resources::PhotonBuffers;
+use super::Round;
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Commands, Gpu, Memory};
 use crate::ledger::Fates;
@@ -49,10 +49,10 @@ impl<'gpu> KeptMaps<'gpu> {
     }
 
     /// Keeps the photons that are in the map, if there is room.
-    pub fn keep(&mut self, commands: &mut Commands, photons: &PhotonBuffers, map: &MapPlan) -> Result<()> {
+    pub fn keep(&mut self, commands: &mut Commands, round: Round, map: &MapPlan) -> Result<()> {
         let held = self.bytes();
         let kept = self.maps.get_mut(&(self.round, map.caustic_only)).expect("the map was begun");
-        let count = u64::from(commands.read(&photons.counters, 1)?[0].min(map.capacity));
+        let count = u64::from(commands.read(&round.photons().counters, 1)?[0].min(map.capacity));
         if kept.is_partial || count == 0 {
             return Ok(());
         }
@@ -60,7 +60,7 @@ impl<'gpu> KeptMaps<'gpu> {
         let part = has_room.then(|| self.gpu.buffer("kept photons", count, Memory::Device));
         match part {
             Some(Ok(part)) => {
-                commands.copy(&photons.map, &part, count);
+                commands.copy(&round.photons().map, &part, count);
                 kept.parts.push(part);
             }
             Some(Err(error)) if !matches!(error, Error::OutOfMemory { .. }) => return Err(error),

@@ -260,11 +260,13 @@ impl<'a> SceneOnGpu<'a> {
     /// Finds the radii of visible points, which those of round 0 decide, where that round is not the first to be done.
     fn find_radii(&mut self, commands: &mut Commands) -> Result<()> {
         let SceneOnGpu { geometry, camera, plan, resources, grids, .. } = self;
-        let Some(photons) = &resources.photons else { return Ok(()) };
+        if resources.photons.is_none() {
+            return Ok(());
+        }
         let round = Round { resources, geometry, plan, number: 0 };
         *grids = Some(commands.scope("radii", |commands| {
             points::see(commands, round, camera.as_ref())?;
-            radius_class::find(commands, round, photons, camera.as_ref())
+            radius_class::find(commands, round, camera.as_ref())
         })?);
         // Nothing of what was seen counts.
         resources.film.forget_seen(commands);
@@ -281,24 +283,29 @@ impl<'a> SceneOnGpu<'a> {
             let sums = 3 * u64::from(plan.visible_points()) * u64::from(plan.arrival_sets);
             commands.fill(&resources.estimates, 0, sums, 0);
         }
-        if let Some(photons) = resources.photons.as_ref().filter(|_| plan.traced_maps().next().is_some()) {
+        if plan.traced_maps().next().is_some() {
             if plan.film.bias == BiasPlan::Blocks {
                 commands.fill(&resources.near_sums, 0, plan.near_sums(), 0);
             }
             let grids = match grids {
                 Some(grids) => grids,
-                None => grids.insert(commands.scope("radii", |commands| radius_class::find(commands, round, photons, camera))?),
+                None => grids.insert(commands.scope("radii", |commands| radius_class::find(commands, round, camera))?),
             };
             let mut traced = [0; 2];
             for map in plan.traced_maps() {
-                let in_round = MapInRound { photons, map, grids: &grids[usize::from(map.caustic_only)] };
+                let in_round = MapInRound { map, grids: &grids[usize::from(map.caustic_only)] };
                 let is_kept = kept.as_mut().is_some_and(|kept| kept.begin(round.number, map));
-                let of_map = commands.scope(map.name, |commands| match (&mut *stored, &mut *kept) {
-                    (Some(stored), _) => one_stored_map(commands, round, &in_round, stored, state),
-                    (_, Some(kept)) if is_kept => one_kept_map(commands, round, &in_round, kept, state),
-                    (_, kept) => {
-                        let timed_chunk = &mut timed_chunks[usize::from(map.caustic_only)];
-                        one_map(commands, round, &in_round, deadline, timed_chunk, kept.as_mut(), state)
+                let of_map = commands.scope(map.name, |commands| {
+                    if plan.cuts_discs() {
+                        commands.scope("cuts", |commands| estimate::cut_discs(commands, round, map))?;
+                    }
+                    match (&mut *stored, &mut *kept) {
+                        (Some(stored), _) => one_stored_map(commands, round, &in_round, stored, state),
+                        (_, Some(kept)) if is_kept => one_kept_map(commands, round, &in_round, kept, state),
+                        (_, kept) => {
+                            let timed_chunk = &mut timed_chunks[usize::from(map.caustic_only)];
+                            one_map(commands, round, &in_round, deadline, timed_chunk, kept.as_mut(), state)
+                        }
                     }
                 })?;
                 traced[usize::from(map.caustic_only)] = of_map;

@@ -277,11 +277,11 @@ impl Trial<'_> {
                 let mut commands = Commands::new(self.gpu, scene::constants(&plan), Instant::now())?;
                 let resources = SceneResources::new(self.gpu, &mut commands, geometry, &plan, &[])?;
                 let (round, map) = (Round { resources: &resources, geometry, plan: &plan, number: 0 }, global_map(&plan));
-                let buffers = resources.photons.as_ref().expect("a map has photons");
+                let buffers = round.photons();
                 self.turns(commands, |commands, turn| {
                     tallies::clear(commands, &buffers.tallies[0]);
                     for chunk in map.chunks() {
-                        commands.scope(turn, |commands| scene_trace::trace(commands, round, buffers, map, chunk, &mut |_, _| Ok(())))?;
+                        commands.scope(turn, |commands| scene_trace::trace(commands, round, map, chunk, &mut |_, _| Ok(())))?;
                         commands.submit()?;
                     }
                     tallies::read(commands, &buffers.tallies[0], plan.tally_rows())
