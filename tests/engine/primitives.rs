@@ -6,7 +6,7 @@ use bytemuck::Zeroable;
 use photonmill::constants::{NO_WALL, SCAN_ITEMS};
 use photonmill::engine::prefix_sum::scan;
 use photonmill::engine::room::resources::RoomResources;
-use photonmill::engine::room::{constants, index, trace};
+use photonmill::engine::room::{Chunk, constants, index, trace};
 use photonmill::engine::tallies;
 use photonmill::gpu::kernels::DispatchSize;
 use photonmill::plan::buffers::block_sum_counts;
@@ -94,7 +94,7 @@ fn the_index_holds_every_photon_in_its_cell() {
         let resources = RoomResources::new(&gpu, &mut commands, &scene, &plan).unwrap();
         let buffers = resources.index.as_ref().expect("a grid gather has an index");
         trace::chunk(&mut commands, &resources, &plan, 0, &plan.chunk(0)).unwrap();
-        index::build(&mut commands, &resources, &plan, photon_count).unwrap();
+        index::build(&mut commands, Chunk { resources: &resources, plan: &plan, photon_count }).unwrap();
         let map = photons(&gpu, &settings);
         let begins = commands.read(&buffers.cells, plan.grid.cells() as usize + 1).unwrap();
         assert_eq!(begins[0], 0);

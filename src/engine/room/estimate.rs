@@ -3,9 +3,9 @@
 pub mod tree;
 
 use crate::constants::{GATHER_SLICE, MAX_GROUPS};
+use crate::engine::room::Chunk;
 use crate::engine::room::index::add_work;
 use crate::engine::room::resources::{IndexBuffers, RoomResources, RoundBuffers};
-use crate::engine::room::trace::photon_list_capacity;
 use crate::error::{Result, require};
 use crate::gpu::kernels::{CandidateCount, EndRound, GatherBruteTwoWords, GatherBruteU64, GatherGridTwoWords, GatherGridU64, SliceCount};
 use crate::gpu::{Commands, DeviceFacts, Extent, Kernel, Module, dispatch_by_sums};
@@ -48,12 +48,13 @@ pub fn modules(plan: &RoomPlan, facts: &DeviceFacts) -> Vec<Module> {
 }
 
 /// A gather of all points; its dispatches each cover a part.
-fn push_for_all_points(plan: &RoomPlan, photon_count: u32) -> GatherPush {
+fn push_for_all_points(chunk: Chunk) -> GatherPush {
+    let plan = chunk.plan;
     GatherPush {
         first_point: 0,
         end_point: plan.points.len() as u32,
         first_slice: 0,
-        photon_capacity: photon_list_capacity(plan, photon_count),
+        photon_capacity: chunk.photon_list_capacity(),
         radius_squared: (plan.settings.radius * plan.settings.radius) as f32,
         reach: plan.grid.reach,
         film_scale: plan.film_scale() as f32,
@@ -86,18 +87,19 @@ fn in_pieces(
 }
 
 /// Adds a chunk to the film.
-pub fn gather(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan, photon_count: u32) -> Result<()> {
-    commands.scope("gather", |commands| match (&resources.tree, &resources.index) {
-        (Some(tree), _) => tree::gather(commands, resources, tree, plan, photon_count),
-        (None, Some(index)) => gather_grid(commands, resources, index, plan, photon_count),
-        (None, None) => gather_brute(commands, resources, plan, photon_count),
+pub fn gather(commands: &mut Commands, chunk: Chunk) -> Result<()> {
+    commands.scope("gather", |commands| match (&chunk.resources.tree, &chunk.resources.index) {
+        (Some(tree), _) => tree::gather(commands, chunk, tree),
+        (None, Some(index)) => gather_grid(commands, chunk, index),
+        (None, None) => gather_brute(commands, chunk),
     })
 }
 
 /// Every point steps through the whole photon list, a slice of it an invocation.
-fn gather_brute(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan, photon_count: u32) -> Result<()> {
+fn gather_brute(commands: &mut Commands, chunk: Chunk) -> Result<()> {
+    let Chunk { resources, plan, .. } = chunk;
     let RoomResources { film, room, photons, counters, .. } = resources;
-    let whole = push_for_all_points(plan, photon_count);
+    let whole = push_for_all_points(chunk);
     let slice_count = whole.photon_capacity.div_ceil(GATHER_SLICE);
     let tests_per_point = u64::from(GATHER_SLICE);
     in_pieces(commands, plan, tests_per_point, 1, |commands, first_point, end_point| {
@@ -117,10 +119,11 @@ fn gather_brute(commands: &mut Commands, resources: &RoomResources, plan: &RoomP
 }
 
 /// Every point tests the photons of the grid cells in reach.
-fn gather_grid(commands: &mut Commands, resources: &RoomResources, index: &IndexBuffers, plan: &RoomPlan, photon_count: u32) -> Result<()> {
+fn gather_grid(commands: &mut Commands, chunk: Chunk, index: &IndexBuffers) -> Result<()> {
+    let Chunk { resources, plan, photon_count } = chunk;
     let RoomResources { film, room, dispatch_args, .. } = resources;
     let IndexBuffers { cells, sorted_photons, longest, .. } = index;
-    let whole = push_for_all_points(plan, photon_count);
+    let whole = push_for_all_points(chunk);
     if plan.slices_candidates {
         commands.fill(longest, 0, 1, 0);
         commands.dispatch(CandidateCount { room, longest, cells }, &whole, Extent::Items(u64::from(whole.end_point)))?;

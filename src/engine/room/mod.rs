@@ -21,6 +21,7 @@ pub use replay::{photons_on_cpu, photons_on_gpu, replay};
 
 use crate::engine::Control;
 use crate::engine::room::film::{RoomFilm, irradiance_weights};
+use crate::engine::room::resources::RoomResources;
 use crate::engine::run::identity::{Hash, Identity};
 use crate::engine::run::saved::SavedFilm;
 use crate::engine::run::watch::Keep;
@@ -41,6 +42,22 @@ pub fn run(gpu: Option<&Gpu>, scene: &RoomScene, settings: &RoomSettings, contro
     match gpu.filter(|_| settings.builder != Builder::Cpu) {
         Some(gpu) => on_gpu(gpu, scene, settings, control),
         None => on_cpu(scene, settings, control),
+    }
+}
+
+/// Photons that are traced together: what the stages of their way to the film share.
+#[derive(Clone, Copy)]
+pub struct Chunk<'a> {
+    pub resources: &'a RoomResources,
+    pub plan: &'a RoomPlan,
+    pub photon_count: u32,
+}
+
+impl Chunk<'_> {
+    /// Entries of the photon map that it uses: all slots, or as many as there is room for.
+    pub fn photon_list_capacity(self) -> u32 {
+        let Chunk { plan, photon_count, .. } = self;
+        if plan.has_slots() { (photon_count * plan.settings.bounces).min(plan.photon_capacity) } else { plan.photon_capacity }
     }
 }
 

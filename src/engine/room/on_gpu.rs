@@ -9,7 +9,7 @@ use crate::engine::film::{KeptBlock, wide};
 use crate::engine::nonfinite_values::NonfiniteValues;
 use crate::engine::room::film::RoomFilm;
 use crate::engine::room::resources::{RoomResources, RoundBuffers};
-use crate::engine::room::{estimate, index, trace};
+use crate::engine::room::{Chunk, estimate, index, trace};
 use crate::engine::run::saved::WorldFilm;
 use crate::engine::run::watch::Later;
 use crate::engine::run::{self, RunState, Task, World};
@@ -52,9 +52,10 @@ impl<'a> World for RoomOnGpu<'a> {
         let RoomOnGpu { resources, plan, .. } = self;
         let ranges = plan.chunk(chunk);
         trace::chunk(commands, resources, plan, state.round(), &ranges)?;
-        index::build(commands, resources, plan, photons_of(&ranges))?;
-        estimate::gather(commands, resources, plan, photons_of(&ranges))?;
-        state.hand_out(0, photons_of(&ranges));
+        let traced = Chunk { resources, plan, photon_count: photons_of(&ranges) };
+        index::build(commands, traced)?;
+        estimate::gather(commands, traced)?;
+        state.hand_out(0, traced.photon_count);
         if chunk + 1 == plan.chunks_per_round { estimate::end_round(commands, resources, plan, state.round()) } else { Ok(()) }
     }
 

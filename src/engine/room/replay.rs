@@ -5,7 +5,7 @@ use std::time::Instant;
 use super::on_cpu::{self, photons_of_blocks, tallies_of};
 use super::on_gpu::constants;
 use super::resources::RoomResources;
-use super::trace;
+use super::{Chunk, trace};
 use crate::constants::NO_WALL;
 use crate::cpu::trace::Tracer;
 use crate::engine;
@@ -102,7 +102,7 @@ fn stored(
     ranges: &[EmissionRange],
 ) -> Result<Vec<Photon>> {
     trace::chunk(commands, resources, plan, round, ranges)?;
-    let capacity = trace::photon_list_capacity(plan, photons_of(ranges));
+    let capacity = Chunk { resources, plan, photon_count: photons_of(ranges) }.photon_list_capacity();
     let length = if plan.has_slots() { capacity } else { commands.read(&resources.counters, 1)?[0].min(capacity) };
     let photons = commands.read(&resources.photons, length as usize)?;
     let origins = commands.read(&resources.origins, length as usize)?;

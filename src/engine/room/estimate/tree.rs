@@ -2,6 +2,7 @@
 
 use super::{adds_in_one_word, in_pieces, push_for_all_points};
 use crate::constants::GATHER_SLICE;
+use crate::engine::room::Chunk;
 use crate::engine::room::index::add_work;
 use crate::engine::room::resources::{RoomResources, SearchBuffers, TreeBuffers};
 use crate::error::Result;
@@ -20,24 +21,19 @@ pub(super) fn modules(plan: &RoomPlan, facts: &DeviceFacts) -> Vec<Module> {
     }
 }
 
-pub(super) fn gather(
-    commands: &mut Commands,
-    resources: &RoomResources,
-    tree: &TreeBuffers,
-    plan: &RoomPlan,
-    photon_count: u32,
-) -> Result<()> {
-    match (&tree.searches, plan.settings.nearest) {
-        (Some(searches), Some(nearest)) => gather_nearest(commands, resources, tree, searches, plan, nearest, photon_count),
-        _ => gather_radius(commands, resources, tree, plan, photon_count),
+pub(super) fn gather(commands: &mut Commands, chunk: Chunk, tree: &TreeBuffers) -> Result<()> {
+    match (&tree.searches, chunk.plan.settings.nearest) {
+        (Some(searches), Some(nearest)) => gather_nearest(commands, chunk, tree, searches, nearest),
+        _ => gather_radius(commands, chunk, tree),
     }
 }
 
 /// Every point tests the photons of the leaves in reach, a slice of its wall's leaves an invocation.
-fn gather_radius(commands: &mut Commands, resources: &RoomResources, tree: &TreeBuffers, plan: &RoomPlan, photon_count: u32) -> Result<()> {
+fn gather_radius(commands: &mut Commands, chunk: Chunk, tree: &TreeBuffers) -> Result<()> {
+    let Chunk { resources, plan, photon_count } = chunk;
     let RoomResources { film, room, dispatch_args, .. } = resources;
     let TreeBuffers { wall_begins, planes, tree_photons, longest, .. } = tree;
-    let whole = push_for_all_points(plan, photon_count);
+    let whole = push_for_all_points(chunk);
     let tests_per_point = plan.work.tests_per_point(photon_count);
     in_pieces(commands, plan, tests_per_point, 1, |commands, first_point, end_point| {
         let size = DispatchSizePush::new(0, end_point - first_point, plan.settings.group_size);
@@ -60,12 +56,10 @@ fn gather_radius(commands: &mut Commands, resources: &RoomResources, tree: &Tree
 /// how the photons lie; each dispatch does a bounded part of it, and the host asks whether any is left.
 fn gather_nearest(
     commands: &mut Commands,
-    resources: &RoomResources,
+    Chunk { resources, plan, photon_count }: Chunk,
     tree: &TreeBuffers,
     buffers: &SearchBuffers,
-    plan: &RoomPlan,
     nearest_count: u32,
-    photon_count: u32,
 ) -> Result<()> {
     let RoomResources { film, room, .. } = resources;
     let TreeBuffers { wall_begins, planes, tree_photons, tree_origins, .. } = tree;

@@ -1,19 +1,18 @@
 //! A bounce whose survivors keep their order, by prefix sums: reduce, then scan.
 
 use crate::engine::prefix_sum::scan;
+use crate::engine::room::Chunk;
 use crate::engine::room::resources::{OrderBuffers, RoomResources};
 use crate::error::Result;
 use crate::gpu::kernels::{ScanMoveRoom, TraceRoomScan};
 use crate::gpu::{Buffer, Commands, Extent};
 use crate::path::StoredPath;
-use crate::plan::RoomPlan;
 use crate::records::TracePush;
 
 /// Survivors are counted by work group, the counts summed, and the survivors moved to where they belong.
 pub fn one_bounce<'a>(
     commands: &mut Commands,
-    resources: &RoomResources,
-    plan: &RoomPlan,
+    Chunk { resources, plan, .. }: Chunk,
     [paths, next_paths]: [&Buffer<StoredPath>; 2],
     push: &TracePush,
     extent: impl Fn() -> Extent<'a>,
