@@ -139,7 +139,7 @@ fn settings_of_trial(of_run: &SceneSettings) -> SceneSettings {
 }
 
 /// What sees at most so many points of those that a run asks about, evenly spread: a smaller picture, or some of the receivers.
-fn few_points(view: &View, sensor: Sensor, most: u32) -> (Sensor, Vec<Vec<Receiver>>) {
+pub(super) fn few_points(view: &View, sensor: Sensor, most: u32) -> (Sensor, Vec<Vec<Receiver>>) {
     match sensor {
         Sensor::Picture { width, height } => {
             let smaller = (f64::from(most) / (f64::from(width) * f64::from(height))).sqrt().min(1.0);
