@@ -99,7 +99,7 @@ fn plans(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings) -> Result<Vec<Ro
 fn first_chunk_ms(gpu: &Gpu, scene: &RoomScene, plan: &RoomPlan) -> Result<f64> {
     gpu.prepare(&modules(plan, gpu), &constants(plan))?;
     let mut commands = Commands::new(gpu, constants(plan), Instant::now())?;
-    let resources = RoomResources::new(gpu, &mut commands, scene, plan)?;
+    let resources = RoomResources::new(&mut commands, scene, plan)?;
     commands.warm_up()?;
     commands.submit()?;
     let ranges = plan.chunk(0);

@@ -72,9 +72,8 @@ pub fn loop_count(gpu: &Gpu, wanted: u32) -> Result<LoopCount> {
 pub fn math(gpu: &Gpu, operands: &[Vec2]) -> Result<Vec<MathResults>> {
     let constants = Constants::new(GROUP_SIZE).set("STRICT_MATH", 1);
     let mut commands = Commands::new(gpu, constants, Instant::now())?;
-    let inputs = gpu.buffer::<Vec2>("operands", operands.len() as u64, Memory::Device)?;
+    let inputs = commands.uploaded("operands", operands)?;
     let results = gpu.buffer::<MathResults>("math results", operands.len() as u64, Memory::Device)?;
-    commands.upload(&inputs, operands)?;
     commands.dispatch(CheckMath { operands: &inputs, results: &results }, &(), Extent::Items(operands.len() as u64))?;
     commands.read(&results, operands.len())
 }
@@ -83,9 +82,8 @@ pub fn math(gpu: &Gpu, operands: &[Vec2]) -> Result<Vec<MathResults>> {
 pub fn sampling(gpu: &Gpu, constants: &[(&'static str, u32)], cases: &[SamplingCase]) -> Result<Vec<Samples>> {
     let constants = constants.iter().fold(Constants::new(GROUP_SIZE), |constants, (name, value)| constants.set(name, *value));
     let mut commands = Commands::new(gpu, constants, Instant::now())?;
-    let inputs = gpu.buffer::<SamplingCase>("sampling cases", cases.len() as u64, Memory::Device)?;
+    let inputs = commands.uploaded("sampling cases", cases)?;
     let results = gpu.buffer::<Samples>("samples", cases.len() as u64, Memory::Device)?;
-    commands.upload(&inputs, cases)?;
     commands.dispatch(CheckSampling { cases: &inputs, results: &results }, &(), Extent::Items(cases.len() as u64))?;
     commands.read(&results, cases.len())
 }

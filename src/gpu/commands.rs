@@ -55,22 +55,27 @@ pub struct Commands<'gpu> {
     pipelines_before: usize,
 }
 
+/// A command buffer and its pool, and a fence that waits for it, which are destroyed by whoever asks for them.
+pub(super) fn command_buffer(gpu: &Gpu) -> Result<(vk::CommandPool, vk::CommandBuffer, vk::Fence)> {
+    let device = &gpu.context.device;
+    let info = vk::CommandPoolCreateInfo::default()
+        .queue_family_index(gpu.facts.queue_family)
+        .flags(vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER);
+    // SAFETY: all infos are complete.
+    unsafe {
+        let pool = call("vkCreateCommandPool", || device.create_command_pool(&info, None))?;
+        let info = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(1);
+        let command_buffer = call("vkAllocateCommandBuffers", || device.allocate_command_buffers(&info))?[0];
+        let fence = call("vkCreateFence", || device.create_fence(&vk::FenceCreateInfo::default(), None))?;
+        Ok((pool, command_buffer, fence))
+    }
+}
+
 impl<'gpu> Commands<'gpu> {
     /// `started` is the zero of all times.
     pub fn new(gpu: &'gpu Gpu, constants: Constants, started: Instant) -> Result<Commands<'gpu>> {
-        let device = &gpu.context.device;
-        let pool_info = vk::CommandPoolCreateInfo::default()
-            .queue_family_index(gpu.facts.queue_family)
-            .flags(vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER);
         let timestamps = Timestamps::new(gpu)?;
-        // SAFETY: all infos are complete; everything is destroyed in Drop.
-        let (pool, command_buffer, fence) = unsafe {
-            let pool = call("vkCreateCommandPool", || device.create_command_pool(&pool_info, None))?;
-            let buffer_info = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(1);
-            let command_buffer = call("vkAllocateCommandBuffers", || device.allocate_command_buffers(&buffer_info))?[0];
-            let fence = call("vkCreateFence", || device.create_fence(&vk::FenceCreateInfo::default(), None))?;
-            (pool, command_buffer, fence)
-        };
+        let (pool, command_buffer, fence) = command_buffer(gpu)?;
         let mut commands = Commands {
             gpu,
             constants,
@@ -213,7 +218,7 @@ impl<'gpu> Commands<'gpu> {
         self.gpu.work().pipelines - self.pipelines_before
     }
 
-    pub fn gpu(&self) -> &Gpu {
+    pub fn gpu(&self) -> &'gpu Gpu {
         self.gpu
     }
 

@@ -202,7 +202,7 @@ pub fn gathered(gpu: &Gpu, plan: &RoomPlan, photons: &[Photon], times: u32, film
     assert!(photons.len() <= plan.photon_capacity as usize);
     let scene = open_box(&plan.settings);
     let mut commands = Commands::new(gpu, room::constants(plan), Instant::now()).unwrap();
-    let resources = RoomResources::new(gpu, &mut commands, &scene, plan).unwrap();
+    let resources = RoomResources::new(&mut commands, &scene, plan).unwrap();
     // As if they had been traced.
     let stored: Vec<StoredPhoton> = photons.iter().map(Photon::stored).collect();
     commands.upload(&resources.photons, &stored).unwrap();

@@ -91,7 +91,7 @@ fn the_index_holds_every_photon_in_its_cell() {
         let plan = plan_for(&gpu, &scene, &settings);
         assert_eq!(plan.chunks_per_round, 1);
         let mut commands = Commands::new(&gpu, constants(&plan), Instant::now()).unwrap();
-        let resources = RoomResources::new(&gpu, &mut commands, &scene, &plan).unwrap();
+        let resources = RoomResources::new(&mut commands, &scene, &plan).unwrap();
         let buffers = resources.index.as_ref().expect("a grid gather has an index");
         trace::chunk(&mut commands, &resources, &plan, 0, &plan.chunk(0)).unwrap();
         index::build(&mut commands, Chunk { resources: &resources, plan: &plan, photon_count }).unwrap();
@@ -155,7 +155,7 @@ fn append(gpu: &Device, scene: &RoomScene, settings: &RoomSettings, capacity: u3
     plan.path_capacity += GUARD_ENTRIES as u32;
     let path_count = u64::from(plan.path_capacity);
     let mut commands = Commands::new(gpu, constants(&plan), Instant::now()).unwrap();
-    let mut resources = RoomResources::new(gpu, &mut commands, scene, &plan).unwrap();
+    let mut resources = RoomResources::new(&mut commands, scene, &plan).unwrap();
     plan.photon_capacity = capacity;
     let entries = u64::from(capacity) + GUARD_ENTRIES;
     resources.photons = gpu.buffer("guarded photons", entries, Memory::Device).unwrap();

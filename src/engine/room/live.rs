@@ -38,7 +38,7 @@ impl<'a> LiveRoom<'a> {
     pub fn new(gpu: &'a Gpu, scene: &'a RoomScene, plan: &'a RoomPlan, cancelled: &'a AtomicBool) -> Result<LiveRoom<'a>> {
         let modules = [modules(plan, gpu), vec![ShowRoom::MODULE, Display::MODULE]].concat();
         let mut commands = run::commands(gpu, &modules, constants(plan), plan.settings.math, Instant::now())?;
-        let resources = commands.scope("set-up", |commands| RoomResources::new(gpu, commands, scene, plan))?;
+        let resources = commands.scope("set-up", |commands| RoomResources::new(commands, scene, plan))?;
         commands.submit()?;
         let world = RoomOnGpu { plan, resources };
         let run = Run::new(world, commands, task(scene, plan), &mut Control::quiet(cancelled))?;

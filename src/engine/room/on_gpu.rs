@@ -34,7 +34,7 @@ pub fn on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings, control: &m
     let identity = super::identity(&mut control.keep, scene, &plan, Some(gpu.facts()))?;
     estimate::check_sums(&plan, gpu.facts())?;
     let mut commands = run::commands(gpu, &modules(&plan, gpu), constants(&plan), settings.math, started)?;
-    let resources = commands.scope("set-up", |commands| RoomResources::new(gpu, commands, scene, &plan))?;
+    let resources = commands.scope("set-up", |commands| RoomResources::new(commands, scene, &plan))?;
     commands.warm_up()?;
     commands.submit()?;
     if let Some((_, saved)) = &control.keep.resume {

@@ -43,7 +43,7 @@ fn replay_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings, name: Ph
     check_math(gpu, settings.math)?;
     let ranges = [plan.range_of(name.photon)];
     let mut commands = Commands::new(gpu, constants(&plan), Instant::now())?;
-    let resources = RoomResources::new(gpu, &mut commands, scene, &plan)?;
+    let resources = RoomResources::new(&mut commands, scene, &plan)?;
     trace::emit(&mut commands, &resources, &plan, name.round, &ranges)?;
     let start = path::unpack(&commands.read(&resources.paths[0], 1)?, 0);
     let vertices = stored(&mut commands, &resources, scene, &plan, name.round, &ranges)?;
@@ -70,7 +70,7 @@ fn replay_on_cpu(scene: &RoomScene, settings: &RoomSettings, name: PhotonName) -
 pub fn photons_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings) -> Result<Vec<Photon>> {
     let plan = RoomPlan { keeps_origins: true, ..RoomPlan::new(scene, settings, &engine::limits(gpu.facts()))? };
     let mut commands = Commands::new(gpu, constants(&plan), Instant::now())?;
-    let resources = RoomResources::new(gpu, &mut commands, scene, &plan)?;
+    let resources = RoomResources::new(&mut commands, scene, &plan)?;
     let mut photons = Vec::new();
     for ranges in plan.chunks() {
         photons.extend(stored(&mut commands, &resources, scene, &plan, 0, &ranges)?);

@@ -4,7 +4,7 @@ use glam::UVec2;
 
 use crate::engine::planned::{Planned, buffers};
 use crate::error::Result;
-use crate::gpu::{Buffer, Commands, Gpu, kernels};
+use crate::gpu::{Buffer, Commands, kernels};
 use crate::path::StoredPath;
 use crate::photon::{Origin, StoredPhoton};
 use crate::plan::RoomPlan;
@@ -54,8 +54,8 @@ buffers! {
 
 impl RoomResources {
     /// Makes the buffers and records the upload of what never changes.
-    pub fn new(gpu: &Gpu, commands: &mut Commands, scene: &RoomScene, plan: &RoomPlan) -> Result<RoomResources> {
-        RoomResources::made(&Planned { gpu, buffers: plan.buffers() }, commands, scene, plan)
+    pub fn new(commands: &mut Commands, scene: &RoomScene, plan: &RoomPlan) -> Result<RoomResources> {
+        RoomResources::made(&Planned { gpu: commands.gpu(), buffers: plan.buffers() }, commands, scene, plan)
     }
 }
 

@@ -39,7 +39,7 @@ pub fn fill(
 ) -> Result<Filled> {
     let started = Instant::now();
     let mut commands = commands(gpu, &trace::modules(plan), constants(plan), plan.settings.math, started)?;
-    let resources = SceneResources::new(gpu, &mut commands, geometry, plan, &[])?;
+    let resources = SceneResources::new(&mut commands, geometry, plan, &[])?;
     commands.set_interrupt(Some(Interrupt { cancelled: control.cancelled, deadline: None }));
     let mut ledger = Ledger::default();
     writer.drop_open_round().map_err(unwritten)?;

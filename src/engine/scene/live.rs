@@ -54,11 +54,11 @@ impl<'a> LiveScene<'a> {
         let shown = [ShowScene::MODULE, Display::MODULE, ShowPhotons::MODULE];
         let modules = [modules(plan, gpu.facts()), shown.into()].concat();
         let mut commands = run::commands(gpu, &modules, constants(plan), plan.settings.math, Instant::now())?;
-        let resources = commands.scope("set-up", |commands| SceneResources::new(gpu, commands, geometry, plan, &[]))?;
+        let resources = commands.scope("set-up", |commands| SceneResources::new(commands, geometry, plan, &[]))?;
         commands.submit()?;
         let most_bytes = gpu.facts().usable_memory_bytes.saturating_sub(plan.bytes) / SHARE_FOR_KEPT_MAPS;
         let mut world = SceneOnGpu::new(geometry, Some(camera.clone()), plan, resources, cancelled);
-        world.kept = Some(KeptMaps::new(gpu, most_bytes));
+        world.kept = Some(KeptMaps::new(most_bytes));
         let run = Run::new(world, commands, task(geometry, plan), &mut Control::quiet(cancelled))?;
         Ok(LiveScene { run, geometry, plan, cancelled, camera: camera.clone() })
     }

@@ -82,7 +82,7 @@ pub struct SceneOnGpu<'a> {
     /// Photons that are not traced but read; `None` where they are traced.
     stored: Option<StoredPhotons<'a>>,
     /// Maps of this run that are kept to be looked at again; `None` where nobody does.
-    pub(super) kept: Option<KeptMaps<'a>>,
+    pub(super) kept: Option<KeptMaps>,
     /// Photons that a chunk of the global and of the caustic map may have where time may be up.
     timed_chunks: [u32; 2],
     /// A round was cut short, of which parts of light may have come to that of the block under way.
@@ -105,7 +105,7 @@ pub fn light_from(gpu: &Gpu, view: &View, plan: ScenePlan, map: Option<&MapFile>
         commands.timings().count(name);
         commands.timings().add(Span::of_host(name, Duration::ZERO, duration));
     }
-    let resources = commands.scope("set-up", |commands| SceneResources::new(gpu, commands, view.geometry, &plan, view.phases))?;
+    let resources = commands.scope("set-up", |commands| SceneResources::new(commands, view.geometry, &plan, view.phases))?;
     commands.warm_up()?;
     commands.submit()?;
     let identity = control.keep.identity(|name| identity(name, view, &plan, map.map(|map| map.hash.as_str()), gpu.facts()))?;

@@ -54,7 +54,7 @@ pub fn light_paths(
     let plan = &plan.by_flights();
     assert!(chunk.1 <= map.chunk_photons && flights <= map.bounces, "{chunk:?}, {flights} flights of {map:?}");
     let mut commands = Commands::new(gpu, constants(plan), Instant::now())?;
-    let resources = SceneResources::new(gpu, &mut commands, geometry, plan, &[])?;
+    let resources = SceneResources::new(&mut commands, geometry, plan, &[])?;
     let round = Round { resources: &resources, geometry, plan, number };
     let buffers = round.photons();
     trace::emit(&mut commands, round, map, chunk)?;

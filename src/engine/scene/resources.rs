@@ -3,7 +3,7 @@
 use super::film_buffers::FilmBuffers;
 use crate::engine::planned::{Planned, buffers};
 use crate::error::Result;
-use crate::gpu::{Buffer, Commands, Gpu, kernels};
+use crate::gpu::{Buffer, Commands, kernels};
 use crate::photon::MapPhoton;
 use crate::plan::buffers::{NONFINITE_VALUES, scene};
 use crate::plan::light_choice::LightChoice;
@@ -76,14 +76,8 @@ buffers! {
 impl SceneResources {
     /// Makes the buffers and records the upload of what never changes. `phases` are sets of receivers
     /// of equal length; none for a picture.
-    pub fn new(
-        gpu: &Gpu,
-        commands: &mut Commands,
-        geometry: &Geometry,
-        plan: &ScenePlan,
-        phases: &[Vec<Receiver>],
-    ) -> Result<SceneResources> {
-        SceneResources::made(&Planned { gpu, buffers: plan.buffers(geometry) }, commands, geometry, plan, phases)
+    pub fn new(commands: &mut Commands, geometry: &Geometry, plan: &ScenePlan, phases: &[Vec<Receiver>]) -> Result<SceneResources> {
+        SceneResources::made(&Planned { gpu: commands.gpu(), buffers: plan.buffers(geometry) }, commands, geometry, plan, phases)
     }
 }
 

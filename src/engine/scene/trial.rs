@@ -97,13 +97,13 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, lights: Option<Li
     )?;
     let began = Instant::now();
     let mut commands = Commands::new(gpu, constants(&plan), began)?;
-    let resources = SceneResources::new(gpu, &mut commands, view.geometry, &plan, &phases)?;
+    let resources = SceneResources::new(&mut commands, view.geometry, &plan, &phases)?;
     let round = Round { resources: &resources, geometry: view.geometry, plan: &plan, number: 0 };
-    let seen = see(gpu, &mut commands, round, view.camera)?;
+    let seen = see(&mut commands, round, view.camera)?;
 
     let mut trial = Trial::default();
     let points = light_trial::points(&phases, &seen.points, &view.geometry.planes);
-    let rays = if casts_rays { trial_rays::cast(gpu, &mut commands, round, &points)? } else { Vec::new() };
+    let rays = if casts_rays { trial_rays::cast(&mut commands, round, &points)? } else { Vec::new() };
     if !plan.openings().is_empty() {
         trial.openings = openings(&rays);
         // The scene's from here on.
@@ -112,7 +112,7 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, lights: Option<Li
         }
     }
     if let Some(lights) = lights {
-        let lights = light_trial::learn(gpu, &mut commands, round, lights, &points, &rays)?;
+        let lights = light_trial::learn(&mut commands, round, lights, &points, &rays)?;
         commands.upload(&resources.scene.emitters, &lights.emitters)?;
         trial.lights = Some(Arc::new(lights));
     }
@@ -160,10 +160,10 @@ struct Seen {
     clearances: Vec<f32>,
 }
 
-fn see(gpu: &Gpu, commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Result<Seen> {
+fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Result<Seen> {
     points::see(commands, round, camera)?;
     let count = round.plan.visible_points();
-    let clearances = gpu.buffer::<f32>("clearances", u64::from(count), Memory::Device)?;
+    let clearances = commands.gpu().buffer::<f32>("clearances", u64::from(count), Memory::Device)?;
     let SceneResources { scene, visible_points, .. } = round.resources;
     let kernel = Clearance { scene, visible_points, clearances: &clearances };
     commands.dispatch(kernel, &ClearancePush { first_point: 0, end_point: count, rank: MEDIAN }, Extent::Items(u64::from(count)))?;

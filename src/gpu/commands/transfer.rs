@@ -49,6 +49,13 @@ impl Commands<'_> {
         Ok(())
     }
 
+    /// A buffer on the device with this content.
+    pub fn uploaded<T: Pod>(&mut self, name: &str, content: &[T]) -> Result<Buffer<T>> {
+        let buffer = self.gpu.buffer(name, content.len() as u64, Memory::Device)?;
+        self.upload(&buffer, content)?;
+        Ok(buffer)
+    }
+
     /// Copies the first `count` elements of a buffer into another.
     pub fn copy<T>(&mut self, from: &Buffer<T>, to: &Buffer<T>, count: u64) {
         for buffer in [from, to] {

@@ -71,7 +71,7 @@ pub fn survey(gpu: &Gpu, job: &Job, map: impl Fn(&ScenePlan) -> Option<&MapPlan>
     let plan = job.plan(gpu, &job.settings)?;
     let Some(map) = map(&plan) else { return Ok(None) };
     let mut commands = Commands::new(gpu, scene::constants(&plan), Instant::now())?;
-    let resources = SceneResources::new(gpu, &mut commands, job.geometry, &plan, &[])?;
+    let resources = SceneResources::new(&mut commands, job.geometry, &plan, &[])?;
     let round = Round { resources: &resources, geometry: job.geometry, plan: &plan, number: 0 };
     let buffers = round.photons();
     points::see(&mut commands, round, Some(&job.scene.first_camera()))?;

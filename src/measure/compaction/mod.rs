@@ -244,7 +244,7 @@ impl Trial<'_> {
             Place::Scene(scene, geometry) => {
                 let plan = self.scene_plan(scene, geometry, builder)?;
                 let mut commands = Commands::new(self.gpu, scene::constants(&plan), Instant::now())?;
-                let resources = SceneResources::new(self.gpu, &mut commands, geometry, &plan, &[])?;
+                let resources = SceneResources::new(&mut commands, geometry, &plan, &[])?;
                 let round = Round { resources: &resources, geometry, plan: &plan, number: 0 };
                 scene_trace::stored(&mut commands, round, global_map(&plan))?.into_iter().map(bytemuck::cast).collect()
             }
@@ -261,7 +261,7 @@ impl Trial<'_> {
                 let plan = RoomPlan::new(&room, &settings, &engine::limits(self.gpu.facts()))?;
                 self.gpu.prepare(&trace::modules(&plan), &constants(&plan))?;
                 let mut commands = Commands::new(self.gpu, constants(&plan), Instant::now())?;
-                let resources = RoomResources::new(self.gpu, &mut commands, &room, &plan)?;
+                let resources = RoomResources::new(&mut commands, &room, &plan)?;
                 self.turns(commands, |commands, turn| {
                     tallies::clear(commands, &resources.tallies);
                     for ranges in plan.chunks() {
@@ -275,7 +275,7 @@ impl Trial<'_> {
                 let plan = self.scene_plan(scene, geometry, builder)?;
                 self.gpu.prepare(&scene_trace::modules(&plan), &scene::constants(&plan))?;
                 let mut commands = Commands::new(self.gpu, scene::constants(&plan), Instant::now())?;
-                let resources = SceneResources::new(self.gpu, &mut commands, geometry, &plan, &[])?;
+                let resources = SceneResources::new(&mut commands, geometry, &plan, &[])?;
                 let (round, map) = (Round { resources: &resources, geometry, plan: &plan, number: 0 }, global_map(&plan));
                 let buffers = round.photons();
                 self.turns(commands, |commands, turn| {
