@@ -77,7 +77,7 @@ impl<'a> World for RoomOnGpu<'a> {
         let copies = (self.plan.settings.bounces * TALLY_COPIES) as usize;
         let of_rounds = commands.copy_out(tallies_of_rounds, if self.plan.chunks_per_round > 1 { copies } else { 0 })?;
         let all = commands.read(tallies, copies)?;
-        tallies::clear(commands, tallies);
+        commands.clear(tallies);
         let all = Fates::counted(&tallies::sums(&all), None);
         let of_rounds = of_rounds.take();
         let of_rounds = if of_rounds.is_empty() { all.clone() } else { Fates::counted(&tallies::sums(&of_rounds), None) };

@@ -88,8 +88,8 @@ fn one_round(commands: &mut Commands, round: Round, writer: &mut MapWriter, unwr
 fn one_map(commands: &mut Commands, round: Round, map: &MapPlan, take: &mut dyn FnMut(&[MapPhoton]) -> Result<()>) -> Result<Fates> {
     let which = usize::from(map.caustic_only);
     let (tallies, totals) = (&round.photons().tallies[which], &round.photons().totals[which]);
-    tallies::clear(commands, tallies);
-    totals::clear(commands, totals);
+    commands.clear(tallies);
+    commands.clear(totals);
     let mut stored = 0;
     for chunk in map.chunks() {
         let mut found: Vec<MapPhoton> = Vec::new();

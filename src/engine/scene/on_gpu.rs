@@ -208,8 +208,8 @@ impl<'a> World for SceneOnGpu<'a> {
             for (tallies, totals) in [(tallies, totals), (&photons.tallies_of_blocks[which], &photons.totals_of_blocks[which])] {
                 read_backs.push((commands.copy_out(tallies, copies)?, commands.copy_out(totals, totals::WORDS as usize)?));
             }
-            tallies::clear(commands, tallies);
-            totals::clear(commands, totals);
+            commands.clear(tallies);
+            commands.clear(totals);
         }
         commands.submit()?;
         let mut counted = read_backs

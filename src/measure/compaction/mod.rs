@@ -263,7 +263,7 @@ impl Trial<'_> {
                 let mut commands = Commands::new(self.gpu, constants(&plan), Instant::now())?;
                 let resources = RoomResources::new(&mut commands, &room, &plan)?;
                 self.turns(commands, |commands, turn| {
-                    tallies::clear(commands, &resources.tallies);
+                    commands.clear(&resources.tallies);
                     for ranges in plan.chunks() {
                         commands.scope(turn, |commands| trace::chunk(commands, &resources, &plan, 0, &ranges))?;
                         commands.submit()?;
@@ -279,7 +279,7 @@ impl Trial<'_> {
                 let (round, map) = (Round { resources: &resources, geometry, plan: &plan, number: 0 }, global_map(&plan));
                 let buffers = round.photons();
                 self.turns(commands, |commands, turn| {
-                    tallies::clear(commands, &buffers.tallies[0]);
+                    commands.clear(&buffers.tallies[0]);
                     for chunk in map.chunks() {
                         commands.scope(turn, |commands| scene_trace::trace(commands, round, map, chunk, &mut |_, _| Ok(())))?;
                         commands.submit()?;
