@@ -283,7 +283,7 @@ const WORLDS: [(&str, &[&str]); 2] = [
             "light_regions",
             "light_shares",
             "openings",
-            "colours",
+            "vertex_colours",
             "texels_1",
             "texels_2",
             "texels_3",

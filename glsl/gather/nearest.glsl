@@ -23,7 +23,7 @@ struct Search {
 layout(set = 0, binding = 3, scalar) readonly buffer Points { Point points[]; };
 layout(set = 0, binding = 0, scalar) readonly buffer Rooms { Room rooms[]; };
 // Heaps, the farthest photon on top: (bits of the squared distance, place in the tree), entry by entry of all points.
-layout(set = 1, binding = 4, scalar) buffer Nearest { uvec2 nearest[]; };
+layout(set = 1, binding = 4, scalar) buffer NearestPhotons { uvec2 nearest_photons[]; };
 layout(set = 1, binding = 5, scalar) buffer Searches { Search searches[]; };
 layout(set = 1, binding = 6, scalar) buffer Unfinished { uint unfinished[]; };
 layout(set = 1, binding = 7, scalar) readonly buffer TreeOrigins { uvec2 tree_origins[]; };
@@ -58,21 +58,21 @@ void keep(uint lane, uvec2 photon, inout uint found, inout uint steps)
         found++;
         while (entry > 0) {
             uint parent = (entry - 1) / 2;
-            uvec2 above = nearest[heap_place(lane, parent)];
+            uvec2 above = nearest_photons[heap_place(lane, parent)];
             if (nearer(photon, above)) {
                 break;
             }
-            nearest[heap_place(lane, entry)] = above;
+            nearest_photons[heap_place(lane, entry)] = above;
             entry = parent;
             steps++;
         }
-    } else if (nearer(photon, nearest[heap_place(lane, 0)])) {
+    } else if (nearer(photon, nearest_photons[heap_place(lane, 0)])) {
         entry = 0;
         uint child = 1;
         while (child < found) {
-            uvec2 below = nearest[heap_place(lane, child)];
+            uvec2 below = nearest_photons[heap_place(lane, child)];
             if (child + 1 < found) {
-                uvec2 other = nearest[heap_place(lane, child + 1)];
+                uvec2 other = nearest_photons[heap_place(lane, child + 1)];
                 if (nearer(below, other)) {
                     below = other;
                     child++;
@@ -81,7 +81,7 @@ void keep(uint lane, uvec2 photon, inout uint found, inout uint steps)
             if (nearer(below, photon)) {
                 break;
             }
-            nearest[heap_place(lane, entry)] = below;
+            nearest_photons[heap_place(lane, entry)] = below;
             entry = child;
             child = 2 * entry + 1;
             steps++;
@@ -89,7 +89,7 @@ void keep(uint lane, uvec2 photon, inout uint found, inout uint steps)
     } else {
         return;
     }
-    nearest[heap_place(lane, entry)] = photon;
+    nearest_photons[heap_place(lane, entry)] = photon;
 }
 
 // A squared distance within which K photons lie for certain, found in the smallest node around the point that has
@@ -154,13 +154,13 @@ void add_nearest(uint index, uint lane, Point point, uint found)
     sums[0] = uvec2(0);
     sums[1] = uvec2(0);
     for (uint entry = is_full ? 1 : 0; entry < found; entry++) {
-        uint place = nearest[heap_place(lane, entry)].y;
+        uint place = nearest_photons[heap_place(lane, entry)].y;
         sums[0] = add_words(sums[0], to_fixed_point(flux_of(tree_photons[place]), float(1u << NEAREST_BITS)));
         sums[1] = add_words(sums[1], to_fixed_point(weight_of(tree_photons[place]), float(1u << NEAREST_BITS)));
     }
     float factor = 1.0;
     if (is_full) {
-        float farthest = max(uintBitsToFloat(nearest[heap_place(lane, 0)].x), push.radius_squared * LEAST_DISC);
+        float farthest = max(uintBitsToFloat(nearest_photons[heap_place(lane, 0)].x), push.radius_squared * LEAST_DISC);
         float whole = push.radius_squared * covered_disc(point.position, point.wall, sqrt(push.radius_squared), rooms[0]);
         float covered = farthest * covered_disc(point.position, point.wall, sqrt(farthest), rooms[0]);
         factor = clamp(divide(whole, covered), 1.0, float(1u << NEAREST_GAIN_BITS));
@@ -204,7 +204,7 @@ void gather()
             }
         }
         if (search.found == push.nearest) {
-            search.limit = min(search.limit, uintBitsToFloat(nearest[heap_place(lane, 0)].x));
+            search.limit = min(search.limit, uintBitsToFloat(nearest_photons[heap_place(lane, 0)].x));
         }
     }
     bool is_done = walk.leaf >= walk.end;

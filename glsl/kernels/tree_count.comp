@@ -1,6 +1,6 @@
 // Counts the digits of a pass of the radix sort of index/tree_digits.glsl.
 // Dispatched by src/engine/room/index/tree.rs once a digit. One thread = a run of TREE_RUN photons.
-// After it counts[d * runs + r] = photons of run r with the digit d.
+// After it tree_counts[d * runs + r] = photons of run r with the digit d.
 #extension GL_EXT_scalar_block_layout : require
 
 #include "index/push.glsl"
@@ -9,7 +9,7 @@ layout(push_constant, scalar) uniform Push { TreePush push; };
 #include "world/room/photon.glsl"
 #include "index/photon_list.glsl"
 #include "index/tree_digits.glsl"
-layout(set = 1, binding = 3, scalar) writeonly buffer Counts { uint counts[]; };
+layout(set = 1, binding = 3, scalar) writeonly buffer TreeCounts { uint tree_counts[]; };
 
 #include "dispatch/dispatch.glsl"
 
@@ -30,6 +30,6 @@ void main()
         found[digit_of(keys[i])]++;
     }
     for (uint digit = 0; digit < TREE_RADIX; digit++) {
-        counts[digit * runs + run] = found[digit];
+        tree_counts[digit * runs + run] = found[digit];
     }
 }

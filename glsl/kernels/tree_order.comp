@@ -1,6 +1,6 @@
 // Moves photons to their places of a pass of the radix sort of index/tree_digits.glsl.
 // Dispatched by src/engine/room/index/tree.rs once a digit. One thread = a run of TREE_RUN photons.
-// counts[d * runs + r] = first place of the photons of run r with the digit d.
+// tree_counts[d * runs + r] = first place of the photons of run r with the digit d.
 #extension GL_EXT_scalar_block_layout : require
 
 #include "index/push.glsl"
@@ -9,7 +9,7 @@ layout(push_constant, scalar) uniform Push { TreePush push; };
 #include "world/room/photon.glsl"
 #include "index/photon_list.glsl"
 #include "index/tree_digits.glsl"
-layout(set = 1, binding = 3, scalar) readonly buffer Counts { uint counts[]; };
+layout(set = 1, binding = 3, scalar) readonly buffer TreeCounts { uint tree_counts[]; };
 layout(set = 1, binding = 4, scalar) writeonly buffer NextKeys { uvec2 next_keys[]; };
 
 #include "dispatch/dispatch.glsl"
@@ -24,7 +24,7 @@ void main()
     }
     uint place[TREE_RADIX];
     for (uint digit = 0; digit < TREE_RADIX; digit++) {
-        place[digit] = counts[digit * runs + run];
+        place[digit] = tree_counts[digit * runs + run];
     }
     uint end = min((run + 1) * TREE_RUN, length);
     for (uint i = run * TREE_RUN; i < end; i++) {

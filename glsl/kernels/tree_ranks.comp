@@ -8,7 +8,7 @@
 layout(push_constant, scalar) uniform Push { TreePush push; };
 #include "index/tree_nodes.glsl"
 layout(set = 1, binding = 2, scalar) readonly buffer Keys { uvec2 keys[]; }; // in order along the axis
-layout(set = 1, binding = 3, scalar) writeonly buffer Ranks { uint ranks[]; };
+layout(set = 1, binding = 3, scalar) writeonly buffer TreeRanks { uint tree_ranks[]; };
 layout(set = 1, binding = 4, scalar) writeonly buffer Planes { float planes[]; };
 
 #include "dispatch/dispatch.glsl"
@@ -21,7 +21,7 @@ void main()
         return;
     }
     uvec2 key = keys[place];
-    ranks[key.y] = place;
+    tree_ranks[key.y] = place;
     if (place == node_at(place).middle) {
         planes[place / TREE_LEAF] = key_coordinate(key.x);
     }

@@ -9,7 +9,7 @@ layout(push_constant, scalar) uniform Push { TreePush push; };
 #include "world/room/photon.glsl"
 #include "index/photon_list.glsl"
 #include "index/tree_digits.glsl"
-layout(set = 1, binding = 3, scalar) readonly buffer Counts { uint counts[]; };
+layout(set = 1, binding = 3, scalar) readonly buffer TreeCounts { uint tree_counts[]; };
 layout(set = 1, binding = 4, scalar) writeonly buffer WallBegins { uint wall_begins[]; };
 layout(set = 1, binding = 5, scalar) writeonly buffer Longest { uint longest[]; };
 
@@ -21,7 +21,7 @@ void main()
     wall_begins[0] = 0;
     for (uint wall = 0; wall < FACE_COUNT; wall++) {
         // The next wall's first place is this one's end; an empty list has no runs that counted.
-        uint end = runs == 0 ? 0 : counts[(wall + 1) * runs];
+        uint end = runs == 0 ? 0 : tree_counts[(wall + 1) * runs];
         wall_begins[wall + 1] = end;
         fullest = max(fullest, end - begin);
         begin = end;

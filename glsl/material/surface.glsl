@@ -109,7 +109,7 @@ layout(set = 0, binding = 2, scalar) readonly buffer Normals { TriangleNormals n
 layout(set = 0, binding = 3, scalar) readonly buffer Uvs { TriangleUvs uvs[]; };
 layout(set = 0, binding = 4, scalar) readonly buffer Materials { SurfaceMaterial materials[]; };
 // One for all triangles where no mesh has any.
-layout(set = 0, binding = 14, scalar) readonly buffer Colours { TriangleColours colours[]; };
+layout(set = 0, binding = 14, scalar) readonly buffer VertexColours { TriangleColours vertex_colours[]; };
 // One for all triangles where no layered material has a texture of its own, or a normal map.
 layout(set = 0, binding = 18, scalar) readonly buffer LayersOfTriangles { TriangleLayers triangle_layers[]; };
 // One for each material.
@@ -184,7 +184,7 @@ vec4 base_texel(SurfaceMaterial material, uint index, float u, float v)
 float vertex_alpha_at(uint index, float u, float v)
 {
     if (HAS_VERTEX_COLOURS) {
-        TriangleColours at = colours[min(index, uint(colours.length()) - 1)];
+        TriangleColours at = vertex_colours[min(index, uint(vertex_colours.length()) - 1)];
         return at.alphas.x + u * (at.alphas.y - at.alphas.x) + v * (at.alphas.z - at.alphas.x);
     }
     return 1.0;
@@ -406,7 +406,7 @@ Surface surface_at(Hit hit, vec3 wo)
     vec4 base = base_texel(material, hit.triangle, hit.u, hit.v);
     surface.base_colour = material.base_colour * base.rgb;
     if (HAS_VERTEX_COLOURS) {
-        TriangleColours at = colours[min(hit.triangle, uint(colours.length()) - 1)];
+        TriangleColours at = vertex_colours[min(hit.triangle, uint(vertex_colours.length()) - 1)];
         // Exactly 1 where all three are.
         surface.base_colour *= at.a + hit.u * (at.b - at.a) + hit.v * (at.c - at.a);
     }

@@ -9,7 +9,7 @@ use super::options::{DevicesOfRunArgs, ReportArgs};
 use super::progress::{MessageArgs, ProgressReporter};
 use super::request::{BAKE, RequestArgs};
 use super::values::{parse_number, parse_stops};
-use super::{End, say_beside};
+use super::{End, say_written};
 use crate::bake::pages::{Atlas, MIN_PAGE};
 use crate::bake::{MAX_SIDE, Written};
 use crate::error::{Error, Result};
@@ -83,15 +83,11 @@ pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
     let text = scene_report::text(name, run, "texel", args.messages.explains());
     reporter.finish();
     let written = written.and_then(|files| write_all(reports.files(run, || scene_report::json(name, run))).map(|()| files));
-    let files = match written {
-        Ok(files) => files,
-        Err(error) => return say_beside(&report_files, &text).and(Err(error)),
-    };
     let [maps, texels] = [(lightmaps.maps.len(), "lightmap"), (lightmaps.texels, "texel")].map(|(count, noun)| counted(count, noun));
     let exposure = lightmaps.stops.map_or_else(String::new, |stops| format!(", pictures for the eye at {stops:+.2} stops"));
     let line = |file: &Written| format!("\nwrote {}: {}", args.output.join(&file.name).display(), file.purpose);
-    let files: String = files.iter().map(line).collect();
-    say_beside(&report_files, &format!("{text}\n{maps} of {texels}{exposure}{files}"))?;
+    let wrote = written.map(|files| format!("\n{maps} of {texels}{exposure}{}", files.iter().map(line).collect::<String>()));
+    say_written(&report_files, &text, wrote)?;
     checkpoints.finish()?;
     Ok(End::of(run))
 }

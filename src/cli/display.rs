@@ -1,10 +1,17 @@
 //! `--display`: the viewer that shows a run while it goes on.
 
+use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
 
 use clap::Args;
 
+use super::complain;
+use crate::engine::run::saved::{SavedRun, WorldFilm};
+use crate::engine::run::watch::Later;
+use crate::engine::scene::SceneFilm;
 use crate::error::Result;
+use crate::output::show::{Layer, Show};
 use crate::output::tev::{Address, PORT, Viewer};
 
 #[derive(Args)]
@@ -23,9 +30,34 @@ impl DisplayArgs {
         self.display.is_some()
     }
 
-    /// The viewer, for a picture of this name and size; fails where nobody listens.
-    pub(super) fn connect(&self, name: String, size: (u32, u32)) -> Result<Option<Viewer>> {
-        self.display.as_ref().map(|address| Viewer::connect(address, name, size)).transpose()
+    /// The viewer, for the picture of a file; fails where nobody listens.
+    pub(super) fn connect(&self, file: Option<&Path>, show: &Show) -> Result<Option<Display>> {
+        let Some(address) = &self.display else { return Ok(None) };
+        // A viewer shows nothing of surfaces.
+        let show = Show { layers: Layer::ALL.into_iter().filter(|layer| !layer.is_of_surface()).collect(), ..show.clone() };
+        let name = file.map_or_else(String::new, |file| file.display().to_string());
+        Ok(Some(Display { viewer: Viewer::connect(address, name, show.size)?, show }))
+    }
+}
+
+/// A viewer and what it shows.
+pub(super) struct Display {
+    viewer: Viewer,
+    show: Show,
+}
+
+impl Display {
+    /// The picture so far.
+    pub(super) fn send(&mut self, run: Later<Arc<SavedRun>>) -> Result<()> {
+        let show = self.show.clone();
+        self.viewer.show(Box::new(move || show.channels(SceneFilm::of(&run().film), &[])))
+    }
+
+    /// The last picture.
+    pub(super) fn finish(self, film: &SceneFilm) {
+        if let Err(error) = self.viewer.finish(self.show.channels(film, &[])) {
+            complain(&format!("warning: {error}"));
+        }
     }
 }
 

@@ -6,8 +6,8 @@ use clap::Args;
 
 use super::values::{parse_stops, value_enum};
 use super::{JsonArg, complain, optional_file, say_beside};
-use crate::engine::blocks::Share;
-use crate::engine::saved::{NotMerged, SavedFilm, SavedRun};
+use crate::engine::run::blocks::Share;
+use crate::engine::run::saved::{NotMerged, SavedFilm, SavedRun};
 use crate::engine::scene::SceneFilm;
 use crate::error::{Error, Result, require};
 use crate::output::colour::{Format, Tone};

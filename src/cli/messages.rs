@@ -54,6 +54,14 @@ pub(super) fn say_beside<'a>(files: impl IntoIterator<Item = &'a Destination>, t
     say(text)
 }
 
+/// What came of a run, and what was written of it, or why it could not be.
+pub(super) fn say_written(files: &[Destination], text: &str, written: Result<String>) -> Result<()> {
+    match written {
+        Ok(wrote) => say_beside(files, &format!("{text}{wrote}")),
+        Err(error) => say_beside(files, text).and(Err(error)),
+    }
+}
+
 /// A destination that may be left out.
 pub(super) fn optional_file(option: &'static str, path: Option<&PathBuf>) -> Result<Option<Destination>> {
     path.map(|path| Destination::open(option, path)).transpose()

@@ -46,7 +46,7 @@ use clap::{ArgMatches, Args, ColorChoice, CommandFactory, FromArgMatches, Parser
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Options};
 use interrupt::{cancel_on_signal, exit_code, interruptible};
-use messages::{End, complain, optional_file, say, say_beside, spell};
+use messages::{End, complain, optional_file, say, say_beside, say_written, spell};
 use values::parse_bytes;
 
 /// Photon mapping on any Vulkan GPU.

@@ -41,12 +41,12 @@ impl Reports {
 
     /// What they hold after a run, of which `json` is the report.
     pub(super) fn files<Plan, Film>(
-        self,
+        &self,
         run: &RunResult<Plan, Film>,
         json: impl FnOnce() -> Vec<u8>,
     ) -> impl Iterator<Item = (Destination, Vec<u8>)> {
-        let json = self.json.map(|file| (file, spell(&String::from_utf8_lossy(&json())).into_bytes()));
-        let trace = self.trace.map(|file| (file, trace_file::chrome_trace(&run.timings, run.device_name())));
+        let json = self.json.as_ref().map(|file| (file.clone(), spell(&String::from_utf8_lossy(&json())).into_bytes()));
+        let trace = self.trace.as_ref().map(|file| (file.clone(), trace_file::chrome_trace(&run.timings, run.device_name())));
         json.into_iter().chain(trace)
     }
 }

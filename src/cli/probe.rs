@@ -10,7 +10,7 @@ use glam::DVec3;
 use super::options::{DevicesOfRunArgs, ReportArgs};
 use super::progress::{MessageArgs, ProgressReporter};
 use super::request::{PROBE, RequestArgs};
-use super::{End, say_beside};
+use super::{End, say_written};
 use crate::engine::scene::RunResult;
 use crate::error::{Error, Result};
 use crate::output::destination::{Destination, check_distinct, write_all};
@@ -63,10 +63,7 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
     let wrote = if output.is_standard_output() { String::new() } else { format!("\nwrote {}", args.output.display()) };
     let mut files = vec![(output, table(&run))];
     files.extend(reports.files(&run, || scene_report::json(scene, &run)));
-    if let Err(error) = write_all(files) {
-        return say_beside(&all, &text).and(Err(error));
-    }
-    say_beside(&all, &format!("{}{wrote}", text.trim_end()))?;
+    say_written(&all, text.trim_end(), write_all(files).map(|()| wrote))?;
     checkpoints.finish()?;
     Ok(End::of(&run))
 }

@@ -1,23 +1,21 @@
 //! `photonmill render`: what a camera sees of a scene.
 
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use clap::Args;
 
 use super::display::{DisplayArgs, EVERY};
-use super::options::{DevicesOfRunArgs, ReportArgs};
+use super::options::{DevicesOfRunArgs, ReportArgs, Reports};
 use super::progress::{MessageArgs, ProgressReporter};
 use super::request::{RENDER, RequestArgs};
 use super::values::{parse_integer, parse_photon_name};
-use super::{End, complain, optional_file, say, say_beside};
+use super::{End, complain, optional_file, say, say_beside, say_written};
 use crate::engine;
 use crate::engine::replay::PhotonName;
-use crate::engine::saved::{SavedFilm, SavedRun};
-use crate::engine::scene::replay;
-use crate::engine::watch::Later;
+use crate::engine::run::saved::{SavedRun, WorldFilm};
+use crate::engine::scene::{SceneFilm, replay};
 use crate::error::{Result, require};
 use crate::output::colour::Format;
 use crate::output::destination::{Destination, check_distinct, write_all};
@@ -67,108 +65,118 @@ const SNAPSHOT: Seconds = Seconds(5.0);
 
 pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     let request = &args.request.0;
-    let mut inputs = Inputs::open(request)?;
+    let inputs = Inputs::open(request)?;
     let reporter = ProgressReporter::explaining(&args.messages);
     let tell = |event: Event| reporter.event(event);
     let observer = Observer { cancelled, tell: &tell };
     if let Some(name) = args.replay {
         return show_photon(args, inputs, name, &observer, &reporter);
     }
-    let output = args.output.as_ref();
-    let format = output.map(|output| Format::of("-o", output)).transpose()?;
-    check_format(request, output.map(PathBuf::as_path))?;
-    args.check_judge(&inputs.settings, request.has_no_end())?;
-    let picture = optional_file("-o", output)?;
-    let errors = optional_file("--error-image", args.error_image.as_ref())?;
-    if let Some(path) = &args.error_image {
-        require(Format::of("--error-image", path)? == Format::Exr, "--error-image", path.display(), "must end in .exr")?;
-    }
-    let reports = args.report.open()?;
+    let mut outputs = Outputs::open(args, &inputs)?;
     let mut checkpoints = Checkpoints::open(request, &observer)?;
-    let shows_parts = format == Some(Format::Exr) && show(request, (0, 0)).layers.into_iter().any(Layer::is_part);
-    inputs = inputs.for_image(shows_parts || args.display.is_given(), checkpoints.resumed())?;
-    let files = [picture.clone(), errors.clone(), inputs.save_settings.clone()].into_iter().flatten().collect();
-    let all: Vec<Destination> = [files, reports.destinations(), checkpoints.destinations()].concat();
-    check_distinct(&all)?;
-    checkpoints.check_not_read(&all, request.inputs())?;
+    let inputs = inputs.for_image(outputs.shows_parts || args.display.is_given(), checkpoints.resumed())?;
+    outputs.all.extend(checkpoints.destinations());
+    check_distinct(&outputs.all)?;
+    checkpoints.check_not_read(&outputs.all, request.inputs())?;
 
     let mut prepared = prepare(inputs, Receivers::Image(None), &observer)?;
     let show = show(request, prepared.size());
-    // A viewer shows nothing of surfaces.
-    let live = Show { layers: Layer::ALL.into_iter().filter(|layer| !layer.is_of_surface()).collect(), ..show.clone() };
-    let name = output.map_or_else(String::new, |output| output.display().to_string());
-    let mut viewer = args.display.connect(name, live.size)?;
+    let mut display = args.display.connect(args.output.as_deref(), &show)?;
     let mut gpus = args.device.open(&reporter)?;
     prepared.inputs = prepared.inputs.ended(gpus[0].facts().kind);
-    let mut snapshot = |run: &SavedRun| match (&run.film, &picture, format) {
-        (SavedFilm::Scene(film), Some(picture), Some(format)) => write_all([(picture.clone(), show.so_far(film, format))]),
-        _ => Ok(()),
-    };
-    if let Some(Seconds(seconds)) = args.snapshot.or(request.has_no_end().then_some(SNAPSHOT)) {
-        require((0.001..=1e6).contains(&seconds), "--snapshot", seconds, "must be from 1ms to 1000000s")?;
-        checkpoints.set_snapshot(Duration::from_secs_f64(seconds), &mut snapshot);
+    let mut write = |run: &SavedRun| outputs.write_so_far(&show, run);
+    if let Some(Seconds(every)) = args.snapshot.or(request.has_no_end().then_some(SNAPSHOT)) {
+        require((0.001..=1e6).contains(&every), "--snapshot", every, "must be from 1ms to 1000000s")?;
+        checkpoints.set_snapshot(Duration::from_secs_f64(every), &mut write);
     }
-    let mut send = |run: Later<Arc<SavedRun>>| {
-        let Some(viewer) = &mut viewer else { return Ok(()) };
-        let live = live.clone();
-        viewer.show(Box::new(move || match &run().film {
-            SavedFilm::Scene(film) => live.channels(film, &[]),
-            SavedFilm::Room(_) => unreachable!("a scene is lit"),
-        }))
-    };
+    let mut send = |run| display.as_mut().map_or(Ok(()), |display| display.send(run));
     if args.display.is_given() {
         checkpoints.set_display(EVERY, &mut send);
     }
-    if picture.is_none() && request.shard.is_none() {
+    if outputs.picture.is_none() && request.shard.is_none() {
         prepared.tune(&mut gpus[0], &observer)?;
         return Ok(End::Finished);
     }
     let image = prepared.image(&mut gpus, &mut checkpoints, &observer)?;
     let kept = checkpoints.finish();
-    if let Some(viewer) = viewer
-        && let Err(error) = viewer.finish(live.channels(&image.run.film, &[]))
-    {
-        complain(&format!("warning: {error}"));
-    }
+    display.into_iter().for_each(|display| display.finish(&image.run.film));
 
-    let run = &image.run.result;
-    if run.film.sums.iter().all(|sum| *sum == 0) {
-        complain(
-            "warning: the picture is black: the camera sees nothing that is lit; is it outside of the scene, behind a wall, or does it look away?",
-        );
-    }
-    let scene = &image.scene.name;
-    let text = scene_report::text(scene, run, prepared.point, args.messages.explains());
-    let mut files = Vec::new();
-    let mut shown = String::new();
-    if let (Some(picture), Some(format), Some(output)) = (&picture, format, output) {
-        let asked = &prepared.inputs.settings;
-        if let Some(reason) = image.missing_parts(asked).filter(|_| shows_parts) {
-            let layers = "has no layers of the parts of its light, which this run does not keep apart";
-            complain(&format!("warning: -o {}: {layers}: {reason}", output.display()));
-        }
-        let (bytes, how) = image.file(request, format, &observer);
-        files.push((picture.clone(), bytes));
-        shown = format!("\nwrote {}{how}", output.display());
-    }
-    files.extend(errors.map(|errors| (errors, show.errors(&run.film))));
-    files.extend(reports.files(run, || scene_report::json(scene, run)));
+    let (files, wrote) = outputs.files(&image, &prepared.inputs.settings, &observer);
     let written = write_all(files);
     reporter.finish();
-    if let Err(error) = written {
-        return say_beside(&all, &text).and(Err(error));
-    }
-    say_beside(&all, &format!("{text}{shown}"))?;
+    let text = scene_report::text(&image.scene.name, &image.run, prepared.point, args.messages.explains());
+    say_written(&outputs.all, &text, written.map(|()| wrote))?;
     if let Some(samples) = args.judge {
         // The picture is there, so Ctrl-C may end the program here.
         let reporter = ProgressReporter::new(&args.messages.progress);
         reporter.step(&format!("path tracing {samples} samples per pixel on the CPU for --judge"));
         let verdict = verdict(&image, samples);
         reporter.finish();
-        say_beside(&all, &format!("judge: {verdict}"))?;
+        say_beside(&outputs.all, &format!("judge: {verdict}"))?;
     }
     kept?;
-    Ok(End::of(run))
+    Ok(End::of(&image.run))
+}
+
+/// Everything that the run will write, checked before it starts.
+struct Outputs {
+    picture: Option<(Destination, Format)>,
+    /// Whether the picture has layers of the parts of its light.
+    shows_parts: bool,
+    errors: Option<Destination>,
+    reports: Reports,
+    all: Vec<Destination>,
+}
+
+impl Outputs {
+    fn open(args: &RenderArgs, inputs: &Inputs) -> Result<Outputs> {
+        let request = &args.request.0;
+        let output = args.output.as_ref();
+        let format = output.map(|output| Format::of("-o", output)).transpose()?;
+        check_format(request, output.map(PathBuf::as_path))?;
+        args.check_judge(&inputs.settings, request.has_no_end())?;
+        let picture = optional_file("-o", output)?;
+        let errors = optional_file("--error-image", args.error_image.as_ref())?;
+        if let Some(path) = &args.error_image {
+            require(Format::of("--error-image", path)? == Format::Exr, "--error-image", path.display(), "must end in .exr")?;
+        }
+        let reports = args.report.open()?;
+        let files = [&picture, &errors, &inputs.save_settings].into_iter().flatten().cloned();
+        let all = files.chain(reports.destinations()).collect();
+        let shows_parts = format == Some(Format::Exr) && show(request, (0, 0)).layers.into_iter().any(Layer::is_part);
+        Ok(Outputs { picture: picture.zip(format), shows_parts, errors, reports, all })
+    }
+
+    /// The picture of a run that is under way.
+    fn write_so_far(&self, show: &Show, run: &SavedRun) -> Result<()> {
+        let Some((picture, format)) = &self.picture else { return Ok(()) };
+        write_all([(picture.clone(), show.so_far(SceneFilm::of(&run.film), *format))])
+    }
+
+    /// What an image gives, and what is to be said of its picture.
+    fn files(&self, image: &Image, asked: &SceneSettings, observer: &Observer) -> (Vec<(Destination, Vec<u8>)>, String) {
+        let run = &image.run.result;
+        if run.film.sums.iter().all(|sum| *sum == 0) {
+            complain(
+                "warning: the picture is black: the camera sees nothing that is lit; is it outside of the scene, behind a wall, or does it look away?",
+            );
+        }
+        let mut files = Vec::new();
+        let mut wrote = String::new();
+        if let Some((picture, format)) = &self.picture {
+            let path = picture.path().display();
+            if let Some(reason) = image.missing_parts(asked).filter(|_| self.shows_parts) {
+                let layers = "has no layers of the parts of its light, which this run does not keep apart";
+                complain(&format!("warning: -o {path}: {layers}: {reason}"));
+            }
+            let (bytes, how) = image.file(&image.request, *format, observer);
+            files.push((picture.clone(), bytes));
+            wrote = format!("\nwrote {path}{how}");
+        }
+        files.extend(self.errors.iter().map(|errors| (errors.clone(), show(&image.request, image.size).errors(&run.film))));
+        files.extend(self.reports.files(run, || scene_report::json(&image.scene.name, run)));
+        (files, wrote)
+    }
 }
 
 impl RenderArgs {

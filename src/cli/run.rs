@@ -10,7 +10,7 @@ use super::options::{DevicesOfRunArgs, ReportArgs, Reports};
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::request::{BOX, RequestArgs};
 use super::values::parse_photon_name;
-use super::{End, say, say_beside};
+use super::{End, say, say_written};
 use crate::engine::error::bound::ErrorSource;
 use crate::engine::replay::PhotonName;
 use crate::engine::room::film::estimate_walls;
@@ -144,9 +144,6 @@ impl Outputs {
         files.extend(self.reports.files(&outcome, || room_report::json(&outcome, &walls, &error)));
         let destinations: Vec<Destination> = files.iter().map(|(destination, _)| destination.clone()).collect();
         let text = room_report::text(&outcome, &error);
-        match write_all(files) {
-            Ok(()) => say_beside(&destinations, &format!("{text}\nwrote {picture}")),
-            Err(error) => say_beside(&destinations, &text).and(Err(error)),
-        }
+        say_written(&destinations, &text, write_all(files).map(|()| format!("\nwrote {picture}")))
     }
 }

@@ -8,7 +8,7 @@ use super::room::constants;
 use super::room::on_gpu::modules;
 use super::run::check_math;
 use crate::engine::room::resources::RoomResources;
-use crate::engine::room::{estimate, index, trace};
+use crate::engine::room::{Chunk, estimate, index, trace};
 use crate::error::{Error, Result};
 use crate::gpu::{Commands, Gpu};
 use crate::plan::{RoomPlan, photons_of};
@@ -99,15 +99,16 @@ fn plans(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings) -> Result<Vec<Ro
 fn first_chunk_ms(gpu: &Gpu, scene: &RoomScene, plan: &RoomPlan) -> Result<f64> {
     gpu.prepare(&modules(plan, gpu), &constants(plan))?;
     let mut commands = Commands::new(gpu, constants(plan), Instant::now())?;
-    let resources = RoomResources::new(gpu, &mut commands, scene, plan)?;
+    let resources = RoomResources::new(&mut commands, scene, plan)?;
     commands.warm_up()?;
     commands.submit()?;
     let ranges = plan.chunk(0);
     commands.scope("chunk", |commands| {
         trace::chunk(commands, &resources, plan, 0, &ranges)?;
-        index::build(commands, &resources, plan, photons_of(&ranges))?;
+        let traced = Chunk { resources: &resources, plan, photon_count: photons_of(&ranges) };
+        index::build(commands, traced)?;
         if plan.settings.gather == Gather::Brute {
-            estimate::gather(commands, &resources, plan, photons_of(&ranges))?;
+            estimate::gather(commands, traced)?;
         }
         Ok(())
     })?;

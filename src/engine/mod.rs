@@ -15,7 +15,6 @@ pub mod tallies;
 pub mod totals;
 
 pub use run::watch::{Control, End, Progress};
-pub use run::{blocks, identity, retry, saved, several_devices, watch};
 
 use crate::gpu::DeviceFacts;
 use crate::plan::Limits;

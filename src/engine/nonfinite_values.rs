@@ -39,18 +39,9 @@ pub struct NonfiniteValues {
 impl NonfiniteValues {
     /// What a run with `--paranoid` found; `None` without it.
     pub fn found(commands: &mut Commands, buffer: &Buffer<u32>, paranoid: bool) -> Result<Option<NonfiniteValues>> {
-        if paranoid { NonfiniteValues::read(commands, buffer).map(Some) } else { Ok(None) }
-    }
-
-    /// Of two devices that shared a run.
-    pub fn both(one: Option<NonfiniteValues>, other: Option<NonfiniteValues>) -> Option<NonfiniteValues> {
-        let (Some(mut one), Some(other)) = (one, other) else { return None };
-        one.count = one.count.saturating_add(other.count);
-        one.first.extend(other.first);
-        Some(one)
-    }
-
-    fn read(commands: &mut Commands, buffer: &Buffer<u32>) -> Result<NonfiniteValues> {
+        if !paranoid {
+            return Ok(None);
+        }
         let words = commands.read(buffer, buffer.count() as usize)?;
         let mut nonfinite_values = NonfiniteValues::default();
         for (kind, words) in words.chunks_exact(NONFINITE_KIND_WORDS).enumerate() {
@@ -68,7 +59,15 @@ impl NonfiniteValues {
         // Devices note in any order.
         nonfinite_values.first.sort_by_key(|nonfinite_value| (nonfinite_value.what as u32, nonfinite_value.round, nonfinite_value.item));
         nonfinite_values.first.dedup();
-        Ok(nonfinite_values)
+        Ok(Some(nonfinite_values))
+    }
+
+    /// Of two devices that shared a run.
+    pub fn both(one: Option<NonfiniteValues>, other: Option<NonfiniteValues>) -> Option<NonfiniteValues> {
+        let (Some(mut one), Some(other)) = (one, other) else { return None };
+        one.count = one.count.saturating_add(other.count);
+        one.first.extend(other.first);
+        Some(one)
     }
 
     pub fn add(&mut self, what: What, round: u32, item: u32) {

@@ -74,9 +74,14 @@ impl Planned<'_> {
 
     /// The only one that is listed, set to zero.
     pub fn zeroed<T: Pod>(&self, commands: &mut Commands, declared: Declared<T>) -> Result<Buffer<T>> {
-        let buffer = self.one(declared)?;
-        commands.clear(&buffer);
+        let [buffer] = self.several_zeroed(commands, declared)?;
         Ok(buffer)
+    }
+
+    pub fn several_zeroed<T: Pod, const N: usize>(&self, commands: &mut Commands, declared: Declared<T>) -> Result<[Buffer<T>; N]> {
+        let buffers = self.several(declared)?;
+        buffers.iter().for_each(|buffer| commands.clear(buffer));
+        Ok(buffers)
     }
 
     /// The only one that is listed with its content, of which the plan keeps all or nothing.

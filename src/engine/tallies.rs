@@ -6,10 +6,6 @@ use crate::error::Result;
 use crate::gpu::{Buffer, Commands};
 use crate::records::Tally;
 
-pub fn clear(commands: &mut Commands, tallies: &Buffer<Tally>) {
-    commands.clear(tallies);
-}
-
 /// Fates of the first bounces, copies added up.
 pub fn read(commands: &mut Commands, tallies: &Buffer<Tally>, bounces: u32) -> Result<Vec<Tally>> {
     Ok(sums(&commands.read(tallies, (bounces * TALLY_COPIES) as usize)?))

@@ -1,15 +1,10 @@
 //! What a scene's photons lose to limits, and how many its maps have held: twin of `glsl/ledger/totals.glsl`.
 
 use crate::constants::{TALLY_COPIES, TOTAL_WORDS};
-use crate::gpu::{Buffer, Commands};
 use crate::ledger::Totals;
 
 /// Words of the buffer.
 pub const WORDS: u64 = TOTAL_WORDS as u64 * TALLY_COPIES as u64;
-
-pub fn clear(commands: &mut Commands, totals: &Buffer<u32>) {
-    commands.clear(totals);
-}
 
 /// What [`WORDS`] words of a buffer count, copies added up.
 pub fn sum(words: &[u32]) -> Totals {

@@ -7,7 +7,7 @@ use std::time::Instant;
 use glam::Vec2;
 
 use super::kernels::{CheckMath, CheckSampling, StartUpTwoWords, StartUpU64};
-use super::{Commands, Constants, Extent, Gpu, Memory};
+use super::{Commands, Constants, Extent, Gpu, Memory, dispatch_by_sums};
 use crate::constants::{LOOP_LIMIT, TALLY_COPIES};
 use crate::error::{Error, Result};
 use crate::records::{CheckPush, MathResults, Samples, SamplingCase, Tally};
@@ -72,9 +72,8 @@ pub fn loop_count(gpu: &Gpu, wanted: u32) -> Result<LoopCount> {
 pub fn math(gpu: &Gpu, operands: &[Vec2]) -> Result<Vec<MathResults>> {
     let constants = Constants::new(GROUP_SIZE).set("STRICT_MATH", 1);
     let mut commands = Commands::new(gpu, constants, Instant::now())?;
-    let inputs = gpu.buffer::<Vec2>("operands", operands.len() as u64, Memory::Device)?;
+    let inputs = commands.uploaded("operands", operands)?;
     let results = gpu.buffer::<MathResults>("math results", operands.len() as u64, Memory::Device)?;
-    commands.upload(&inputs, operands)?;
     commands.dispatch(CheckMath { operands: &inputs, results: &results }, &(), Extent::Items(operands.len() as u64))?;
     commands.read(&results, operands.len())
 }
@@ -83,9 +82,8 @@ pub fn math(gpu: &Gpu, operands: &[Vec2]) -> Result<Vec<MathResults>> {
 pub fn sampling(gpu: &Gpu, constants: &[(&'static str, u32)], cases: &[SamplingCase]) -> Result<Vec<Samples>> {
     let constants = constants.iter().fold(Constants::new(GROUP_SIZE), |constants, (name, value)| constants.set(name, *value));
     let mut commands = Commands::new(gpu, constants, Instant::now())?;
-    let inputs = gpu.buffer::<SamplingCase>("sampling cases", cases.len() as u64, Memory::Device)?;
+    let inputs = commands.uploaded("sampling cases", cases)?;
     let results = gpu.buffer::<Samples>("samples", cases.len() as u64, Memory::Device)?;
-    commands.upload(&inputs, cases)?;
     commands.dispatch(CheckSampling { cases: &inputs, results: &results }, &(), Extent::Items(cases.len() as u64))?;
     commands.read(&results, cases.len())
 }
@@ -129,13 +127,13 @@ fn ask(gpu: &Gpu, push: &CheckPush) -> Result<Answers> {
     let counters = gpu.buffer::<u32>("check counters", 1, Memory::Device)?;
     let tallies = gpu.buffer::<Tally>("check tallies", u64::from(TALLY_COPIES), Memory::Device)?;
     commands.clear(&counters);
-    if gpu.facts.int64_atomics {
-        let kernel = StartUpU64 { film: &film, answers: &answers, entries: &entries, counters: &counters, tallies: &tallies };
-        commands.dispatch(kernel, push, Extent::Groups(1, 1))?;
-    } else {
-        let kernel = StartUpTwoWords { film: &film, answers: &answers, entries: &entries, counters: &counters, tallies: &tallies };
-        commands.dispatch(kernel, push, Extent::Groups(1, 1))?;
-    }
+    dispatch_by_sums!(
+        commands,
+        gpu.facts.int64_atomics,
+        [StartUpU64, StartUpTwoWords] { film: &film, answers: &answers, entries: &entries, counters: &counters, tallies: &tallies },
+        push,
+        Extent::Groups(1, 1)
+    )?;
     let words = commands.read(&answers, 5)?;
     let film_sum = commands.read(&film, 1)?[0];
     let stored = commands.read::<u32>(&counters, 1)?[0].min(16 * push.photon_count);

@@ -8,7 +8,6 @@ pub mod commands;
 mod descriptor_sets;
 pub mod device;
 mod faults;
-mod hazards;
 pub mod kernel;
 mod labels;
 mod mapped_file;
@@ -32,6 +31,7 @@ use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
 pub use buffer::{AnyBuffer, Buffer, HeldMemory, Memory};
+pub(crate) use commands::dispatch_by_sums;
 pub use commands::{Commands, Extent, Interrupt};
 pub use device::{DeviceFacts, Reconvergence};
 pub use kernel::{Constants, Kernel, Module};

@@ -10,6 +10,7 @@ use egui_ash_renderer::{DynamicRendering, Options as PainterOptions, RenderMode,
 use winit::raw_window_handle::{HasDisplayHandle, HasWindowHandle, RawDisplayHandle};
 pub use winit::window::Window;
 
+use super::commands::command_buffer;
 use super::{Buffer, Context, DeviceFacts, Gpu, call};
 use crate::error::{Error, Result};
 
@@ -123,18 +124,9 @@ impl<'gpu> Presenter<'gpu> {
             .find(|format| known.contains(&format.format) && format.color_space == vk::ColorSpaceKHR::SRGB_NONLINEAR)
             .ok_or_else(|| no_window("the display has no pixels of 8 bits"))?;
         let device = &context.device;
-        let pool_info = vk::CommandPoolCreateInfo::default()
-            .queue_family_index(gpu.facts.queue_family)
-            .flags(vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER);
-        // SAFETY: all infos are complete; everything is destroyed in Drop.
-        let (pool, command_buffer, fence, acquired) = unsafe {
-            let pool = call("vkCreateCommandPool", || device.create_command_pool(&pool_info, None))?;
-            let info = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(1);
-            let command_buffer = call("vkAllocateCommandBuffers", || device.allocate_command_buffers(&info))?[0];
-            let fence = call("vkCreateFence", || device.create_fence(&vk::FenceCreateInfo::default(), None))?;
-            let acquired = call("vkCreateSemaphore", || device.create_semaphore(&vk::SemaphoreCreateInfo::default(), None))?;
-            (pool, command_buffer, fence, acquired)
-        };
+        let (pool, command_buffer, fence) = command_buffer(gpu)?;
+        // SAFETY: the info is complete; destroyed in Drop, as all is.
+        let acquired = call("vkCreateSemaphore", || unsafe { device.create_semaphore(&vk::SemaphoreCreateInfo::default(), None) })?;
         let mode =
             DynamicRendering { color_attachment_format: format.format, depth_attachment_format: None, stencil_attachment_format: None };
         let painter = Renderer::with_default_allocator(

@@ -7,7 +7,7 @@ use serde_json::{Map, Value};
 
 use super::report::{Errors, errors, ledger};
 use crate::engine::error::bound::FilmError;
-use crate::engine::saved::SavedRun;
+use crate::engine::run::saved::SavedRun;
 use crate::engine::scene::SceneFilm;
 use crate::ledger::{Fates, Ledger};
 use crate::text::counted;

@@ -12,7 +12,7 @@ use crate::engine::error::bound::{ErrorPlaces, ErrorSource, FilmError};
 use crate::engine::error::unknown::Unknown;
 use crate::engine::nonfinite_values::NonfiniteValues;
 use crate::engine::run::RunResult;
-use crate::engine::watch::End;
+use crate::engine::run::watch::End;
 use crate::gpu::DeviceFacts;
 use crate::ledger::{Ledger, Losses};
 use crate::settings::stop::{LEAST_BLOCKS, Measure, Stop};

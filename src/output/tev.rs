@@ -10,7 +10,7 @@ use std::time::Duration;
 use tev_client::{PacketCreateImage, PacketUpdateImage, TevClient};
 
 use super::exr_file::Channel;
-use crate::engine::watch::Later;
+use crate::engine::run::watch::Later;
 use crate::error::{Error, Result};
 
 /// Where tev listens unless it is started with another `--hostname`.

@@ -45,28 +45,35 @@ impl ScenePlan {
         limits: &Limits,
         trial: Option<Trial>,
     ) -> Result<ScenePlan> {
-        let plan = ScenePlan::fitting(scene, geometry, settings, sensor, limits, trial.clone());
+        let asked = Asked { scene, geometry, settings, sensor, limits, trial: trial.as_ref() };
+        let plan = asked.plan();
         if plan.is_ok() || !settings.keeps_parts {
             return plan;
         }
         // A picture that is too large with its parts may fit without them.
-        let without = SceneSettings { keeps_parts: false, ..settings.clone() };
-        ScenePlan::fitting(scene, geometry, &without, sensor, limits, trial)
+        Asked { settings: &SceneSettings { keeps_parts: false, ..settings.clone() }, ..asked }.plan()
     }
+}
 
+/// What a plan is made of.
+#[derive(Clone, Copy)]
+struct Asked<'a> {
+    scene: &'a Scene,
+    geometry: &'a Geometry,
+    settings: &'a SceneSettings,
+    sensor: Sensor,
+    limits: &'a Limits,
+    trial: Option<&'a Trial>,
+}
+
+impl Asked<'_> {
     /// In as large pieces as fit on the device.
-    fn fitting(
-        scene: &Scene,
-        geometry: &Geometry,
-        settings: &SceneSettings,
-        sensor: Sensor,
-        limits: &Limits,
-        trial: Option<Trial>,
-    ) -> Result<ScenePlan> {
+    fn plan(self) -> Result<ScenePlan> {
+        let Asked { settings, limits, .. } = self;
         // Where the scene and the picture leave little room, photons are traced in smaller chunks.
         let mut for_maps = *limits;
         loop {
-            let plan = ScenePlan::with_maps_within(scene, geometry, settings, sensor, limits, &for_maps, trial.clone())?;
+            let plan = self.with_maps_within(&for_maps)?;
             let chunk = plan.maps().map(|map| map.chunk_photons).max().unwrap_or(0);
             if plan.bytes <= limits.memory_bytes {
                 return Ok(plan);
@@ -75,7 +82,7 @@ impl ScenePlan {
                 // As much as is enough in any case.
                 let boundless = Limits { memory_bytes: u64::MAX, ..*limits };
                 let in_pieces = SceneSettings { chunk: Some(LEAST_CHUNK.min(settings.chunk.unwrap_or(LEAST_CHUNK))), ..settings.clone() };
-                let all = ScenePlan::with_maps_within(scene, geometry, &in_pieces, sensor, limits, &boundless, trial)?.bytes;
+                let all = Asked { settings: &in_pieces, ..self }.with_maps_within(&boundless)?.bytes;
                 let needed = format!(
                     "is less than the {} MiB of device memory that the run needs even in small pieces; ask for a smaller picture, or choose another `device`",
                     all.max(plan.bytes).div_ceil(1 << 20)
@@ -86,15 +93,8 @@ impl ScenePlan {
         }
     }
 
-    fn with_maps_within(
-        scene: &Scene,
-        geometry: &Geometry,
-        settings: &SceneSettings,
-        sensor: Sensor,
-        limits: &Limits,
-        for_maps: &Limits,
-        trial: Option<Trial>,
-    ) -> Result<ScenePlan> {
+    fn with_maps_within(self, for_maps: &Limits) -> Result<ScenePlan> {
+        let Asked { scene, geometry, settings, sensor, limits, trial } = self;
         let began = Instant::now();
         settings.validate()?;
         let count = geometry.triangles.len();
@@ -110,7 +110,7 @@ impl ScenePlan {
         let by_itself = if settings.math == Math::Strict || !limits.votes_in_loops { Builder::Ballot } else { Builder::Persistent };
         let settings = SceneSettings { builder: Some(settings.builder.unwrap_or(by_itself)), ..settings.clone() };
         let split = settings.illumination == Illumination::Split;
-        let maps = Maps::new(scene, geometry, &settings, for_maps, trial.as_ref(), &keeps)?;
+        let maps = Maps::new(scene, geometry, &settings, for_maps, trial, &keeps)?;
         let gather_rays = match (keeps(Effect::Indirect), settings.final_gather, keeps(Effect::Glossy)) {
             (true, true, _) => GATHER_ALL,
             (true, false, true) if split => GATHER_GLOSSY,
@@ -123,7 +123,7 @@ impl ScenePlan {
         let mut constants = constants(geometry, &settings, &facts, &maps, &keeps);
         constants.extend([("GATHER_RAYS", gather_rays), ("CHAIN_STEPS", chain_steps)]);
         constants.push(("HAS_SEEN_LIGHT", u32::from(is_picture)));
-        let has_clusters = trial.as_ref().is_some_and(|trial| trial.lights.is_some());
+        let has_clusters = trial.is_some_and(|trial| trial.lights.is_some());
         constants.push(("HAS_LIGHT_CLUSTERS", u32::from(has_clusters)));
         let Maps { global, caustic, caustic_surfaces, targets, arrivals } = maps;
         let tiles = settings.tiles.as_ref().filter(|_| is_picture);
@@ -155,7 +155,7 @@ impl ScenePlan {
         let mut plan = ScenePlan {
             settings,
             sensor,
-            trial,
+            trial: trial.cloned(),
             decisions,
             constants,
             global,
@@ -183,7 +183,9 @@ impl ScenePlan {
         plan.planned_in = began.elapsed();
         Ok(plan)
     }
+}
 
+impl ScenePlan {
     /// A unit far below the scene's mean radiance, and sums that cannot overflow however long the run goes on.
     fn set_film(&mut self, geometry: &Geometry, facts: &Facts) {
         let mean = (geometry.power / 3.0 / (PI * geometry.area)).max(f64::MIN_POSITIVE);

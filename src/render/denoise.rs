@@ -4,7 +4,7 @@
 use glam::{DVec3, Vec3};
 
 use super::events::Observer;
-use crate::engine::saved::SavedRun;
+use crate::engine::run::saved::SavedRun;
 use crate::engine::scene::SceneFilm;
 use crate::error::{Result, require};
 use crate::oidn::{Denoiser, Guides};

@@ -3,7 +3,7 @@
 use std::sync::atomic::AtomicBool;
 
 use crate::engine::Progress;
-use crate::engine::retry::in_words;
+use crate::engine::run::retry::in_words;
 use crate::engine::scene::pilot::Pilot;
 use crate::error::Error;
 use crate::gpu::Gpu;
@@ -64,7 +64,7 @@ impl Observer<'_> {
     }
 
     /// Reports a device that failed while it was at work.
-    pub(super) fn failed(&self) -> impl Fn(&Gpu, &Error, crate::engine::retry::Remedy) {
+    pub(super) fn failed(&self) -> impl Fn(&Gpu, &Error, crate::engine::run::retry::Remedy) {
         |gpu: &Gpu, error: &Error, remedy| self.warn(in_words(gpu, error, remedy))
     }
 }

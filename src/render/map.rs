@@ -2,11 +2,11 @@
 
 use super::events::{Event, Observer};
 use super::prepare::Prepared;
-use crate::engine::retry::until_done;
+use crate::engine::run::retry::until_done;
+use crate::engine::run::watch::Keep;
 use crate::engine::scene::fill_map::{Filled, fill};
 use crate::engine::scene::map_file::{Header, MapWriter};
 use crate::engine::scene::trial;
-use crate::engine::watch::Keep;
 use crate::engine::{self, Control};
 use crate::error::{Error, Result, require};
 use crate::gpu::Gpu;

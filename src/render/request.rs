@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 
 use super::values::{Layers, Percent, Seconds, Shininess, Stops, SunPosition, Threads, Variant, Watts};
-use crate::engine::blocks;
+use crate::engine::run::blocks;
 use crate::output::colour::Tone;
 use crate::plan::work_division::Free;
 use crate::rng::Rng;

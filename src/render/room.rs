@@ -1,6 +1,5 @@
 //! The paper's box: from a request to a run.
 
-use std::cell::OnceCell;
 use std::path::Path;
 
 use super::bias::{bias_before, rounds_after};
@@ -11,17 +10,14 @@ use super::request::RenderRequest;
 use super::values::{Shininess, Threads, Variant, Watts};
 use crate::engine::choose_builder::{Choice, choose_builder};
 use crate::engine::error::bound::FilmError;
-use crate::engine::identity::settings_with_effect;
-use crate::engine::retry::{run_on, until_done};
-use crate::engine::room::film::{RoomFilm, estimate_walls};
+use crate::engine::room::film::estimate_walls;
 use crate::engine::room::{self, RunResult};
-use crate::engine::saved::SavedFilm;
-use crate::engine::several_devices::Work;
-use crate::engine::watch::End;
+use crate::engine::run::identity::settings_with_effect;
+use crate::engine::run::retry::{run_on, until_done};
+use crate::engine::run::watch::End;
 use crate::engine::{self, Control};
 use crate::error::{Result, require};
 use crate::gpu::Gpu;
-use crate::ledger::Fates;
 use crate::output::colour::Format;
 use crate::output::destination::{Destination, write_all};
 use crate::output::image::overview;
@@ -134,27 +130,9 @@ fn light(gpus: &mut Vec<Gpu>, scene: &RoomScene, settings: &RoomSettings, observ
     let is_alone = gpus.len() == 1;
     require(is_alone || settings.sums == Sums::Integer, "devices", "with `sums`", "adds up integers only; leave `sums` out")?;
     let plan = RoomPlan::new(scene, settings, &engine::limits(gpus[0].facts()))?;
-    let weights = OnceCell::new();
     let run =
         |gpu: &Gpu, stop: Stop, control: &mut Control| room::run(Some(gpu), scene, &RoomSettings { stop, ..settings.clone() }, control);
-    let work = Work {
-        run: &run,
-        film: |film| match film {
-            SavedFilm::Room(film) => film,
-            SavedFilm::Scene(_) => unreachable!("the box was lit"),
-        },
-        error: &|film: &RoomFilm| room::error(film, scene, &plan, &weights),
-        losses: &|_: &RoomFilm, fates: &[Fates]| room::losses(&plan, fates),
-        can_go_on: settings.sums == Sums::Integer,
-        stop: settings.stop,
-        // The paper's radius never shrinks, and its rounds are independent.
-        alpha: 1.0,
-        rounds: settings.rounds,
-        rounds_per_block: 1,
-        bounces: settings.bounces,
-        photons_per_round: settings.photons.into(),
-    };
-    let outcome = run_on(gpus, &work, &observer.failed(), control)?;
+    let outcome = run_on(gpus, &room::task(scene, &plan), &run, &observer.failed(), control)?;
     // With its goals, which no device had.
     Ok(RunResult { plan: RoomPlan { settings: settings.clone(), ..outcome.plan }, ..outcome })
 }

@@ -9,7 +9,7 @@ use std::str::FromStr;
 
 use glam::DVec3;
 
-use crate::engine::blocks;
+use crate::engine::run::blocks;
 use crate::output::colour::Tone;
 use crate::output::show::Layer;
 use crate::rng::Rng;

@@ -1,4 +1,4 @@
-//! What is asked for to end a run before its last round; `engine::watch` ends it.
+//! What is asked for to end a run before its last round; `engine::run::watch` ends it.
 
 use serde::Serialize;
 

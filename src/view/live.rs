@@ -44,8 +44,8 @@ impl Status {
     /// Takes what the latest round has left.
     pub fn take(&mut self, live: &mut Live) {
         self.ledger = match live {
-            Live::Scene(live) => live.ledger(),
-            Live::Room(live) => live.ledger(),
+            Live::Scene(live) => live.run.state.ledger(),
+            Live::Room(live) => live.run.state.ledger(),
         };
         if let Live::Scene(live) = live {
             (self.kept_rounds, self.kept_bytes) = live.kept();
@@ -91,22 +91,22 @@ impl<'a> Live<'a> {
 
     pub fn has_ended(&self) -> bool {
         match self {
-            Live::Scene(live) => live.has_ended(),
-            Live::Room(live) => live.has_ended(),
+            Live::Scene(live) => live.run.has_ended(),
+            Live::Room(live) => live.run.has_ended(),
         }
     }
 
     pub fn rounds(&self) -> u32 {
         match self {
-            Live::Scene(live) => live.rounds(),
-            Live::Room(live) => live.rounds(),
+            Live::Scene(live) => live.run.state.rounds(),
+            Live::Room(live) => live.run.state.rounds(),
         }
     }
 
     pub fn take_timings(&mut self) -> Timings {
         match self {
-            Live::Scene(live) => live.take_timings(),
-            Live::Room(live) => live.take_timings(),
+            Live::Scene(live) => std::mem::take(live.run.recorder.timings()),
+            Live::Room(live) => std::mem::take(live.run.recorder.timings()),
         }
     }
 
@@ -120,15 +120,15 @@ impl<'a> Live<'a> {
 
     pub fn commands(&mut self) -> &mut Commands<'a> {
         match self {
-            Live::Scene(live) => live.commands(),
-            Live::Room(live) => live.commands(),
+            Live::Scene(live) => &mut live.run.recorder,
+            Live::Room(live) => &mut live.run.recorder,
         }
     }
 
     pub fn look(&mut self) -> Result<Look> {
         match self {
             Live::Scene(live) => {
-                let (film, error) = live.look()?;
+                let (film, error) = live.run.look()?;
                 let pixels: Vec<Vec3> = film.means().map(DVec3::as_vec3).collect();
                 let mean = film.surface_means().map(|mean| mean.element_sum() / 3.0).sum::<f64>() / pixels.len().max(1) as f64;
                 let picture = ColourPicture { width: pixels.len() as u32, height: 1, pixels };

@@ -200,9 +200,9 @@ pub fn photons_on_cpu(settings: &RoomSettings) -> Vec<Photon> {
 /// What the device gathers of photons that are handed to it, so many times over, onto film sums or an empty film.
 pub fn gathered(gpu: &Gpu, plan: &RoomPlan, photons: &[Photon], times: u32, film: Option<&[u64]>) -> Vec<u64> {
     assert!(photons.len() <= plan.photon_capacity as usize);
-    let (scene, chunk) = (open_box(&plan.settings), plan.settings.photons);
+    let scene = open_box(&plan.settings);
     let mut commands = Commands::new(gpu, room::constants(plan), Instant::now()).unwrap();
-    let resources = RoomResources::new(gpu, &mut commands, &scene, plan).unwrap();
+    let resources = RoomResources::new(&mut commands, &scene, plan).unwrap();
     // As if they had been traced.
     let stored: Vec<StoredPhoton> = photons.iter().map(Photon::stored).collect();
     commands.upload(&resources.photons, &stored).unwrap();
@@ -212,8 +212,9 @@ pub fn gathered(gpu: &Gpu, plan: &RoomPlan, photons: &[Photon], times: u32, film
     }
     commands.upload(&resources.counters, &[photons.len() as u32]).unwrap();
     film.into_iter().for_each(|sums| commands.upload(&resources.film, sums).unwrap());
-    index::build(&mut commands, &resources, plan, chunk).unwrap();
-    (0..times).for_each(|_| estimate::gather(&mut commands, &resources, plan, chunk).unwrap());
+    let chunk = room::Chunk { resources: &resources, plan, photon_count: plan.settings.photons };
+    index::build(&mut commands, chunk).unwrap();
+    (0..times).for_each(|_| estimate::gather(&mut commands, chunk).unwrap());
     commands.read(&resources.film, plan.points.len() * plan.channel_count as usize).unwrap()
 }
 

@@ -5,7 +5,7 @@ use std::process::Command;
 
 use crate::common::prelude::*;
 use crate::common::program::on_device;
-use photonmill::engine::saved::SavedRun;
+use photonmill::engine::run::saved::SavedRun;
 
 /// A radius that is given needs no trial.
 const SMALL: &str = "--size 8x8 --photons 500 --caustic-photons 300 --radius 0.05 --block 1 -q";

@@ -159,7 +159,7 @@ fn photons_stored_lie_in_the_map(illumination: Illumination) {
         let lit = run(&gpu, &scene, &settings, 8, &AtomicBool::new(false)).unwrap();
         let geometry = Geometry::new(&scene).unwrap();
         let mut commands = Commands::new(&gpu, scene::constants(&lit.plan), Instant::now()).unwrap();
-        let resources = SceneResources::new(&gpu, &mut commands, &geometry, &lit.plan, &[]).unwrap();
+        let resources = SceneResources::new(&mut commands, &geometry, &lit.plan, &[]).unwrap();
         let buffers = resources.photons.as_ref().unwrap();
         let round = Round { resources: &resources, geometry: &geometry, plan: &lit.plan, number: 0 };
         for map in lit.plan.maps() {
@@ -169,7 +169,7 @@ fn photons_stored_lie_in_the_map(illumination: Illumination) {
                     stored += u64::from(commands.read(&buffers.counters, 1)?[0]);
                     Ok(())
                 };
-                trace::trace(&mut commands, round, buffers, map, chunk, &mut count).unwrap();
+                trace::trace(&mut commands, round, map, chunk, &mut count).unwrap();
             }
             let fates = &lit.fates[usize::from(map.caustic_only)];
             assert!(stored > 100, "{builder:?}, {illumination:?}, {}: {stored}", map.name);

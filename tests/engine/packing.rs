@@ -147,11 +147,6 @@ struct Found {
 }
 
 fn ask(gpu: &Gpu, packed: &[PackingCase], nodes: &[BvhNode]) -> Found {
-    fn with<T: bytemuck::Pod>(gpu: &Gpu, commands: &mut Commands, content: &[T]) -> Buffer<T> {
-        let buffer = gpu.buffer("packed", content.len() as u64, Memory::Device).unwrap();
-        commands.upload(&buffer, content).unwrap();
-        buffer
-    }
     fn empty<T: bytemuck::Pod>(gpu: &Gpu, commands: &mut Commands, count: usize) -> Buffer<T> {
         let buffer = gpu.buffer("unpacked", count as u64, Memory::Device).unwrap();
         commands.clear(&buffer);
@@ -159,17 +154,17 @@ fn ask(gpu: &Gpu, packed: &[PackingCase], nodes: &[BvhNode]) -> Found {
     }
     let count = packed.len();
     let commands = &mut Commands::new(gpu, Constants::new(128).set("STRICT_MATH", 1), Instant::now()).unwrap();
-    let cases = &with(gpu, commands, packed);
+    let cases = &commands.uploaded("packed", packed).unwrap();
     let (sorted_photons, next_paths, sorted_map) =
         (&empty(gpu, commands, count), &empty(gpu, commands, count), &empty(gpu, commands, count));
     let (room, scene) = (&empty(gpu, commands, count), &empty(gpu, commands, count));
     let one_hits = &empty(gpu, commands, HIT_KINDS as usize * count);
-    let photons = &with(gpu, commands, &packed.iter().map(|case| photon(case).stored()).collect::<Vec<_>>());
-    let paths = &with(gpu, commands, &paths(packed));
+    let photons = &commands.uploaded("packed", &packed.iter().map(|case| photon(case).stored()).collect::<Vec<_>>()).unwrap();
+    let paths = &commands.uploaded("packed", &paths(packed)).unwrap();
     let kernel = CheckPackingRoom { cases, photons, paths, sorted_photons, next_paths, results: room };
     commands.dispatch(kernel, &(), Extent::Items(count as u64)).unwrap();
-    let map = &with(gpu, commands, &packed.iter().map(map_photon).collect::<Vec<_>>());
-    let node_cases = &with(gpu, commands, nodes);
+    let map = &commands.uploaded("packed", &packed.iter().map(map_photon).collect::<Vec<_>>()).unwrap();
+    let node_cases = &commands.uploaded("packed", nodes).unwrap();
     let kernel = CheckPackingScene { cases, map, node_cases, one_hits, sorted_map, results: scene };
     commands.dispatch(kernel, &(), Extent::Items(count as u64)).unwrap();
     Found {

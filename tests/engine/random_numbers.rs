@@ -150,7 +150,7 @@ fn neighbouring_photons_do_not_resemble_each_other() {
 fn emitted(gpu: &Device, plan: &RoomPlan, round: u32, range: EmissionRange) -> Vec<Path> {
     let scene = open_box(&plan.settings);
     let mut commands = Commands::new(gpu, constants(plan), Instant::now()).unwrap();
-    let resources = RoomResources::new(gpu, &mut commands, &scene, plan).unwrap();
+    let resources = RoomResources::new(&mut commands, &scene, plan).unwrap();
     trace::emit(&mut commands, &resources, plan, round, &[range]).unwrap();
     let array = commands.read(&resources.paths[0], plan.path_array_length() as usize).unwrap();
     (0..range.count as usize).map(|index| path::unpack(&array, index)).collect()

@@ -8,13 +8,10 @@ use std::time::Duration;
 use crate::common::lit::Viewed;
 use crate::common::prelude::*;
 use photonmill::engine::End;
-use photonmill::engine::retry::{Remedy, run_on};
-use photonmill::engine::saved::{SavedFilm, SavedRun};
-use photonmill::engine::scene::losses::losses;
-use photonmill::engine::scene::{self, RunResult, SceneFilm};
-use photonmill::engine::several_devices::Work;
-use photonmill::engine::watch::{Keep, SaveRun};
-use photonmill::ledger::Fates;
+use photonmill::engine::run::retry::{Remedy, run_on};
+use photonmill::engine::run::saved::SavedRun;
+use photonmill::engine::run::watch::{Keep, SaveRun};
+use photonmill::engine::scene::{self, RunResult};
 use photonmill::settings::stop::Stop;
 
 fn settings() -> SceneSettings {
@@ -110,22 +107,6 @@ fn shared(room: &Viewed, count: usize, settings: &SceneSettings, trouble: Troubl
         lit
     };
     let given_up = AtomicU32::new(0);
-    let work = Work {
-        run: &run,
-        film: |film| match film {
-            SavedFilm::Scene(film) => film,
-            SavedFilm::Room(_) => panic!("a scene was lit"),
-        },
-        error: &|film: &SceneFilm| film.error(plan.film.confidence),
-        losses: &|film: &SceneFilm, fates: &[Fates]| losses(&room.geometry, &plan, fates, film),
-        can_go_on: true,
-        stop: plan.settings.stop,
-        alpha: plan.settings.alpha,
-        rounds: plan.settings.rounds,
-        rounds_per_block: plan.film.rounds_per_block,
-        bounces: plan.settings.bounces,
-        photons_per_round: plan.maps().map(|map| u64::from(map.photons)).sum(),
-    };
     let failed = &|_: &Gpu, _: &Error, remedy: Remedy| {
         assert_eq!(remedy, Remedy::GivenUp);
         given_up.fetch_add(1, Ordering::Relaxed);
@@ -139,7 +120,7 @@ fn shared(room: &Viewed, count: usize, settings: &SceneSettings, trouble: Troubl
     let resume = trouble.resume.clone().map(|run| (PathBuf::from("a file"), run));
     let keep = Keep { scene: &room.scene.name, resume, every: Duration::ZERO, save: Some(&mut all), ..Keep::default() };
     let mut control = Control { cancelled: &cancelled, progress: &mut progress, keep };
-    let lit = run_on(&mut gpus, &work, failed, &mut control);
+    let lit = run_on(&mut gpus, &scene::task(&room.geometry, &plan), &run, failed, &mut control);
     gpus.iter().for_each(|gpu| gpu.check_validation().unwrap());
     IDLE.lock().unwrap().append(&mut gpus);
     Ok(Came { lit: lit?, given_up: given_up.into_inner(), saved: all.0 })

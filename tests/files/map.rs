@@ -5,10 +5,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::common::lit::Viewed;
 use crate::common::prelude::*;
+use photonmill::engine::run::watch::Keep;
 use photonmill::engine::scene::fill_map::{Filled, fill};
 use photonmill::engine::scene::map_file::{MapFile, MapWriter};
 use photonmill::engine::scene::{self, RunResult};
-use photonmill::engine::watch::Keep;
 use photonmill::settings::scene::Kernel;
 use ply_rs_bw::parser::Parser;
 use ply_rs_bw::ply::{DefaultElement, Property};

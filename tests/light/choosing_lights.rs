@@ -186,11 +186,10 @@ fn rows(lights: &LightChoice, place: [f32; 6]) -> usize {
 /// it states.
 fn picks(gpu: &Gpu, geometry: &Geometry, plan: &ScenePlan, receivers: &[Receiver], unseen: bool) -> Vec<(usize, f64)> {
     let mut commands = Commands::new(gpu, scene::constants(plan), Instant::now()).unwrap();
-    let resources = SceneResources::new(gpu, &mut commands, geometry, plan, &[]).unwrap();
+    let resources = SceneResources::new(&mut commands, geometry, plan, &[]).unwrap();
     let pairs = receivers.len() * 64;
-    let points = gpu.buffer::<Receiver>("points", receivers.len() as u64, Memory::Device).unwrap();
+    let points = commands.uploaded("points", receivers).unwrap();
     let found = gpu.buffer::<f32>("found", pairs as u64, Memory::Device).unwrap();
-    commands.upload(&points, receivers).unwrap();
     let mut ask = |what: u32| {
         let SceneResources { scene, nonfinite_values, .. } = &resources;
         let kernel = TryLights { scene, receivers: &points, found: &found, nonfinite_values };

@@ -343,9 +343,8 @@ pub(super) fn ask(gpu: &Gpu, math: Math, all: bool, cases: &[LobeCase], samples:
     let commands = &mut Commands::new(gpu, constants, Instant::now()).unwrap();
     let plate = scene_of(vec![level(0.0, [1.0; 2], true, 0)], vec![layered::dull(0.5)], vec![sun(DVec3::NEG_Y)]);
     let (geometry, plan) = scene_plan(gpu, &plate, &flights(100, 1), square_picture(1)).unwrap();
-    let SceneResources { scene, .. } = &SceneResources::new(gpu, commands, &geometry, &plan, &[]).unwrap();
-    let inputs = gpu.buffer("lobe cases", cases.len() as u64, Memory::Device).unwrap();
-    commands.upload(&inputs, cases).unwrap();
+    let SceneResources { scene, .. } = &SceneResources::new(commands, &geometry, &plan, &[]).unwrap();
+    let inputs = commands.uploaded("lobe cases", cases).unwrap();
     let count = cases.len() * samples;
     let results = gpu.buffer("lobe samples", count as u64, Memory::Device).unwrap();
     commands.dispatch(CheckLobes { scene, cases: &inputs, results: &results }, &(), Extent::Items(count as u64)).unwrap();

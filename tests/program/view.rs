@@ -47,22 +47,22 @@ fn a_moved_camera_sees_kept_photons_and_the_picture_of_its_own_run() {
 
     let mut live = LiveScene::new(&gpu, &geometry, &first, &plan, &NEVER).unwrap();
     rounds(&mut live, 4);
-    let before = live.look().unwrap().0;
+    let before = live.run.look().unwrap().0;
     live.look_from(&moved).unwrap();
     // Half of these rounds have kept photons.
     rounds(&mut live, 8);
-    assert_eq!((live.rounds(), live.kept().0), (8, 8));
-    let after = live.look().unwrap().0;
+    assert_eq!((live.run.state.rounds(), live.kept().0), (8, 8));
+    let after = live.run.look().unwrap().0;
     let mut own = LiveScene::new(&gpu, &geometry, &moved, &plan, &NEVER).unwrap();
     rounds(&mut own, 8);
-    assert!(after == own.look().unwrap().0);
-    assert_eq!(live.ledger(), own.ledger());
-    assert!(live.ledger().closes() && live.ledger().emitted == (8 * 2) << 10);
+    assert!(after == own.run.look().unwrap().0);
+    assert_eq!(live.run.state.ledger(), own.run.state.ledger());
+    assert!(live.run.state.ledger().closes() && live.run.state.ledger().emitted == (8 * 2) << 10);
     assert!(before.of_blocks.sums != after.of_blocks.sums);
     // Back again, from kept photons alone.
     live.look_from(&first).unwrap();
     rounds(&mut live, 4);
-    assert!(live.look().unwrap().0 == before);
+    assert!(live.run.look().unwrap().0 == before);
 }
 
 /// What reaches the window is the film: light, its parts, its error, and the codes that a file would have.
@@ -75,12 +75,12 @@ fn the_window_has_the_values_of_the_film_and_the_codes_of_its_file() {
     let pixels = (SIZE[0] * SIZE[1]) as usize;
     // Before a block is whole, and after several.
     for rounds in [1, 12] {
-        (live.rounds()..rounds).for_each(|_| live.round().unwrap());
-        let (film, error) = live.look().unwrap();
+        (live.run.state.rounds()..rounds).for_each(|_| live.round().unwrap());
+        let (film, error) = live.run.look().unwrap();
         assert_eq!(error.noise.is_finite(), film.blocks >= LEAST_BLOCKS, "{} blocks", film.blocks);
         let mut shown = |shows: u32| {
             live.show(shows, 2.0, &picture.shown).unwrap();
-            live.commands().read(&picture.shown, pixels).unwrap()
+            live.run.recorder.read(&picture.shown, pixels).unwrap()
         };
         for part in [None, Some(0), Some(1), Some(2), Some(3)] {
             for (pixel, value) in shown(part.map_or(SHOW_ALL, |part| SHOW_DIRECT + part)).into_iter().enumerate() {
@@ -102,7 +102,7 @@ fn the_window_has_the_values_of_the_film_and_the_codes_of_its_file() {
         }
         assert!(if rounds > 1 { known_pixels > pixels / 2 } else { known_pixels == 0 }, "{known_pixels}");
     }
-    let film = live.look().unwrap().0;
+    let film = live.run.look().unwrap().0;
     let colours = ColourPicture {
         width: SIZE[0],
         height: SIZE[1],
@@ -113,8 +113,8 @@ fn the_window_has_the_values_of_the_film_and_the_codes_of_its_file() {
     for blue_first in [false, true] {
         live.show(SHOW_ALL, 1.0, &picture.shown).unwrap();
         let exposure = Exposure { shows: SHOW_ALL, stops, is_light: true };
-        picture.expose(live.commands(), exposure, 1, blue_first).unwrap();
-        let codes = picture.codes(live.commands(), blue_first).unwrap();
+        picture.expose(&mut live.run.recorder, exposure, 1, blue_first).unwrap();
+        let codes = picture.codes(&mut live.run.recorder, blue_first).unwrap();
         let farthest = codes.as_flattened().iter().zip(&of_file).map(|(a, b)| a.abs_diff(*b)).max().unwrap();
         assert!(farthest <= 1, "{farthest}");
     }
@@ -131,7 +131,7 @@ fn the_box_is_seen_with_the_illumination_of_its_walls() {
     (0..5).for_each(|_| live.round().unwrap());
     // Of fewer than eight blocks.
     assert!(live.look().unwrap().0.is_infinite());
-    let film = live.film().unwrap();
+    let film = live.run.film().unwrap();
     let middle = 0.5 * (room.min_corner + room.max_corner);
     for (place, (face, _)) in room.walls().enumerate() {
         let rectangle = room.rectangle(face);
@@ -140,16 +140,16 @@ fn the_box_is_seen_with_the_illumination_of_its_walls() {
         let camera = Camera::looking_at("test", middle, texel, DVec3::new(0.1, 0.9, 0.2), 0.01);
         let picture = Picture::new(&gpu, [3, 3], [3, 3]).unwrap();
         live.show(SHOW_ALL, 1.0, &camera, [3, 3], &picture.shown).unwrap();
-        let seen = f64::from(live.commands().read(&picture.shown, 9).unwrap()[4].x);
+        let seen = f64::from(live.run.recorder.read(&picture.shown, 9).unwrap()[4].x);
         let expected = estimate_walls(&film, &room, &plan)[place].illumination[(row * 16 + column) as usize];
         assert!((seen - expected).abs() <= 1e-5 * expected && expected > 0.0, "face {face}: {seen} is {expected}");
         live.show(SHOW_ERROR, 1.0, &camera, [3, 3], &picture.shown).unwrap();
-        let error = f64::from(live.commands().read(&picture.shown, 9).unwrap()[4].x);
+        let error = f64::from(live.run.recorder.read(&picture.shown, 9).unwrap()[4].x);
         assert!(error > 0.0 && error < expected, "face {face}: {error} of {expected}");
         // From behind a wall is not there.
         let from_behind = Camera::looking_at("test", 2.0 * texel - middle, middle, DVec3::new(0.1, 0.9, 0.2), 0.01);
         live.show(SHOW_ALL, 1.0, &from_behind, [3, 3], &picture.shown).unwrap();
-        let seen = f64::from(live.commands().read(&picture.shown, 9).unwrap()[4].x);
+        let seen = f64::from(live.run.recorder.read(&picture.shown, 9).unwrap()[4].x);
         assert!((seen - expected).abs() > 1e-4 * expected, "face {face} is seen from behind");
     }
 }

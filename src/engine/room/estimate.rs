@@ -3,12 +3,12 @@
 pub mod tree;
 
 use crate::constants::{GATHER_SLICE, MAX_GROUPS};
+use crate::engine::room::Chunk;
 use crate::engine::room::index::add_work;
 use crate::engine::room::resources::{IndexBuffers, RoomResources, RoundBuffers};
-use crate::engine::room::trace::photon_list_capacity;
 use crate::error::{Result, require};
 use crate::gpu::kernels::{CandidateCount, EndRound, GatherBruteTwoWords, GatherBruteU64, GatherGridTwoWords, GatherGridU64, SliceCount};
-use crate::gpu::{Commands, DeviceFacts, Extent, Kernel, Module};
+use crate::gpu::{Commands, DeviceFacts, Extent, Kernel, Module, dispatch_by_sums};
 use crate::plan::RoomPlan;
 use crate::records::{DispatchSizePush, EndRoundPush, GatherPush};
 use crate::settings::Sums;
@@ -48,12 +48,13 @@ pub fn modules(plan: &RoomPlan, facts: &DeviceFacts) -> Vec<Module> {
 }
 
 /// A gather of all points; its dispatches each cover a part.
-fn push_for_all_points(plan: &RoomPlan, photon_count: u32) -> GatherPush {
+fn push_for_all_points(chunk: Chunk) -> GatherPush {
+    let plan = chunk.plan;
     GatherPush {
         first_point: 0,
         end_point: plan.points.len() as u32,
         first_slice: 0,
-        photon_capacity: photon_list_capacity(plan, photon_count),
+        photon_capacity: chunk.photon_list_capacity(),
         radius_squared: (plan.settings.radius * plan.settings.radius) as f32,
         reach: plan.grid.reach,
         film_scale: plan.film_scale() as f32,
@@ -86,18 +87,19 @@ fn in_pieces(
 }
 
 /// Adds a chunk to the film.
-pub fn gather(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan, photon_count: u32) -> Result<()> {
-    commands.scope("gather", |commands| match (&resources.tree, &resources.index) {
-        (Some(tree), _) => tree::gather(commands, resources, tree, plan, photon_count),
-        (None, Some(index)) => gather_grid(commands, resources, index, plan, photon_count),
-        (None, None) => gather_brute(commands, resources, plan, photon_count),
+pub fn gather(commands: &mut Commands, chunk: Chunk) -> Result<()> {
+    commands.scope("gather", |commands| match (&chunk.resources.tree, &chunk.resources.index) {
+        (Some(tree), _) => tree::gather(commands, chunk, tree),
+        (None, Some(index)) => gather_grid(commands, chunk, index),
+        (None, None) => gather_brute(commands, chunk),
     })
 }
 
 /// Every point steps through the whole photon list, a slice of it an invocation.
-fn gather_brute(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan, photon_count: u32) -> Result<()> {
+fn gather_brute(commands: &mut Commands, chunk: Chunk) -> Result<()> {
+    let Chunk { resources, plan, .. } = chunk;
     let RoomResources { film, room, photons, counters, .. } = resources;
-    let whole = push_for_all_points(plan, photon_count);
+    let whole = push_for_all_points(chunk);
     let slice_count = whole.photon_capacity.div_ceil(GATHER_SLICE);
     let tests_per_point = u64::from(GATHER_SLICE);
     in_pieces(commands, plan, tests_per_point, 1, |commands, first_point, end_point| {
@@ -108,11 +110,8 @@ fn gather_brute(commands: &mut Commands, resources: &RoomResources, plan: &RoomP
             let slices = slices_at_once.min(slice_count - first_slice);
             let push = GatherPush { first_point, end_point, first_slice, ..whole };
             let extent = Extent::Groups(point_count.div_ceil(plan.settings.group_size), slices);
-            if adds_in_one_word(plan, commands.facts()) {
-                commands.dispatch(GatherBruteU64 { room, film, photons, counters }, &push, extent)?;
-            } else {
-                commands.dispatch(GatherBruteTwoWords { room, film, photons, counters }, &push, extent)?;
-            }
+            let in_one_word = adds_in_one_word(plan, commands.facts());
+            dispatch_by_sums!(commands, in_one_word, [GatherBruteU64, GatherBruteTwoWords] { room, film, photons, counters }, &push, extent)?;
             add_work(commands, plan, u64::from(slices) * tests_per_slice)?;
         }
         Ok(())
@@ -120,10 +119,11 @@ fn gather_brute(commands: &mut Commands, resources: &RoomResources, plan: &RoomP
 }
 
 /// Every point tests the photons of the grid cells in reach.
-fn gather_grid(commands: &mut Commands, resources: &RoomResources, index: &IndexBuffers, plan: &RoomPlan, photon_count: u32) -> Result<()> {
+fn gather_grid(commands: &mut Commands, chunk: Chunk, index: &IndexBuffers) -> Result<()> {
+    let Chunk { resources, plan, photon_count } = chunk;
     let RoomResources { film, room, dispatch_args, .. } = resources;
     let IndexBuffers { cells, sorted_photons, longest, .. } = index;
-    let whole = push_for_all_points(plan, photon_count);
+    let whole = push_for_all_points(chunk);
     if plan.slices_candidates {
         commands.fill(longest, 0, 1, 0);
         commands.dispatch(CandidateCount { room, longest, cells }, &whole, Extent::Items(u64::from(whole.end_point)))?;
@@ -140,21 +140,18 @@ fn gather_grid(commands: &mut Commands, resources: &RoomResources, index: &Index
             Extent::Groups(capacity.div_ceil(group_size), 1)
         };
         let push = GatherPush { first_point, end_point, ..whole };
-        if adds_in_one_word(plan, commands.facts()) {
-            commands.dispatch(GatherGridU64 { room, film, cells, sorted_photons }, &push, extent)?;
-        } else {
-            commands.dispatch(GatherGridTwoWords { room, film, cells, sorted_photons }, &push, extent)?;
-        }
+        let in_one_word = adds_in_one_word(plan, commands.facts());
+        dispatch_by_sums!(commands, in_one_word, [GatherGridU64, GatherGridTwoWords] { room, film, cells, sorted_photons }, &push, extent)?;
         add_work(commands, plan, u64::from(end_point - first_point) * tests_per_point)
     })
 }
 
 /// Moves what a round left on the film to the sums and squares of all rounds, of which there are several.
 pub fn end_round(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan, round: u32) -> Result<()> {
-    let RoomResources { film, rounds: Some(RoundBuffers { totals, low_squares, high_squares, latest_blocks }), .. } = resources else {
+    let RoomResources { film, rounds: Some(RoundBuffers { film_totals, low_squares, high_squares, latest_blocks }), .. } = resources else {
         return Ok(());
     };
     let push = EndRoundPush { sum_count: plan.points.len() as u32 * plan.channel_count, channel_count: plan.channel_count, round };
-    let kernel = EndRound { film, film_totals: totals, low_squares, high_squares, latest_blocks };
+    let kernel = EndRound { film, film_totals, low_squares, high_squares, latest_blocks };
     commands.scope("film", |commands| commands.dispatch(kernel, &push, Extent::Items(u64::from(push.sum_count))))
 }

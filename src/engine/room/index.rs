@@ -3,8 +3,8 @@
 pub mod tree;
 
 use crate::engine::prefix_sum::scan;
+use crate::engine::room::Chunk;
 use crate::engine::room::resources::{IndexBuffers, RoomResources};
-use crate::engine::room::trace::photon_list_capacity;
 use crate::error::Result;
 use crate::gpu::kernels::{CellCount, CellScatter, DispatchSize, ScanAdd, ScanBlocks};
 use crate::gpu::{Commands, Extent, Kernel, Module};
@@ -25,13 +25,14 @@ pub fn modules(plan: &RoomPlan) -> Vec<Module> {
 /// Sorts the photon map into cell order, or into the leaves of a kd-tree.
 ///
 /// Does nothing where the plan has no index.
-pub fn build(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan, photon_count: u32) -> Result<()> {
+pub fn build(commands: &mut Commands, chunk: Chunk) -> Result<()> {
+    let Chunk { resources, plan, .. } = chunk;
     if let Some(buffers) = &resources.tree {
-        return commands.scope("index", |commands| tree::build(commands, resources, buffers, plan, photon_count));
+        return commands.scope("index", |commands| tree::build(commands, chunk, buffers));
     }
     let RoomResources { room, photons, counters, dispatch_args, index: Some(index), .. } = resources else { return Ok(()) };
-    let IndexBuffers { cells, ranks, block_sums, sorted_photons, .. } = index;
-    let push = plan.grid.index_push(photon_list_capacity(plan, photon_count));
+    let IndexBuffers { cells, ranks, sums_of_cells, sorted_photons, .. } = index;
+    let push = plan.grid.index_push(chunk.photon_list_capacity());
     let extent = || if plan.has_slots() { Extent::Items(u64::from(push.photon_capacity)) } else { Extent::Indirect(dispatch_args) };
     commands.scope("index", |commands| {
         commands.scope("count", |commands| {
@@ -42,7 +43,7 @@ pub fn build(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan
             }
             commands.dispatch(CellCount { room, photons, counters, cells, ranks }, &push, extent())
         })?;
-        commands.scope("scan", |commands| scan(commands, cells, block_sums, plan.grid.cells() + 1, plan.settings.group_size))?;
+        commands.scope("scan", |commands| scan(commands, cells, sums_of_cells, plan.grid.cells() + 1, plan.settings.group_size))?;
         commands.scope("sort", |commands| {
             commands.dispatch(CellScatter { room, photons, counters, cells, sorted_photons, ranks }, &push, extent())
         })

@@ -5,25 +5,23 @@ use std::time::Instant;
 
 use glam::Vec4;
 
-use super::film::{RoomFilm, estimate_walls};
+use super::film::estimate_walls;
 use super::on_gpu::{RoomOnGpu, constants, modules};
 use super::resources::{RoomResources, RoundBuffers};
 use super::{estimate, task};
-use crate::engine::run::{self, Run, World};
+use crate::engine::run::{self, Run};
 use crate::engine::{self, Control};
 use crate::error::Result;
 use crate::gpu::kernels::{Display, ShowRoom};
-use crate::gpu::{Buffer, Commands, Extent, Gpu, Kernel};
-use crate::ledger::Ledger;
+use crate::gpu::{Buffer, Extent, Gpu, Kernel};
 use crate::plan::RoomPlan;
 use crate::records::ShowRoomPush;
 use crate::scene::Camera;
 use crate::scene::room::RoomScene;
 use crate::settings::RoomSettings;
-use crate::timings::Timings;
 
 pub struct LiveRoom<'a> {
-    run: Run<'a, RoomOnGpu<'a>>,
+    pub run: Run<'a, RoomOnGpu<'a>>,
     scene: &'a RoomScene,
     plan: &'a RoomPlan,
     cancelled: &'a AtomicBool,
@@ -39,63 +37,32 @@ impl<'a> LiveRoom<'a> {
 
     pub fn new(gpu: &'a Gpu, scene: &'a RoomScene, plan: &'a RoomPlan, cancelled: &'a AtomicBool) -> Result<LiveRoom<'a>> {
         let modules = [modules(plan, gpu), vec![ShowRoom::MODULE, Display::MODULE]].concat();
-        let (mut commands, pipelines_before) = run::commands(gpu, &modules, constants(plan), plan.settings.math, Instant::now())?;
-        let resources = commands.scope("set-up", |commands| RoomResources::new(gpu, commands, scene, plan))?;
+        let mut commands = run::commands(gpu, &modules, constants(plan), plan.settings.math, Instant::now())?;
+        let resources = commands.scope("set-up", |commands| RoomResources::new(commands, scene, plan))?;
         commands.submit()?;
-        let world = RoomOnGpu::new(scene, plan, resources);
-        let run = Run::new(world, commands, task(plan, Some((gpu, pipelines_before)), None), &mut Control::quiet(cancelled))?;
+        let world = RoomOnGpu { plan, resources };
+        let run = Run::new(world, commands, task(scene, plan), &mut Control::quiet(cancelled))?;
         Ok(LiveRoom { run, scene, plan, cancelled })
     }
 
     /// One more round, unless all have been.
     pub fn round(&mut self) -> Result<()> {
-        if !self.run.has_ended() {
-            self.run.round(&mut Control::quiet(self.cancelled))?;
-            self.run.collect()?;
-        }
-        Ok(())
-    }
-
-    pub fn has_ended(&self) -> bool {
-        self.run.has_ended()
-    }
-
-    pub fn rounds(&self) -> u32 {
-        self.run.state.rounds()
-    }
-
-    pub fn ledger(&self) -> Ledger {
-        self.run.state.ledger()
-    }
-
-    /// Times since the last call.
-    pub fn take_timings(&mut self) -> Timings {
-        std::mem::take(self.run.recorder.timings())
-    }
-
-    pub fn commands(&mut self) -> &mut Commands<'a> {
-        &mut self.run.recorder
-    }
-
-    /// What all rounds have left.
-    pub fn film(&mut self) -> Result<RoomFilm> {
-        self.run.film()
+        self.run.round_to_look_at(self.cancelled)
     }
 
     /// The error over the mean, as far as it is known, and the mean of the illumination.
     pub fn look(&mut self) -> Result<(f64, f64)> {
-        let found = self.film()?;
-        let noise = self.run.world.error(&found).stated().noise;
-        let walls = estimate_walls(&found, self.scene, self.plan);
+        let (film, error) = self.run.look()?;
+        let walls = estimate_walls(&film, self.scene, self.plan);
         let values: Vec<f64> = walls.iter().flat_map(|wall| wall.illumination.iter().copied()).collect();
-        Ok((noise, values.iter().sum::<f64>() / values.len().max(1) as f64))
+        Ok((error.noise, values.iter().sum::<f64>() / values.len().max(1) as f64))
     }
 
     /// Records what a camera sees of the walls.
     pub fn show(&mut self, shows: u32, mean: f64, camera: &Camera, [width, height]: [u32; 2], shown: &Buffer<Vec4>) -> Result<()> {
         let Run { world, recorder, state } = &mut self.run;
-        let RoomResources { room, rounds, .. } = world.resources();
-        let RoundBuffers { totals: film_totals, low_squares, high_squares, .. } = rounds.as_ref().expect("a plan that is kept has them");
+        let RoomResources { room, rounds, .. } = &world.resources;
+        let RoundBuffers { film_totals, low_squares, high_squares, .. } = rounds.as_ref().expect("a plan that is kept has them");
         let half_height = camera.half_height();
         let push = ShowRoomPush {
             width,

@@ -20,8 +20,8 @@ pub use on_gpu::{constants, on_gpu};
 pub use replay::{photons_on_cpu, photons_on_gpu, replay};
 
 use crate::engine::Control;
-use crate::engine::error::bound::FilmError;
 use crate::engine::room::film::{RoomFilm, irradiance_weights};
+use crate::engine::room::resources::RoomResources;
 use crate::engine::run::identity::{Hash, Identity};
 use crate::engine::run::saved::SavedFilm;
 use crate::engine::run::watch::Keep;
@@ -45,10 +45,27 @@ pub fn run(gpu: Option<&Gpu>, scene: &RoomScene, settings: &RoomSettings, contro
     }
 }
 
-fn task<'a>(plan: &RoomPlan, device: Option<(&'a Gpu, usize)>, identity: Option<Identity>) -> Task<'a> {
+/// Photons that are traced together: what the stages of their way to the film share.
+#[derive(Clone, Copy)]
+pub struct Chunk<'a> {
+    pub resources: &'a RoomResources,
+    pub plan: &'a RoomPlan,
+    pub photon_count: u32,
+}
+
+impl Chunk<'_> {
+    /// Entries of the photon map that it uses: all slots, or as many as there is room for.
+    pub fn photon_list_capacity(self) -> u32 {
+        let Chunk { plan, photon_count, .. } = self;
+        if plan.has_slots() { (photon_count * plan.settings.bounces).min(plan.photon_capacity) } else { plan.photon_capacity }
+    }
+}
+
+/// What a run of a plan is to do.
+pub fn task<'a>(scene: &'a RoomScene, plan: &'a RoomPlan) -> Task<'a, RoomFilm> {
+    let weights = OnceCell::new();
     Task {
-        device,
-        identity,
+        identity: None,
         sensor: None,
         stop: plan.settings.stop,
         // The paper's radius never shrinks.
@@ -62,6 +79,9 @@ fn task<'a>(plan: &RoomPlan, device: Option<(&'a Gpu, usize)>, identity: Option<
         photons_per_part: plan.path_capacity.into(),
         counts_photons: true,
         fates: fates(plan),
+        can_go_on: plan.settings.sums == Sums::Integer,
+        error: Box::new(move |film| film.error(weights.get_or_init(|| irradiance_weights(scene, plan)), 1.0, &plan.settings.stop)),
+        losses: Box::new(|_, fates| Losses::of_room(&fates[0], plan.settings.light_power.iter().sum())),
     }
 }
 
@@ -87,14 +107,4 @@ fn identity(keep: &mut Keep, scene: &RoomScene, plan: &RoomPlan, device: Option<
             && saved.has_lengths(&fates(plan), places * channels as usize, kept_count(places))
     })?;
     Ok(identity)
-}
-
-/// What a film tells of its error. `weights` are [`irradiance_weights`], made at the first look.
-pub fn error(film: &RoomFilm, scene: &RoomScene, plan: &RoomPlan, weights: &OnceCell<Vec<f64>>) -> FilmError {
-    film.error(weights.get_or_init(|| irradiance_weights(scene, plan)), 1.0, &plan.settings.stop)
-}
-
-/// Light that the cap on bounces kept from the result.
-pub fn losses(plan: &RoomPlan, fates: &[Fates]) -> Losses {
-    Losses::of_room(&fates[0], plan.settings.light_power.iter().sum())
 }

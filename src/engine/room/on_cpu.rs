@@ -1,7 +1,5 @@
 //! The box on the CPU.
 
-use std::cell::OnceCell;
-
 use pulp::Arch;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -9,14 +7,13 @@ use super::RunResult;
 use crate::cpu::trace::{Block, Tracer};
 use crate::cpu::{estimate, nearest, splat::Splats, tree::Tree};
 use crate::engine::Control;
-use crate::engine::error::bound::FilmError;
 use crate::engine::nonfinite_values::{NonfiniteValues, What};
 use crate::engine::room::film::RoomFilm;
-use crate::engine::run::saved::{SavedFilm, SavedRun};
+use crate::engine::run::saved::WorldFilm;
 use crate::engine::run::watch::Later;
-use crate::engine::run::{self, RunState, World};
+use crate::engine::run::{self, RunState, Task, World};
 use crate::error::{Error, Result};
-use crate::ledger::{Fates, Losses};
+use crate::ledger::Fates;
 use crate::photon::Photon;
 use crate::plan::{Limits, RoomPlan, photons_of};
 use crate::records::Tally;
@@ -39,7 +36,6 @@ struct RoomOnCpu<'a> {
     /// What the round under way has left so far.
     sums: Vec<u64>,
     film: RoomFilm,
-    weights: OnceCell<Vec<f64>>,
     nonfinite_values: NonfiniteValues,
 }
 
@@ -49,10 +45,7 @@ pub fn on_cpu(scene: &RoomScene, settings: &RoomSettings, control: &mut Control)
     let plan = &RoomPlan { is_kept: control.keep.is_used(), ..plan(scene, settings)? };
     let identity = super::identity(&mut control.keep, scene, plan, None)?;
     let pool = thread_pool(settings)?;
-    let film = match &control.keep.resume {
-        Some((_, SavedRun { film: SavedFilm::Room(film), .. })) => film.clone(),
-        _ => RoomFilm::new(plan),
-    };
+    let film = control.keep.resume.as_ref().map_or_else(|| RoomFilm::new(plan), |(_, saved)| RoomFilm::of(&saved.film).clone());
     let world = RoomOnCpu {
         tracer: Tracer::new(scene, plan),
         blocks: Vec::new(),
@@ -61,20 +54,19 @@ pub fn on_cpu(scene: &RoomScene, settings: &RoomSettings, control: &mut Control)
         splats: adds_by_splatting(plan).then(|| pool.install(|| Splats::new(plan, Arch::new()))),
         sums: vec![0; film.sums.len()],
         film,
-        weights: OnceCell::new(),
         nonfinite_values: NonfiniteValues::default(),
         scene,
         plan,
         pool,
     };
-    run::run(world, clock, plan, super::task(plan, None, identity), control)
+    run::run(world, clock, plan, Task { identity, ..super::task(scene, plan) }, control)
 }
 
 impl World for RoomOnCpu<'_> {
     type Recorder = HostClock;
     type Film = RoomFilm;
 
-    fn trace(&mut self, clock: &mut HostClock, state: &mut RunState, chunk: u32) -> Result<()> {
+    fn trace(&mut self, clock: &mut HostClock, state: &mut RunState<RoomFilm>, chunk: u32) -> Result<()> {
         let ranges = self.plan.chunk(chunk);
         clock.time("build", |_| {
             let round = state.round();
@@ -95,7 +87,7 @@ impl World for RoomOnCpu<'_> {
         Ok(())
     }
 
-    fn end_block(&mut self, _: &mut HostClock, _: &RunState) -> Result<()> {
+    fn end_block(&mut self, _: &mut HostClock, _: &RunState<RoomFilm>) -> Result<()> {
         self.of_rounds = Fates::counted(&self.tallies, None);
         Ok(())
     }
@@ -104,27 +96,19 @@ impl World for RoomOnCpu<'_> {
         true
     }
 
-    fn collect(&mut self, _: &mut HostClock, state: &mut RunState) -> Result<()> {
+    fn collect(&mut self, _: &mut HostClock, state: &mut RunState<RoomFilm>) -> Result<()> {
         let all = Fates::counted(&self.tallies, None);
         state.count(0, all.clone(), std::mem::replace(&mut self.of_rounds, Fates::new(self.plan.settings.bounces)));
         Ok(())
     }
 
-    fn film(&mut self, _: &mut HostClock, state: &RunState) -> Result<Later<RoomFilm>> {
+    fn film(&mut self, _: &mut HostClock, state: &RunState<RoomFilm>) -> Result<Later<RoomFilm>> {
         let mut film = RoomFilm { emitted: state.emitted(), ..self.film.clone() };
         if state.rounds() == 0 {
             self.flush();
             film.sums.copy_from_slice(&self.sums);
         }
         Ok(Box::new(|| film))
-    }
-
-    fn error(&self, film: &RoomFilm) -> FilmError {
-        super::error(film, self.scene, self.plan, &self.weights)
-    }
-
-    fn losses(&self, _: &RoomFilm, fates: &[Fates]) -> Losses {
-        super::losses(self.plan, fates)
     }
 
     fn nonfinite_values(&mut self, _: &mut HostClock) -> Result<Option<NonfiniteValues>> {

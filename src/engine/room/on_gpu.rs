@@ -1,34 +1,30 @@
 //! The box on the GPU.
 
-use std::cell::OnceCell;
 use std::time::Instant;
 
 use super::RunResult;
 use crate::constants::{KEPT_BLOCKS, TALLY_COPIES};
 use crate::engine;
-use crate::engine::error::bound::FilmError;
 use crate::engine::film::{KeptBlock, wide};
 use crate::engine::nonfinite_values::NonfiniteValues;
 use crate::engine::room::film::RoomFilm;
 use crate::engine::room::resources::{RoomResources, RoundBuffers};
-use crate::engine::room::{estimate, index, trace};
-use crate::engine::run::saved::SavedFilm;
+use crate::engine::room::{Chunk, estimate, index, trace};
+use crate::engine::run::saved::WorldFilm;
 use crate::engine::run::watch::Later;
-use crate::engine::run::{self, RunState, World};
+use crate::engine::run::{self, RunState, Task, World};
 use crate::engine::{Control, tallies};
 use crate::error::Result;
 use crate::gpu::{Commands, Constants, Gpu, Module};
-use crate::ledger::{Fates, Losses};
+use crate::ledger::Fates;
 use crate::plan::latest_blocks::kept_count;
 use crate::plan::{RoomPlan, photons_of};
 use crate::scene::room::RoomScene;
 use crate::settings::RoomSettings;
 
-pub(super) struct RoomOnGpu<'a> {
-    scene: &'a RoomScene,
-    plan: &'a RoomPlan,
-    resources: RoomResources,
-    weights: OnceCell<Vec<f64>>,
+pub struct RoomOnGpu<'a> {
+    pub(super) plan: &'a RoomPlan,
+    pub(super) resources: RoomResources,
 }
 
 /// Runs on the GPU.
@@ -37,39 +33,29 @@ pub fn on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings, control: &m
     let plan = RoomPlan { is_kept: control.keep.is_used(), ..RoomPlan::new(scene, settings, &engine::limits(gpu.facts()))? };
     let identity = super::identity(&mut control.keep, scene, &plan, Some(gpu.facts()))?;
     estimate::check_sums(&plan, gpu.facts())?;
-    let (mut commands, pipelines_before) = run::commands(gpu, &modules(&plan, gpu), constants(&plan), settings.math, started)?;
-    let resources = commands.scope("set-up", |commands| RoomResources::new(gpu, commands, scene, &plan))?;
+    let mut commands = run::commands(gpu, &modules(&plan, gpu), constants(&plan), settings.math, started)?;
+    let resources = commands.scope("set-up", |commands| RoomResources::new(commands, scene, &plan))?;
     commands.warm_up()?;
     commands.submit()?;
     if let Some((_, saved)) = &control.keep.resume {
-        let SavedFilm::Room(film) = &saved.film else { unreachable!("identities of two worlds differ") };
-        restore(&mut commands, &resources, &plan, film)?;
+        restore(&mut commands, &resources, &plan, RoomFilm::of(&saved.film))?;
     }
-    let world = RoomOnGpu::new(scene, &plan, resources);
-    run::run(world, commands, &plan, super::task(&plan, Some((gpu, pipelines_before)), identity), control)
-}
-
-impl<'a> RoomOnGpu<'a> {
-    pub(super) fn new(scene: &'a RoomScene, plan: &'a RoomPlan, resources: RoomResources) -> RoomOnGpu<'a> {
-        RoomOnGpu { scene, plan, resources, weights: OnceCell::new() }
-    }
-
-    pub(super) fn resources(&self) -> &RoomResources {
-        &self.resources
-    }
+    let world = RoomOnGpu { plan: &plan, resources };
+    run::run(world, commands, &plan, Task { identity, ..super::task(scene, &plan) }, control)
 }
 
 impl<'a> World for RoomOnGpu<'a> {
     type Recorder = Commands<'a>;
     type Film = RoomFilm;
 
-    fn trace(&mut self, commands: &mut Commands<'a>, state: &mut RunState, chunk: u32) -> Result<()> {
+    fn trace(&mut self, commands: &mut Commands<'a>, state: &mut RunState<RoomFilm>, chunk: u32) -> Result<()> {
         let RoomOnGpu { resources, plan, .. } = self;
         let ranges = plan.chunk(chunk);
         trace::chunk(commands, resources, plan, state.round(), &ranges)?;
-        index::build(commands, resources, plan, photons_of(&ranges))?;
-        estimate::gather(commands, resources, plan, photons_of(&ranges))?;
-        state.hand_out(0, photons_of(&ranges));
+        let traced = Chunk { resources, plan, photon_count: photons_of(&ranges) };
+        index::build(commands, traced)?;
+        estimate::gather(commands, traced)?;
+        state.hand_out(0, traced.photon_count);
         if chunk + 1 == plan.chunks_per_round { estimate::end_round(commands, resources, plan, state.round()) } else { Ok(()) }
     }
 
@@ -77,7 +63,7 @@ impl<'a> World for RoomOnGpu<'a> {
         commands.is_full(self.plan.pair_tests_per_submission) || commands.timestamps_left() < trace::timestamps_per_chunk(self.plan)
     }
 
-    fn end_block(&mut self, commands: &mut Commands<'a>, _: &RunState) -> Result<()> {
+    fn end_block(&mut self, commands: &mut Commands<'a>, _: &RunState<RoomFilm>) -> Result<()> {
         // Of whole rounds alone nothing else is ever read.
         if self.plan.chunks_per_round > 1 {
             let RoomResources { tallies, tallies_of_rounds, .. } = &self.resources;
@@ -86,12 +72,12 @@ impl<'a> World for RoomOnGpu<'a> {
         Ok(())
     }
 
-    fn collect(&mut self, commands: &mut Commands<'a>, state: &mut RunState) -> Result<()> {
+    fn collect(&mut self, commands: &mut Commands<'a>, state: &mut RunState<RoomFilm>) -> Result<()> {
         let RoomResources { tallies, tallies_of_rounds, .. } = &self.resources;
         let copies = (self.plan.settings.bounces * TALLY_COPIES) as usize;
         let of_rounds = commands.copy_out(tallies_of_rounds, if self.plan.chunks_per_round > 1 { copies } else { 0 })?;
         let all = commands.read(tallies, copies)?;
-        tallies::clear(commands, tallies);
+        commands.clear(tallies);
         let all = Fates::counted(&tallies::sums(&all), None);
         let of_rounds = of_rounds.take();
         let of_rounds = if of_rounds.is_empty() { all.clone() } else { Fates::counted(&tallies::sums(&of_rounds), None) };
@@ -99,19 +85,19 @@ impl<'a> World for RoomOnGpu<'a> {
         Ok(())
     }
 
-    fn film(&mut self, commands: &mut Commands<'a>, state: &RunState) -> Result<Later<RoomFilm>> {
+    fn film(&mut self, commands: &mut Commands<'a>, state: &RunState<RoomFilm>) -> Result<Later<RoomFilm>> {
         let RoomOnGpu { resources, plan, .. } = self;
         let mut film = RoomFilm { emitted: state.emitted(), ..RoomFilm::new(plan) };
         let count = film.sums.len();
         film.rounds = state.rounds();
         film.blocks = state.rounds();
-        let Some(RoundBuffers { totals, low_squares, high_squares, latest_blocks }) =
+        let Some(RoundBuffers { film_totals, low_squares, high_squares, latest_blocks }) =
             resources.rounds.as_ref().filter(|_| state.rounds() > 0)
         else {
             film.sums = commands.read(&resources.film, count)?;
             return Ok(Box::new(|| film));
         };
-        let sums = commands.copy_out(totals, count)?;
+        let sums = commands.copy_out(film_totals, count)?;
         let (low, high) = (commands.copy_out(low_squares, count)?, commands.copy_out(high_squares, count)?);
         let values = commands.copy_out(latest_blocks, latest_blocks.count() as usize)?;
         commands.submit()?;
@@ -124,14 +110,6 @@ impl<'a> World for RoomOnGpu<'a> {
         Ok(Box::new(|| film))
     }
 
-    fn error(&self, film: &RoomFilm) -> FilmError {
-        super::error(film, self.scene, self.plan, &self.weights)
-    }
-
-    fn losses(&self, _: &RoomFilm, fates: &[Fates]) -> Losses {
-        super::losses(self.plan, fates)
-    }
-
     fn nonfinite_values(&mut self, commands: &mut Commands<'a>) -> Result<Option<NonfiniteValues>> {
         NonfiniteValues::found(commands, &self.resources.nonfinite_values, self.plan.settings.paranoid)
     }
@@ -139,9 +117,9 @@ impl<'a> World for RoomOnGpu<'a> {
 
 /// Goes on with a film.
 fn restore(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan, film: &RoomFilm) -> Result<()> {
-    let RoundBuffers { totals, low_squares, high_squares, latest_blocks } =
+    let RoundBuffers { film_totals, low_squares, high_squares, latest_blocks } =
         resources.rounds.as_ref().expect("a plan that is kept has them");
-    commands.upload(totals, &film.sums)?;
+    commands.upload(film_totals, &film.sums)?;
     commands.upload(low_squares, &film.squares.iter().map(|square| *square as u64).collect::<Vec<u64>>())?;
     commands.upload(high_squares, &film.squares.iter().map(|square| (*square >> 64) as u64).collect::<Vec<u64>>())?;
     let kept = kept_count(plan.points.len());

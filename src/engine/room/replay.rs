@@ -5,7 +5,7 @@ use std::time::Instant;
 use super::on_cpu::{self, photons_of_blocks, tallies_of};
 use super::on_gpu::constants;
 use super::resources::RoomResources;
-use super::trace;
+use super::{Chunk, trace};
 use crate::constants::NO_WALL;
 use crate::cpu::trace::Tracer;
 use crate::engine;
@@ -43,7 +43,7 @@ fn replay_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings, name: Ph
     check_math(gpu, settings.math)?;
     let ranges = [plan.range_of(name.photon)];
     let mut commands = Commands::new(gpu, constants(&plan), Instant::now())?;
-    let resources = RoomResources::new(gpu, &mut commands, scene, &plan)?;
+    let resources = RoomResources::new(&mut commands, scene, &plan)?;
     trace::emit(&mut commands, &resources, &plan, name.round, &ranges)?;
     let start = path::unpack(&commands.read(&resources.paths[0], 1)?, 0);
     let vertices = stored(&mut commands, &resources, scene, &plan, name.round, &ranges)?;
@@ -70,7 +70,7 @@ fn replay_on_cpu(scene: &RoomScene, settings: &RoomSettings, name: PhotonName) -
 pub fn photons_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings) -> Result<Vec<Photon>> {
     let plan = RoomPlan { keeps_origins: true, ..RoomPlan::new(scene, settings, &engine::limits(gpu.facts()))? };
     let mut commands = Commands::new(gpu, constants(&plan), Instant::now())?;
-    let resources = RoomResources::new(gpu, &mut commands, scene, &plan)?;
+    let resources = RoomResources::new(&mut commands, scene, &plan)?;
     let mut photons = Vec::new();
     for ranges in plan.chunks() {
         photons.extend(stored(&mut commands, &resources, scene, &plan, 0, &ranges)?);
@@ -102,7 +102,7 @@ fn stored(
     ranges: &[EmissionRange],
 ) -> Result<Vec<Photon>> {
     trace::chunk(commands, resources, plan, round, ranges)?;
-    let capacity = trace::photon_list_capacity(plan, photons_of(ranges));
+    let capacity = Chunk { resources, plan, photon_count: photons_of(ranges) }.photon_list_capacity();
     let length = if plan.has_slots() { capacity } else { commands.read(&resources.counters, 1)?[0].min(capacity) };
     let photons = commands.read(&resources.photons, length as usize)?;
     let origins = commands.read(&resources.origins, length as usize)?;

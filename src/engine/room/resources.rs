@@ -4,7 +4,7 @@ use glam::UVec2;
 
 use crate::engine::planned::{Planned, buffers};
 use crate::error::Result;
-use crate::gpu::{Buffer, Commands, Gpu, kernels};
+use crate::gpu::{Buffer, Commands, kernels};
 use crate::path::StoredPath;
 use crate::photon::{Origin, StoredPhoton};
 use crate::plan::RoomPlan;
@@ -26,7 +26,7 @@ buffers! {
             planned.filled(commands, room::STREAM_SEEDS, &plan.streams().first_states(plan.path_capacity))?,
         // Photons of the chunk under way.
         /// Paths entering even bounces and odd bounces; one element, for a replay, where no bounce hands paths to the next.
-        paths: [Buffer<StoredPath>; 2] = [planned.one(room::EVEN_PATHS)?, planned.one(room::ODD_PATHS)?],
+        paths: [Buffer<StoredPath>; 2] = planned.several(room::PATHS)?,
         photons: Buffer<StoredPhoton> = planned.one(room::PHOTONS)?,
         /// Which photon each entry of the photon map is; one empty element where nobody asks.
         origins: Buffer<Origin> = planned.one(room::ORIGINS)?,
@@ -54,8 +54,8 @@ buffers! {
 
 impl RoomResources {
     /// Makes the buffers and records the upload of what never changes.
-    pub fn new(gpu: &Gpu, commands: &mut Commands, scene: &RoomScene, plan: &RoomPlan) -> Result<RoomResources> {
-        RoomResources::made(&Planned { gpu, buffers: plan.buffers() }, commands, scene, plan)
+    pub fn new(commands: &mut Commands, scene: &RoomScene, plan: &RoomPlan) -> Result<RoomResources> {
+        RoomResources::made(&Planned { gpu: commands.gpu(), buffers: plan.buffers() }, commands, scene, plan)
     }
 }
 
@@ -64,7 +64,7 @@ buffers! {
     pub struct OrderBuffers(planned: &Planned) {
         /// Survivors in each work group of paths, then their prefix sums, and the sum of all behind them.
         survivors: Buffer<u32> = planned.one(room::SURVIVORS)?,
-        block_sums: Vec<Buffer<u32>> = planned.all(room::SUMS_OF_SURVIVORS)?,
+        sums_of_survivors: Vec<Buffer<u32>> = planned.all(room::SUMS_OF_SURVIVORS)?,
         /// Weight at the eye of each path's photon; one element where all weigh 1.
         weights: Buffer<f32> = planned.one(room::WEIGHTS)?,
     }
@@ -73,7 +73,7 @@ buffers! {
 buffers! {
     /// The rounds that have ended, sum by sum of the film.
     pub struct RoundBuffers(planned: &Planned, commands: &mut Commands) {
-        totals: Buffer<u64> = planned.zeroed(commands, room::FILM_TOTALS)?,
+        film_totals: Buffer<u64> = planned.zeroed(commands, room::FILM_TOTALS)?,
         /// Lower and upper 64 bits of the sums of squares.
         low_squares: Buffer<u64> = planned.zeroed(commands, room::LOW_SQUARES)?,
         high_squares: Buffer<u64> = planned.zeroed(commands, room::HIGH_SQUARES)?,
@@ -88,7 +88,7 @@ buffers! {
         /// Place of each entry of the photon map among those of its cell.
         ranks: Buffer<u32> = planned.one(room::RANKS)?,
         /// Sums of blocks of cells, sums of blocks of those, ... down to one.
-        block_sums: Vec<Buffer<u32>> = planned.all(room::SUMS_OF_CELLS)?,
+        sums_of_cells: Vec<Buffer<u32>> = planned.all(room::SUMS_OF_CELLS)?,
         sorted_photons: Buffer<StoredPhoton> = planned.one(room::SORTED_PHOTONS)?,
         /// Candidates of the busiest point.
         longest: Buffer<u32> = planned.one(room::LONGEST)?,
@@ -100,12 +100,12 @@ buffers! {
     pub struct TreeBuffers(planned: &Planned, plan: &RoomPlan) {
         /// (order key, entry of the photon map) in the order along the walls' first axis and along their second, and one
         /// to write into, in changing roles.
-        lists: [Buffer<UVec2>; 3] = planned.several(room::TREE_LIST)?,
+        tree_lists: [Buffer<UVec2>; 3] = planned.several(room::TREE_LISTS)?,
         /// Place of each photon in the order along the axis that nodes are split along.
-        ranks: Buffer<u32> = planned.one(room::TREE_RANKS)?,
+        tree_ranks: Buffer<u32> = planned.one(room::TREE_RANKS)?,
         /// Photons of each digit and run, or that go to the left; then their prefix sums.
-        counts: Buffer<u32> = planned.one(room::TREE_COUNTS)?,
-        block_sums: Vec<Buffer<u32>> = planned.all(room::SUMS_OF_TREE_COUNTS)?,
+        tree_counts: Buffer<u32> = planned.one(room::TREE_COUNTS)?,
+        sums_of_tree_counts: Vec<Buffer<u32>> = planned.all(room::SUMS_OF_TREE_COUNTS)?,
         /// Sizes of dispatches of an invocation a photon, a run of them, and a share of a prefix sum.
         item_args: Buffer<DispatchArgs> = planned.one(room::ITEM_ARGS)?,
         run_args: Buffer<DispatchArgs> = planned.one(room::RUN_ARGS)?,
@@ -126,7 +126,7 @@ buffers! {
 buffers! {
     pub struct SearchBuffers(planned: &Planned) {
         /// Nearest photons of each point that is searched for.
-        nearest: Buffer<UVec2> = planned.one(room::NEAREST_PHOTONS)?,
+        nearest_photons: Buffer<UVec2> = planned.one(room::NEAREST_PHOTONS)?,
         /// As many as go on at once.
         searches: Buffer<Search> = planned.one(room::SEARCHES)?,
         /// 1: some search has not ended.

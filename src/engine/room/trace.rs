@@ -3,6 +3,7 @@
 mod in_order;
 
 use crate::constants::{MAX_GROUPS, PATHS_TOGETHER};
+use crate::engine::room::Chunk;
 use crate::engine::room::resources::RoomResources;
 use crate::error::Result;
 use crate::gpu::kernels::{
@@ -35,13 +36,14 @@ pub fn modules(plan: &RoomPlan) -> Vec<Module> {
 /// Traces the photons of a chunk into the photon map and adds their fates to the tallies.
 pub fn chunk(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan, round: u32, ranges: &[EmissionRange]) -> Result<()> {
     let photon_count = photons_of(ranges);
+    let chunk = Chunk { resources, plan, photon_count };
     commands.scope("build", |commands| {
         commands.fill(&resources.counters, 0, plan.counter_array_length(), 0);
         commands.fill(&resources.counters, 1, 1, photon_count);
         commands.add_work(plan.work.tracing(photon_count));
         commands.count(Handled { photons: photon_count.into(), ..Handled::default() });
         if plan.settings.builder == Builder::Persistent {
-            return trace_persistent(commands, resources, plan, round, ranges);
+            return trace_persistent(commands, chunk, round, ranges);
         }
         commands.scope("emit", |commands| emit(commands, resources, plan, round, ranges))?;
         for bounce in 0..plan.settings.bounces {
@@ -49,7 +51,7 @@ pub fn chunk(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan
                 commands.submit()?;
             }
             let name = format!("bounce {}", bounce + 1);
-            commands.scope(&name, |commands| one_bounce(commands, resources, plan, round, bounce, photon_count))?;
+            commands.scope(&name, |commands| one_bounce(commands, chunk, round, bounce))?;
         }
         Ok(())
     })
@@ -89,13 +91,7 @@ fn photon_range(plan: &RoomPlan, round: u32, range: &EmissionRange) -> PhotonRan
 }
 
 /// Traces every photon from its light to its end.
-fn trace_persistent(
-    commands: &mut Commands,
-    resources: &RoomResources,
-    plan: &RoomPlan,
-    round: u32,
-    ranges: &[EmissionRange],
-) -> Result<()> {
+fn trace_persistent(commands: &mut Commands, Chunk { resources, plan, .. }: Chunk, round: u32, ranges: &[EmissionRange]) -> Result<()> {
     let RoomResources { room, stream_seeds, photons, origins, counters, tallies, nonfinite_values, .. } = resources;
     for range in ranges.iter().flat_map(|range| range.parts(plan.photons_per_dispatch())) {
         let push = TracePersistentPush {
@@ -120,11 +116,6 @@ pub fn timestamps_per_chunk(plan: &RoomPlan) -> u32 {
     (6 * plan.settings.bounces + TIMESTAMP_RESERVE).min(4 * TIMESTAMP_RESERVE)
 }
 
-/// Entries of the photon map that a chunk uses: all slots, or as many as there is room for.
-pub fn photon_list_capacity(plan: &RoomPlan, photon_count: u32) -> u32 {
-    if plan.has_slots() { (photon_count * plan.settings.bounces).min(plan.photon_capacity) } else { plan.photon_capacity }
-}
-
 /// Paths that an invocation takes through a bounce.
 fn paths_each(builder: Builder) -> u32 {
     match builder {
@@ -133,21 +124,15 @@ fn paths_each(builder: Builder) -> u32 {
     }
 }
 
-fn one_bounce(
-    commands: &mut Commands,
-    resources: &RoomResources,
-    plan: &RoomPlan,
-    round: u32,
-    bounce: u32,
-    photon_count: u32,
-) -> Result<()> {
+fn one_bounce(commands: &mut Commands, chunk: Chunk, round: u32, bounce: u32) -> Result<()> {
+    let Chunk { resources, plan, photon_count } = chunk;
     let builder = plan.settings.builder;
     let push = TracePush {
         key: plan.streams().key(round),
         bounce,
         bounces: plan.settings.bounces,
         path_capacity: plan.path_capacity,
-        photon_capacity: photon_list_capacity(plan, photon_count),
+        photon_capacity: chunk.photon_list_capacity(),
         eye: plan.settings.eye.into(),
     };
     // Every photon enters bounce 0, and the naive builder looks at every slot each time. After that
@@ -172,7 +157,7 @@ fn one_bounce(
         Builder::Atomic => trace!(TraceRoomAtomic),
         Builder::Ballot => trace!(TraceRoomBallot),
         Builder::Group => trace!(TraceRoomGroup),
-        Builder::Scan => in_order::one_bounce(commands, resources, plan, [paths, next_paths], &push, extent),
+        Builder::Scan => in_order::one_bounce(commands, chunk, [paths, next_paths], &push, extent),
         Builder::Persistent | Builder::Cpu => panic!("{} has no bounces of all paths", builder.name()),
     }?;
     if builder == Builder::Naive {

@@ -11,7 +11,7 @@ mod state;
 pub mod watch;
 
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 pub use recorder::Recorder;
@@ -28,13 +28,11 @@ use crate::plan::sensor::Sensor;
 use crate::settings::Math;
 use crate::settings::stop::Stop;
 use identity::Identity;
-use saved::SavedFilm;
+use saved::WorldFilm;
 use watch::{Control, End, Later};
 
-/// What a run of a world is to do.
-pub struct Task<'a> {
-    /// The device, and its pipelines before the run; `None` for the CPU.
-    pub device: Option<(&'a Gpu, usize)>,
+/// What a run of a world is to do, on one device or several, and what its film tells.
+pub struct Task<'a, Film> {
     /// Of a run that is kept.
     pub identity: Option<Identity>,
     /// `None` for the paper's box.
@@ -55,28 +53,30 @@ pub struct Task<'a> {
     pub counts_photons: bool,
     /// Of each map.
     pub fates: Vec<Fates>,
+    /// Whether what is done can be gone on with: sums of floats cannot.
+    pub can_go_on: bool,
+    pub error: Box<dyn Fn(&Film) -> FilmError + 'a>,
+    /// Light that limits kept from a film.
+    pub losses: Box<dyn Fn(&Film, &[Fates]) -> Losses + 'a>,
 }
 
 /// What is lit: the paper's box or a scene, on a device or on the CPU.
 pub trait World {
     type Recorder: Recorder;
-    type Film: Clone + Into<SavedFilm> + Send + 'static;
+    type Film: WorldFilm;
 
     /// Records a part of the round under way, and tells `state` of its photons. Fails with [`Error::Interrupted`] where the round
     /// was cut short and nothing of it counts.
-    fn trace(&mut self, recorder: &mut Self::Recorder, state: &mut RunState, part: u32) -> Result<()>;
+    fn trace(&mut self, recorder: &mut Self::Recorder, state: &mut RunState<Self::Film>, part: u32) -> Result<()>;
     /// The round that was recorded is the last of its block: notes what counts of it, as what follows may be cut short.
-    fn end_block(&mut self, recorder: &mut Self::Recorder, state: &RunState) -> Result<()>;
+    fn end_block(&mut self, recorder: &mut Self::Recorder, state: &RunState<Self::Film>) -> Result<()>;
     /// Whether what is recorded must run now, as there is no room for another part, or it would take long.
     fn is_full(&self, recorder: &Self::Recorder) -> bool;
     /// Runs what is recorded and counts the fates of its photons.
-    fn collect(&mut self, recorder: &mut Self::Recorder, state: &mut RunState) -> Result<()>;
+    fn collect(&mut self, recorder: &mut Self::Recorder, state: &mut RunState<Self::Film>) -> Result<()>;
     /// What all whole blocks have left, or where there is none, all photons so far. It is copied from the device, and made of the copies
     /// when it is wanted, by whom it may be.
-    fn film(&mut self, recorder: &mut Self::Recorder, state: &RunState) -> Result<Later<Self::Film>>;
-    fn error(&self, film: &Self::Film) -> FilmError;
-    /// Light that limits kept from a film.
-    fn losses(&self, film: &Self::Film, fates: &[Fates]) -> Losses;
+    fn film(&mut self, recorder: &mut Self::Recorder, state: &RunState<Self::Film>) -> Result<Later<Self::Film>>;
     /// What `--paranoid` found; `None` without it.
     fn nonfinite_values(&mut self, recorder: &mut Self::Recorder) -> Result<Option<NonfiniteValues>>;
 }
@@ -85,12 +85,12 @@ pub trait World {
 pub struct Run<'a, W: World> {
     pub world: W,
     pub recorder: W::Recorder,
-    pub state: RunState<'a>,
+    pub state: RunState<'a, W::Film>,
 }
 
 impl<'a, W: World> Run<'a, W> {
     /// Goes on with what was saved, if anything was.
-    pub fn new(world: W, recorder: W::Recorder, task: Task<'a>, control: &mut Control) -> Result<Run<'a, W>> {
+    pub fn new(world: W, recorder: W::Recorder, task: Task<'a, W::Film>, control: &mut Control) -> Result<Run<'a, W>> {
         let state = RunState::new(task, &recorder, control)?;
         let mut run = Run { world, recorder, state };
         // What was saved may be enough, or have to be handed over.
@@ -135,9 +135,14 @@ impl<'a, W: World> Run<'a, W> {
         Ok(())
     }
 
-    /// Runs what is recorded and counts the fates of its photons, as one must who looks at a run between two of its rounds.
-    pub fn collect(&mut self) -> Result<()> {
-        self.state.collect(&mut self.world, &mut self.recorder, false)
+    /// One more round, unless all have been, of a run that is looked at between two of its rounds: runs what is recorded and counts the
+    /// fates of its photons.
+    pub fn round_to_look_at(&mut self, cancelled: &AtomicBool) -> Result<()> {
+        if !self.has_ended() {
+            self.round(&mut Control::quiet(cancelled))?;
+            self.state.collect(&mut self.world, &mut self.recorder, false)?;
+        }
+        Ok(())
     }
 
     /// What all whole blocks have left.
@@ -145,8 +150,15 @@ impl<'a, W: World> Run<'a, W> {
         Ok(self.world.film(&mut self.recorder, &self.state)?())
     }
 
+    /// The same with its error as users are told of it.
+    pub fn look(&mut self) -> Result<(W::Film, FilmError)> {
+        let film = self.film()?;
+        let error = (self.state.task.error)(&film).stated();
+        Ok((film, error))
+    }
+
     /// Begins anew from round 0, with a world that knows nothing of the rounds before.
-    pub fn begin_anew(&mut self, task: Task<'a>, control: &mut Control) -> Result<()> {
+    pub fn begin_anew(&mut self, task: Task<'a, W::Film>, control: &mut Control) -> Result<()> {
         self.state = RunState::new(task, &self.recorder, control)?;
         Ok(())
     }
@@ -159,13 +171,13 @@ impl<'a, W: World> Run<'a, W> {
             save.save(&Arc::new(state.to_be_saved()(film.clone().into())), true)?;
         }
         let nonfinite_values = world.nonfinite_values(&mut recorder)?;
-        let device = state.task.device;
+        let device = recorder.device();
         if let Some((gpu, _)) = device {
             gpu.check_validation()?;
         }
         let [dispatches, submissions] = recorder.counts();
         Ok(RunResult {
-            losses: world.losses(&film, state.fates()),
+            losses: (state.task.losses)(&film, state.fates()),
             film,
             left_out: if state.blocks() > 0 { state.emitted - state.emitted_of_blocks } else { 0 },
             fates: state.fates().to_vec(),
@@ -175,7 +187,7 @@ impl<'a, W: World> Run<'a, W> {
             bias: None,
             dispatches,
             submissions,
-            pipelines: device.map_or(0, |(gpu, before)| gpu.work().pipelines - before),
+            pipelines: device.map_or(0, |(_, pipelines)| pipelines),
             nonfinite_values,
             timings: recorder.finish(),
             plan: plan.clone(),
@@ -188,7 +200,7 @@ pub fn run<W: World, Plan: Clone>(
     world: W,
     recorder: W::Recorder,
     plan: &Plan,
-    task: Task,
+    task: Task<W::Film>,
     control: &mut Control,
 ) -> Result<RunResult<Plan, W::Film>> {
     let mut run = Run::new(world, recorder, task, control)?;
@@ -203,19 +215,11 @@ pub fn check_math(gpu: &Gpu, math: Math) -> Result<()> {
     if math == Math::Strict { strict_math(gpu) } else { Ok(()) }
 }
 
-/// The commands of a run on a device that makes these pipelines, and no others; `started` is the zero of its times. With the
-/// pipelines that there were before.
-pub fn commands<'gpu>(
-    gpu: &'gpu Gpu,
-    modules: &[Module],
-    constants: Constants,
-    math: Math,
-    started: Instant,
-) -> Result<(Commands<'gpu>, usize)> {
+/// The commands of a run on a device that makes these pipelines, and no others; `started` is the zero of its times.
+pub fn commands<'gpu>(gpu: &'gpu Gpu, modules: &[Module], constants: Constants, math: Math, started: Instant) -> Result<Commands<'gpu>> {
     check_math(gpu, math)?;
-    let pipelines_before = gpu.work().pipelines;
-    gpu.prepare(modules, &constants)?;
     let mut commands = Commands::new(gpu, constants, started)?;
+    commands.prepare(modules)?;
     commands.timings().count("run");
-    Ok((commands, pipelines_before))
+    Ok(commands)
 }

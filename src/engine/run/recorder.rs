@@ -1,16 +1,14 @@
 //! What rounds are recorded with, and timed by: commands of a device, or the host's clock.
 
-use std::time::Instant;
-
 use crate::error::Result;
-use crate::gpu::Commands;
+use crate::gpu::{Commands, Gpu};
 use crate::timings::{HostClock, Timings};
 
 pub trait Recorder {
     /// Runs `body` as a round, and times it.
     fn round(&mut self, body: impl FnOnce(&mut Self) -> Result<()>) -> Result<()>;
-    /// The zero of all times.
-    fn started(&self) -> Instant;
+    /// The device, and the pipelines that it made since; `None` for the CPU.
+    fn device(&self) -> Option<(&Gpu, usize)>;
     /// Dispatches and submissions so far.
     fn counts(&self) -> [u64; 2];
     fn finish(self) -> Timings;
@@ -21,8 +19,8 @@ impl Recorder for Commands<'_> {
         self.scope("round", body)
     }
 
-    fn started(&self) -> Instant {
-        self.started()
+    fn device(&self) -> Option<(&Gpu, usize)> {
+        Some((self.gpu(), self.pipelines()))
     }
 
     fn counts(&self) -> [u64; 2] {
@@ -40,8 +38,8 @@ impl Recorder for HostClock {
         self.time("round", body)
     }
 
-    fn started(&self) -> Instant {
-        self.started()
+    fn device(&self) -> Option<(&Gpu, usize)> {
+        None
     }
 
     fn counts(&self) -> [u64; 2] {

@@ -2,14 +2,15 @@
 //! full goes on with less; where that is of no use it is given up, and the others go on. All of them go on from the last look
 //! ([`super::several_devices`]); one device alone, from what it has noted of itself.
 
+use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use super::RunResult;
 use super::identity::Identity;
-use super::saved::SavedRun;
-use super::several_devices::{NOTED_EVERY, Outcome, Together, Work};
+use super::saved::{SavedRun, WorldFilm};
+use super::several_devices::{NOTED_EVERY, Outcome, RunOnOne, Together};
 use super::watch::{Control, Keep, Later, SaveRun};
+use super::{RunResult, Task};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::settings::stop::Stop;
@@ -97,18 +98,19 @@ impl SaveRun for Notes<'_> {
     }
 }
 
-/// Does some work on one device or several to its end.
+/// Does a task on one device or several to its end.
 pub fn run_on<Plan, Film>(
     gpus: &mut Vec<Gpu>,
-    work: &Work<Plan, Film>,
+    task: &Task<Film>,
+    run: &RunOnOne<Plan, Film>,
     failed: Failed,
     control: &mut Control,
 ) -> Result<RunResult<Plan, Film>>
 where
     Plan: Send,
-    Film: Clone + Send,
+    Film: WorldFilm,
 {
-    let blocks = work.rounds.div_ceil(work.rounds_per_block);
+    let blocks = task.rounds.div_ceil(task.rounds_per_block);
     let started = Instant::now();
     // Another scene's file is to be refused; what was noted of this run is known to be its own.
     let wants_identity = control.keep.save.is_some() || control.keep.resume.is_some();
@@ -118,9 +120,11 @@ where
     loop {
         let resumed = base.clone();
         let outcome = if is_shared && gpus.len() > 1 {
-            Together { work, started, blocks }.run(gpus, base, control)?
+            Together { task, run, started, blocks }.run(gpus, base, control)?
         } else {
-            alone(work, &gpus[0], base, started.elapsed(), is_shared && work.can_go_on, wants_identity, control)
+            let seconds = task.stop.seconds.map(|seconds| (seconds - started.elapsed().as_secs_f64()).max(0.0));
+            let stop = Stop { seconds, ..task.stop };
+            alone(|control| run(&gpus[0], stop, control), base, is_shared && task.can_go_on, wants_identity, control)
         };
         let (device, error, so_far) = match outcome {
             Outcome::Ended(result) => return Ok(*result),
@@ -146,12 +150,10 @@ where
     }
 }
 
-/// Runs on one device; of its time some is `spent`.
+/// Runs on one device.
 fn alone<Plan, Film>(
-    work: &Work<Plan, Film>,
-    gpu: &Gpu,
-    resume: Option<(std::path::PathBuf, SavedRun)>,
-    spent: Duration,
+    run: impl FnOnce(&mut Control) -> Result<RunResult<Plan, Film>>,
+    resume: Option<(PathBuf, SavedRun)>,
     notes_itself: bool,
     wants_identity: bool,
     control: &mut Control,
@@ -163,8 +165,7 @@ fn alone<Plan, Film>(
         Notes { outer: save.as_mut().map(|save| &mut **save as &mut dyn SaveRun), wants_identity, latest: None, noted: Instant::now() };
     let save = is_used.then_some(&mut notes as &mut dyn SaveRun);
     let keep = Keep { scene, share: *share, resume, every, save, dealt: None };
-    let stop = Stop { seconds: work.stop.seconds.map(|seconds| (seconds - spent.as_secs_f64()).max(0.0)), ..work.stop };
-    match (work.run)(gpu, stop, &mut Control { cancelled: control.cancelled, progress: &mut *control.progress, keep }) {
+    match run(&mut Control { cancelled: control.cancelled, progress: &mut *control.progress, keep }) {
         Ok(result) => Outcome::Ended(Box::new(result)),
         Err(error) => Outcome::Failed { device: 0, error, base: notes.latest },
     }

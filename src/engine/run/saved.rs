@@ -1,5 +1,7 @@
 //! Runs as files: the sums of whole blocks, with which a run can go on, or be added to others of the same identity.
 
+use bytemuck::Pod;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
@@ -48,6 +50,26 @@ pub enum NotMerged {
     OtherShape,
     /// Together they hold more than any run does.
     TooLarge,
+}
+
+/// Of one of the two.
+pub trait WorldFilm: Clone + Into<SavedFilm> + Send + 'static {
+    /// Of what a run saved whose identity is this world's.
+    fn of(saved: &SavedFilm) -> &Self;
+}
+
+impl WorldFilm for RoomFilm {
+    fn of(saved: &SavedFilm) -> &RoomFilm {
+        let SavedFilm::Room(film) = saved else { unreachable!("identities of two worlds differ") };
+        film
+    }
+}
+
+impl WorldFilm for SceneFilm {
+    fn of(saved: &SavedFilm) -> &SceneFilm {
+        let SavedFilm::Scene(film) = saved else { unreachable!("identities of two worlds differ") };
+        film
+    }
 }
 
 impl From<RoomFilm> for SavedFilm {
@@ -175,25 +197,13 @@ struct Arrays {
 }
 
 /// What files hold arrays of.
-trait Element: Copy {
+trait Element: Pod {
     const NAME: &'static str;
-    const BYTES: usize;
-    fn put(self, bytes: &mut Vec<u8>);
-    fn take(bytes: &[u8]) -> Self;
 }
 
 macro_rules! elements {
     ($($kind:ident),*) => { $(impl Element for $kind {
         const NAME: &'static str = stringify!($kind);
-        const BYTES: usize = size_of::<$kind>();
-
-        fn put(self, bytes: &mut Vec<u8>) {
-            bytes.extend_from_slice(&self.to_le_bytes());
-        }
-
-        fn take(bytes: &[u8]) -> $kind {
-            $kind::from_le_bytes(bytes.try_into().expect("so many bytes were cut out"))
-        }
     })* };
 }
 
@@ -202,8 +212,7 @@ elements!(u32, u64, u128, f32);
 impl Arrays {
     fn add<T: Element>(&mut self, name: &str, values: &[T]) {
         self.list.push((name.to_owned(), T::NAME.to_owned(), values.len() as u64));
-        self.bytes.reserve(values.len() * T::BYTES);
-        values.iter().for_each(|value| value.put(&mut self.bytes));
+        self.bytes.extend_from_slice(bytemuck::cast_slice(values));
     }
 
     fn add_sums(&mut self, name: &str, sums: &BlockSums) {
@@ -230,10 +239,11 @@ impl Reader<'_> {
             .next()
             .filter(|(found, kind, _)| found == name && kind == T::NAME)
             .ok_or_else(|| format!("holds no {name} where they should be"))?;
-        let bytes = usize::try_from(*count).ok().and_then(|count| count.checked_mul(T::BYTES)).filter(|bytes| *bytes <= self.bytes.len());
+        let bytes =
+            usize::try_from(*count).ok().and_then(|count| count.checked_mul(size_of::<T>())).filter(|bytes| *bytes <= self.bytes.len());
         let (own, rest) = self.bytes.split_at(bytes.ok_or_else(|| format!("ends in its {name}"))?);
         self.bytes = rest;
-        Ok(own.chunks_exact(T::BYTES).map(T::take).collect())
+        Ok(bytemuck::pod_collect_to_vec(own))
     }
 
     fn next_sums(&mut self, name: &str, rounds: u32, blocks: u32) -> Result<BlockSums, String> {
@@ -300,23 +310,9 @@ impl SavedRun {
         }
         let rest = &rest[..rest.len() - CHECKSUM_BYTES];
         let (length, rest) = rest.split_at(8);
-        let length = usize::try_from(u64::take(length)).map_err(|_| damaged())?;
-        let (header, arrays) = rest.split_at_checked(length).ok_or_else(damaged)?;
-        SavedRun::check_format(header)?;
-        let header: Header = serde_json::from_slice(header)
-            .map_err(|error| format!("has a header that is not understood ({})", one_line(&error.to_string())))?;
-        SavedRun::from_parts(header, arrays)
-    }
-
-    /// Before anything else of the header is read, which may look otherwise in another format.
-    fn check_format(header: &[u8]) -> Result<(), String> {
-        let header: serde_json::Value = serde_json::from_slice(header).map_err(|_| "has no header".to_owned())?;
-        let (format, program) = (&header["format"], header["program"].as_str().unwrap_or("unknown"));
-        if format.as_u64() == Some(FORMAT.into()) {
-            return Ok(());
-        }
-        let own = env!("CARGO_PKG_VERSION");
-        Err(format!("is of format {format} (photonmill {}), and this is photonmill {own}, which reads format {FORMAT}", one_line(program)))
+        let length = u64::from_le_bytes(length.try_into().expect("8 bytes were cut out"));
+        let (header, arrays) = usize::try_from(length).ok().and_then(|length| rest.split_at_checked(length)).ok_or_else(damaged)?;
+        SavedRun::from_parts(read_header(header, FORMAT)?, arrays)
     }
 
     fn from_parts(header: Header, bytes: &[u8]) -> Result<SavedRun, String> {
@@ -399,4 +395,15 @@ impl SavedRun {
         }
         Ok(saved)
     }
+}
+
+/// The header of a file. Before anything else of it is read, its format, as it may look otherwise in another one.
+pub fn read_header<T: DeserializeOwned>(bytes: &[u8], known: u32) -> Result<T, String> {
+    let header: serde_json::Value = serde_json::from_slice(bytes).map_err(|_| "has no header".to_owned())?;
+    let (format, program) = (&header["format"], one_line(header["program"].as_str().unwrap_or("unknown")));
+    if format.as_u64() != Some(known.into()) {
+        let own = env!("CARGO_PKG_VERSION");
+        return Err(format!("is of format {format} (photonmill {program}), and this is photonmill {own}, which reads format {known}"));
+    }
+    serde_json::from_slice(bytes).map_err(|error| format!("has a header that is not understood ({})", one_line(&error.to_string())))
 }

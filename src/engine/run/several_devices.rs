@@ -12,37 +12,19 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::RunResult;
 use super::blocks::Dealer;
 use super::identity::Identity;
-use super::saved::{SavedFilm, SavedRun};
+use super::saved::{SavedRun, WorldFilm};
 use super::watch::{Control, End, Keep, Later, Progress, SaveRun, Watch, looks};
-use crate::engine::error::bound::FilmError;
+use super::{RunResult, Task};
 use crate::engine::nonfinite_values::NonfiniteValues;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::ledger::{Fates, Ledger, Losses};
+use crate::ledger::Ledger;
 use crate::settings::stop::Stop;
 
-/// Does some work on one device.
-type RunOnOne<'a, Plan, Film> = dyn Fn(&Gpu, Stop, &mut Control) -> Result<RunResult<Plan, Film>> + Sync + 'a;
-
-/// What is run, in either world.
-pub struct Work<'a, Plan, Film> {
-    /// Runs on one device until a goal is reached, or as long as it is dealt blocks.
-    pub run: &'a RunOnOne<'a, Plan, Film>,
-    pub film: fn(&SavedFilm) -> &Film,
-    pub error: &'a dyn Fn(&Film) -> FilmError,
-    pub losses: &'a dyn Fn(&Film, &[Fates]) -> Losses,
-    /// Whether what is done can be gone on with: sums of floats cannot.
-    pub can_go_on: bool,
-    pub stop: Stop,
-    pub alpha: f64,
-    pub rounds: u32,
-    pub rounds_per_block: u32,
-    pub bounces: u32,
-    pub photons_per_round: u64,
-}
+/// Runs on one device until a goal is reached, or as long as it is dealt blocks.
+pub type RunOnOne<'a, Plan, Film> = dyn Fn(&Gpu, Stop, &mut Control) -> Result<RunResult<Plan, Film>> + Sync + 'a;
 
 /// Between two times at which a run is noted, in memory.
 pub const NOTED_EVERY: Duration = Duration::from_secs(10);
@@ -110,7 +92,8 @@ const PAUSE: Duration = Duration::from_millis(20);
 
 /// One attempt.
 pub struct Together<'a, Plan, Film> {
-    pub work: &'a Work<'a, Plan, Film>,
+    pub task: &'a Task<'a, Film>,
+    pub run: &'a RunOnOne<'a, Plan, Film>,
     pub started: Instant,
     pub blocks: u32,
 }
@@ -136,33 +119,33 @@ struct Attempt<'a, Plan, Film> {
     numbers: Vec<usize>,
 }
 
-impl<Plan: Send, Film: Clone + Send> Together<'_, Plan, Film> {
+impl<Plan: Send, Film: WorldFilm> Together<'_, Plan, Film> {
     pub fn run(
         &self,
         gpus: &mut [Gpu],
         resume: Option<(std::path::PathBuf, SavedRun)>,
         control: &mut Control,
     ) -> Result<Outcome<Plan, Film>> {
-        let work = self.work;
+        let Together { task, run, .. } = *self;
         let share = control.keep.share;
         let done = resume.as_ref().map(|(_, run)| run.done.clone()).unwrap_or_default();
-        let most = work.stop.photons.map_or(self.blocks, |photons| {
-            let of_block = (work.photons_per_round * u64::from(work.rounds_per_block)).max(1);
+        let most = task.stop.photons.map_or(self.blocks, |photons| {
+            let of_block = (task.photons_per_round * u64::from(task.rounds_per_block)).max(1);
             photons.div_ceil(of_block).min(u64::from(self.blocks)) as u32
         });
         let mut order: Vec<u32> = (share.number..self.blocks).step_by(share.of as usize).filter(|block| !done.contains(*block)).collect();
         order.truncate(most.saturating_sub(done.count()) as usize);
         let all = order.len() as u32;
         // Nobody looks where no error decides; what is done is noted from time to time all the same.
-        let looks = work.stop.error.into_iter().flat_map(|_| looks(done.count())).map(|look| look - done.count());
+        let looks = task.stop.error.into_iter().flat_map(|_| looks(done.count())).map(|look| look - done.count());
         let dealer = Arc::new(Dealer::new(order, gpus.len(), looks));
         let cancelled = AtomicBool::new(false);
         let (events, received) = channel();
         let mut attempt = Attempt {
             devices: gpus.iter().map(|_| Known::new()).collect(),
             dealer: &dealer,
-            watch: Watch::new(work.stop, work.alpha, work.rounds_per_block, self.started),
-            most_rounds: (done.count() + all) * work.rounds_per_block,
+            watch: Watch::new(task.stop, task.alpha, task.rounds_per_block, self.started),
+            most_rounds: (done.count() + all) * task.rounds_per_block,
             look: 0,
             base: resume.as_ref().map(|(_, run)| Arc::new(run.clone())),
             end: None,
@@ -174,8 +157,8 @@ impl<Plan: Send, Film: Clone + Send> Together<'_, Plan, Film> {
         };
         attempt.watch.go_on(done.count());
         let scene = control.keep.scene;
-        let (resume, run) = (Mutex::new(resume), work.run);
-        let no_goal = Stop { error: None, seconds: None, photons: None, ..work.stop };
+        let resume = Mutex::new(resume);
+        let no_goal = Stop { error: None, seconds: None, photons: None, ..task.stop };
         std::thread::scope(|scope| {
             for (device, gpu) in gpus.iter_mut().enumerate() {
                 let (dealer, events, cancelled, resume) = (&dealer, events.clone(), &cancelled, &resume);
@@ -214,7 +197,7 @@ impl<Plan: Send, Film: Clone + Send> Together<'_, Plan, Film> {
         let is_whole = run.done.count() == done.count() + all;
         let end = match attempt.end {
             Some(End::Error) => End::Error,
-            _ if is_whole && work.stop.photons.is_some_and(|photons| run.emitted() >= photons) => End::Photons,
+            _ if is_whole && task.stop.photons.is_some_and(|photons| run.emitted() >= photons) => End::Photons,
             _ if is_whole => End::Rounds,
             end => end.unwrap_or(End::Cancelled),
         };
@@ -283,9 +266,9 @@ impl<Plan: Send, Film: Clone + Send> Together<'_, Plan, Film> {
             };
             let blocks = run.done.count();
             if attempt.watch.is_due(blocks) {
-                let film = (self.work.film)(&run.film);
-                attempt.watch.look(&(self.work.error)(film), &(self.work.losses)(film, &run.fates));
-                attempt.watch.check_error(self.work.bounces)?;
+                let film = Film::of(&run.film);
+                attempt.watch.look(&(self.task.error)(film), &(self.task.losses)(film, &run.fates));
+                attempt.watch.check_error(self.task.bounces)?;
                 attempt.end = attempt.watch.end(blocks, 0);
             }
             control.keep.save.iter_mut().try_for_each(|save| save.save(&run, false))?;
@@ -299,7 +282,7 @@ impl<Plan: Send, Film: Clone + Send> Together<'_, Plan, Film> {
         let all = || attempt.devices.iter().map(|device| &device.progress);
         let rounds: u64 = all().map(|progress| progress.done).sum();
         let ledger = all().fold(Ledger::default(), |sum, progress| sum.plus(&progress.ledger));
-        attempt.watch.progress(rounds as f64, attempt.most_rounds, self.work.photons_per_round, ledger)
+        attempt.watch.progress(rounds as f64, attempt.most_rounds, self.task.photons_per_round, ledger)
     }
 
     /// The result of all, in place of that of the first device.
@@ -316,10 +299,10 @@ impl<Plan: Send, Film: Clone + Send> Together<'_, Plan, Film> {
             result.nonfinite_values = NonfiniteValues::both(result.nonfinite_values, other.nonfinite_values);
             result.more_devices.extend(other.device);
         }
-        let film = (self.work.film)(&run.film).clone();
+        let film = Film::of(&run.film).clone();
         RunResult {
             left_out: traced.saturating_sub(run.fates.iter().map(|fates| fates.emitted).sum()),
-            losses: (self.work.losses)(&film, &run.fates),
+            losses: (self.task.losses)(&film, &run.fates),
             film,
             fates: run.fates.clone(),
             end,

@@ -6,7 +6,7 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use super::blocks::{Blocks, Dealer, Share};
-use super::saved::{SavedFilm, SavedRun};
+use super::saved::{SavedFilm, SavedRun, WorldFilm};
 use super::watch::{Control, End, Progress, SaveRun, Watch};
 use super::{Recorder, Task, World};
 use crate::constants::KEPT_BLOCKS;
@@ -15,8 +15,8 @@ use crate::ledger::{Fates, Ledger};
 use crate::text::counted;
 
 /// How far a run has come, and whether it goes on.
-pub struct RunState<'a> {
-    pub(super) task: Task<'a>,
+pub struct RunState<'a, Film> {
+    pub(super) task: Task<'a, Film>,
     pub(super) watch: Watch,
     /// Of each map in whole blocks, and in the block under way, as far as they are collected.
     fates_of_blocks: Vec<Fates>,
@@ -49,9 +49,9 @@ pub struct RunState<'a> {
 /// What nobody needs at once is made so many times as long after the one before as that took: of the run's time it takes 2 %.
 const WAITS: u32 = 50;
 
-impl<'a> RunState<'a> {
+impl<'a, Film: WorldFilm> RunState<'a, Film> {
     /// Goes on with what was saved, if anything was.
-    pub(super) fn new(task: Task<'a>, recorder: &impl Recorder, control: &mut Control) -> Result<RunState<'a>> {
+    pub(super) fn new(task: Task<'a, Film>, recorder: &impl Recorder, control: &mut Control) -> Result<RunState<'a, Film>> {
         let share = control.keep.share;
         let mut state = RunState {
             watch: Watch::new(task.stop, task.alpha, task.rounds_per_block, Instant::now()),
@@ -116,7 +116,7 @@ impl<'a> RunState<'a> {
     }
 
     /// The run as far as whole blocks are done, for its film.
-    pub(super) fn to_be_saved(&self) -> impl FnOnce(SavedFilm) -> SavedRun + Send + use<> {
+    pub(super) fn to_be_saved(&self) -> impl FnOnce(SavedFilm) -> SavedRun + Send + use<Film> {
         let identity = self.task.identity.clone().expect("what is kept has an identity");
         let (share, wanted, sensor) = (self.share, self.wanted(), self.task.sensor);
         let (done, fates) = (self.done.clone(), self.fates_of_blocks.clone());
@@ -185,7 +185,7 @@ impl<'a> RunState<'a> {
         if self.blocks() > 0 { self.emitted_of_blocks } else { self.emitted }
     }
 
-    pub(super) fn end_round<W: World>(&mut self, world: &mut W, recorder: &mut W::Recorder) -> Result<()> {
+    pub(super) fn end_round<W: World<Film = Film>>(&mut self, world: &mut W, recorder: &mut W::Recorder) -> Result<()> {
         if self.ends_block() {
             world.end_block(recorder, self)?;
             let latest = self.kept.entry(self.block % KEPT_BLOCKS).or_insert(self.block);
@@ -220,7 +220,12 @@ impl<'a> RunState<'a> {
     }
 
     /// Runs what is recorded where that is due, looks at it, and says whether the run ends.
-    pub(super) fn pause<W: World>(&mut self, world: &mut W, recorder: &mut W::Recorder, control: &mut Control) -> Result<bool> {
+    pub(super) fn pause<W: World<Film = Film>>(
+        &mut self,
+        world: &mut W,
+        recorder: &mut W::Recorder,
+        control: &mut Control,
+    ) -> Result<bool> {
         let waited = self.saved.elapsed();
         let least = |save: &&mut dyn SaveRun| if save.may_wait() { self.saving * WAITS } else { Duration::ZERO };
         let is_due = self.hands_over || waited >= control.keep.every;
@@ -236,7 +241,7 @@ impl<'a> RunState<'a> {
             let mut film = world.film(recorder, self)?;
             if looks {
                 let made = film();
-                self.watch.look(&world.error(&made), &world.losses(&made, self.fates()));
+                self.watch.look(&(self.task.error)(&made), &(self.task.losses)(&made, self.fates()));
                 self.watch.check_error(self.task.bounces)?;
                 film = Box::new(|| made);
             }
@@ -263,7 +268,7 @@ impl<'a> RunState<'a> {
     }
 
     /// Whether what is recorded should run now.
-    fn is_due<W: World>(&self, world: &W, recorder: &W::Recorder) -> bool {
+    fn is_due<W: World<Film = Film>>(&self, world: &W, recorder: &W::Recorder) -> bool {
         let is_last = self.end.is_some() || self.is_short();
         let may_end = self.is_between_blocks() && self.watch.may_end(self.blocks(), self.emitted);
         // Tallies are 32-bit on the device.
@@ -275,7 +280,7 @@ impl<'a> RunState<'a> {
     }
 
     /// Runs what is recorded and counts the fates of its photons. Those of a round that was cut short may still be under way.
-    pub(super) fn collect<W: World>(&mut self, world: &mut W, recorder: &mut W::Recorder, interrupted: bool) -> Result<()> {
+    pub(super) fn collect<W: World<Film = Film>>(&mut self, world: &mut W, recorder: &mut W::Recorder, interrupted: bool) -> Result<()> {
         world.collect(recorder, self)?;
         if interrupted {
             self.fates_of_rest.iter_mut().for_each(Fates::interrupt);

@@ -12,7 +12,7 @@ use crate::error::Result;
 use crate::gpu::kernels::{
     CrowdSize, DiscCuts, EndDifference, FluxToRadiance, GatherVisiblePointsTwoWords, GatherVisiblePointsU64, Resolve,
 };
-use crate::gpu::{Commands, Extent};
+use crate::gpu::{Commands, Extent, dispatch_by_sums};
 use crate::plan::differences::row_length;
 use crate::plan::scene::MapPlan;
 use crate::records::{CellPush, CrowdSizePush, DiscCutsPush, EndDifferencePush, FluxToRadiancePush, ResolvePush, SceneGatherPush};
@@ -42,45 +42,25 @@ pub fn cut_discs(commands: &mut Commands, round: Round, map: &MapPlan) -> Result
 }
 
 /// Adds a chunk of a map to the estimates of all visible points whose class this grid serves, all where radii have no classes.
-pub fn gather(
-    commands: &mut Commands,
-    round: Round,
-    photons: &PhotonBuffers,
-    map: &MapPlan,
-    classes: Range<u32>,
-    cells_push: CellPush,
-) -> Result<()> {
+pub fn gather(commands: &mut Commands, round: Round, map: &MapPlan, classes: Range<u32>, cells_push: CellPush) -> Result<()> {
+    let PhotonBuffers { cells, sorted_map, crowded_points, dispatch_args, .. } = round.photons();
     let Round { resources, plan, number: round, .. } = round;
-    let PhotonBuffers { cells, sorted_map, crowded, dispatch_args, .. } = photons;
     let SceneResources { scene, visible_points, matt_lobes, matt_covers, estimates, near_sums, .. } = resources;
     let SceneResources { radius_classes, disc_cuts, nonfinite_values, .. } = resources;
     let point_count = plan.visible_points();
     let lanes = map.lanes;
     let (width, height) = plan.sensor.size();
-    macro_rules! kernel {
-        ($kernel:ident) => {
-            $kernel {
-                scene,
-                visible_points,
-                matt_lobes,
-                matt_covers,
-                film: estimates,
-                near_sums,
-                cells,
-                sorted_map,
-                crowded,
-                radius_classes,
-                disc_cuts,
-                nonfinite_values,
-            }
-        };
-    }
     let dispatch = |commands: &mut Commands, push: &SceneGatherPush, extent: Extent| {
-        if commands.facts().int64_atomics {
-            commands.dispatch(kernel!(GatherVisiblePointsU64), push, extent)
-        } else {
-            commands.dispatch(kernel!(GatherVisiblePointsTwoWords), push, extent)
-        }
+        dispatch_by_sums!(
+            commands,
+            commands.facts().int64_atomics,
+            [GatherVisiblePointsU64, GatherVisiblePointsTwoWords] {
+                scene, visible_points, matt_lobes, matt_covers, film: estimates, near_sums, cells, sorted_map, crowded_points,
+                radius_classes, disc_cuts, nonfinite_values,
+            },
+            push,
+            extent
+        )
     };
     in_pieces(commands, plan, point_count, plan.points_at_once(), map.tests_per_point(), |commands, first_point, end_point| {
         let push = SceneGatherPush {
@@ -103,11 +83,11 @@ pub fn gather(
             first_cut: plan.first_cut(map.caustic_only),
             cells: cells_push,
         };
-        commands.fill(crowded, 0, 2, 0);
+        commands.fill(crowded_points, 0, 2, 0);
         let groups = ((end_point - first_point) * lanes).div_ceil(plan.settings.group_size);
         dispatch(commands, &push, Extent::Groups(groups, 1))?;
         let size = CrowdSizePush { items_per_group: plan.settings.group_size / lanes, max_groups: MAX_GROUPS };
-        commands.dispatch(CrowdSize { crowded, dispatch_args }, &size, Extent::Groups(1, 1))?;
+        commands.dispatch(CrowdSize { crowded_points, dispatch_args }, &size, Extent::Groups(1, 1))?;
         dispatch(commands, &SceneGatherPush { first_slice: 1, ..push }, Extent::Indirect(dispatch_args))
     })
 }
@@ -175,7 +155,8 @@ pub fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u32; 2])
 pub fn resolve(commands: &mut Commands, round: Round, ends_block: bool) -> Result<()> {
     let Round { resources, plan, .. } = round;
     let SceneResources { extra_samples, pass_sums, estimates, film, .. } = resources;
-    let FilmBuffers { all, surfaces, part_totals, part_sums, latest_blocks, .. } = film;
+    let FilmBuffers { sums_of_block, film_sums, film_squares, part_totals, part_sums, latest_blocks, .. } = film;
+    let FilmBuffers { surface_sums_of_block, surface_sums, surface_squares, .. } = film;
     let pixel_count = plan.sensor.pixels();
     let points_per_path = if resources.photons.is_some() { plan.points_per_path } else { 0 };
     let block = round.number / plan.film.rounds_per_block;
@@ -196,12 +177,12 @@ pub fn resolve(commands: &mut Commands, round: Round, ends_block: bool) -> Resul
             extra_samples,
             pass_sums,
             estimates,
-            sums_of_block: &all.under_way,
-            film_sums: &all.sums,
-            film_squares: &all.squares,
-            surface_sums_of_block: &surfaces.under_way,
-            surface_sums: &surfaces.sums,
-            surface_squares: &surfaces.squares,
+            sums_of_block,
+            film_sums,
+            film_squares,
+            surface_sums_of_block,
+            surface_sums,
+            surface_squares,
             part_totals,
             part_sums,
             latest_blocks,

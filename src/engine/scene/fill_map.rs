@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::map_file::MapWriter;
 use super::resources::SceneResources;
 use super::{Round, constants, trace};
-use crate::constants::{NONE, TALLY_COPIES};
+use crate::constants::TALLY_COPIES;
 use crate::engine::nonfinite_values::NonfiniteValues;
 use crate::engine::run::commands;
 use crate::engine::{Control, Progress, tallies, totals};
@@ -38,8 +38,8 @@ pub fn fill(
     control: &mut Control,
 ) -> Result<Filled> {
     let started = Instant::now();
-    let (mut commands, _) = commands(gpu, &trace::modules(plan), constants(plan), plan.settings.math, started)?;
-    let resources = SceneResources::new(gpu, &mut commands, geometry, plan, &[])?;
+    let mut commands = commands(gpu, &trace::modules(plan), constants(plan), plan.settings.math, started)?;
+    let resources = SceneResources::new(&mut commands, geometry, plan, &[])?;
     commands.set_interrupt(Some(Interrupt { cancelled: control.cancelled, deadline: None }));
     let mut ledger = Ledger::default();
     writer.drop_open_round().map_err(unwritten)?;
@@ -86,19 +86,14 @@ fn one_round(commands: &mut Commands, round: Round, writer: &mut MapWriter, unwr
 
 /// Hands over the photons of a chunk in an order of their own, as the order in which a device stores them is not the same twice.
 fn one_map(commands: &mut Commands, round: Round, map: &MapPlan, take: &mut dyn FnMut(&[MapPhoton]) -> Result<()>) -> Result<Fates> {
-    let buffers = round.resources.photons.as_ref().expect("a map has photons");
     let which = usize::from(map.caustic_only);
-    let (tallies, totals) = (&buffers.tallies[which], &buffers.totals[which]);
-    tallies::clear(commands, tallies);
-    totals::clear(commands, totals);
+    let (tallies, totals) = (&round.photons().tallies[which], &round.photons().totals[which]);
+    commands.clear(tallies);
+    commands.clear(totals);
     let mut stored = 0;
     for chunk in map.chunks() {
         let mut found: Vec<MapPhoton> = Vec::new();
-        trace::trace(commands, round, buffers, map, chunk, &mut |commands, _| {
-            let count = commands.read(&buffers.counters, 1)?[0].min(map.capacity);
-            found.extend(commands.read(&buffers.map, count as usize)?.into_iter().filter(|photon| photon.plane != NONE));
-            Ok(())
-        })?;
+        trace::trace(commands, round, map, chunk, &mut |commands, _| Ok(found.extend(trace::in_map(commands, round, map)?)))?;
         found.par_sort_unstable_by_key(|photon| bytemuck::cast::<MapPhoton, [u32; 8]>(*photon));
         stored += found.len() as u64;
         take(&found)?;

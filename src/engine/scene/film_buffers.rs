@@ -11,36 +11,23 @@ use crate::engine::run::RunState;
 use crate::engine::run::watch::Later;
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands};
-use crate::plan::buffers::{ANOMALY_WORDS, Declared, PART_VALUES, scene};
+use crate::plan::buffers::{ANOMALY_WORDS, PART_VALUES, scene};
 use crate::plan::differences::difference_count;
 use crate::plan::film::BiasPlan;
 use crate::plan::latest_blocks::kept_count;
 use crate::plan::scene::ScenePlan;
 
 buffers! {
-    /// Light of pixels, in fixed point.
-    pub struct BlockBuffers(planned: &Planned, commands: &mut Commands, declared: [Declared<u64>; 3]) {
-        under_way: Buffer<u64> = planned.zeroed(commands, declared[0])?,
-        /// Of all whole blocks, and the squares of these in two halves.
-        sums: Buffer<u64> = planned.zeroed(commands, declared[1])?,
-        squares: Buffer<u64> = planned.zeroed(commands, declared[2])?,
-    }
-}
-
-buffers! {
-    /// Counts as the latest whole block left them: a block that is cut short leaves nothing in the result.
-    pub struct CountsOfBlocks(planned: &Planned) {
-        one_hits: Buffer<u32> = planned.one(scene::ONE_HITS_OF_BLOCKS)?,
-        part_totals: Buffer<u64> = planned.one(scene::PART_TOTALS_OF_BLOCKS)?,
-        anomalies: Buffer<u32> = planned.one(scene::ANOMALIES_OF_BLOCKS)?,
-    }
-}
-
-buffers! {
+    /// Light of pixels in fixed point, and counts.
     pub struct FilmBuffers(planned: &Planned, commands: &mut Commands) {
-        all: BlockBuffers = BlockBuffers::made(planned, commands, [scene::BLOCK_SUMS, scene::FILM_SUMS, scene::FILM_SQUARES])?,
-        /// Of light that surfaces scatter; of a picture.
-        surfaces: BlockBuffers = BlockBuffers::made(planned, commands, [scene::SURFACE_BLOCK_SUMS, scene::SURFACE_SUMS, scene::SURFACE_SQUARES])?,
+        /// Of the block under way, of all whole blocks, and the squares of these in two halves.
+        sums_of_block: Buffer<u64> = planned.zeroed(commands, scene::SUMS_OF_BLOCK)?,
+        film_sums: Buffer<u64> = planned.zeroed(commands, scene::FILM_SUMS)?,
+        film_squares: Buffer<u64> = planned.zeroed(commands, scene::FILM_SQUARES)?,
+        /// The same of light that surfaces scatter; of a picture.
+        surface_sums_of_block: Buffer<u64> = planned.zeroed(commands, scene::SURFACE_SUMS_OF_BLOCK)?,
+        surface_sums: Buffer<u64> = planned.zeroed(commands, scene::SURFACE_SUMS)?,
+        surface_squares: Buffer<u64> = planned.zeroed(commands, scene::SURFACE_SQUARES)?,
         /// What a smaller radius would change.
         differences: Buffer<u64> = planned.zeroed(commands, scene::DIFFERENCES)?,
         latest_blocks: Buffer<f32> = planned.zeroed(commands, scene::LATEST_BLOCKS)?,
@@ -50,21 +37,23 @@ buffers! {
         part_sums: Buffer<u64> = planned.zeroed(commands, scene::PART_SUMS)?,
         anomalies: Buffer<u32> = planned.zeroed(commands, scene::ANOMALIES)?,
         class_counts: Buffer<u32> = planned.zeroed(commands, scene::CLASS_COUNTS)?,
-        of_blocks: CountsOfBlocks = CountsOfBlocks::made(planned)?,
+        /// Counts as the latest whole block left them: a block that is cut short leaves nothing in the result.
+        one_hits_of_blocks: Buffer<u32> = planned.one(scene::ONE_HITS_OF_BLOCKS)?,
+        part_totals_of_blocks: Buffer<u64> = planned.one(scene::PART_TOTALS_OF_BLOCKS)?,
+        anomalies_of_blocks: Buffer<u32> = planned.one(scene::ANOMALIES_OF_BLOCKS)?,
     }
 }
 
 impl FilmBuffers {
     /// Empties the film.
     pub(super) fn clear(&self, commands: &mut Commands) {
-        let FilmBuffers { all, surfaces, differences, latest_blocks, part_sums, class_counts, .. } = self;
-        for BlockBuffers { under_way, sums, squares } in [all, surfaces] {
-            [under_way, sums, squares].into_iter().for_each(|sums| commands.clear(sums));
+        let FilmBuffers { sums_of_block, film_sums, film_squares, .. } = self;
+        let FilmBuffers { surface_sums_of_block, surface_sums, surface_squares, differences, part_sums, .. } = self;
+        for sums in [sums_of_block, film_sums, film_squares, surface_sums_of_block, surface_sums, surface_squares, differences, part_sums] {
+            commands.clear(sums);
         }
-        commands.clear(differences);
-        commands.clear(latest_blocks);
-        commands.clear(part_sums);
-        commands.clear(class_counts);
+        commands.clear(&self.latest_blocks);
+        commands.clear(&self.class_counts);
         self.forget_seen(commands);
     }
 
@@ -77,20 +66,19 @@ impl FilmBuffers {
 
     /// Notes what the block that ends leaves of the counts.
     pub(super) fn end_block(&self, commands: &mut Commands) {
-        let FilmBuffers { one_hits, part_totals, anomalies, of_blocks, .. } = self;
-        commands.copy(one_hits, &of_blocks.one_hits, one_hits.count());
-        commands.copy(part_totals, &of_blocks.part_totals, PART_COUNT.into());
-        commands.copy(anomalies, &of_blocks.anomalies, anomalies.count());
+        commands.copy(&self.one_hits, &self.one_hits_of_blocks, self.one_hits.count());
+        commands.copy(&self.part_totals, &self.part_totals_of_blocks, PART_COUNT.into());
+        commands.copy(&self.anomalies, &self.anomalies_of_blocks, self.anomalies.count());
     }
 
     /// Goes on with a film.
     pub(super) fn restore(&self, commands: &mut Commands, film: &SceneFilm) -> Result<()> {
-        let FilmBuffers { all, surfaces, latest_blocks, one_hits, part_totals, anomalies, of_blocks, .. } = self;
+        let FilmBuffers { film_sums, film_squares, surface_sums, surface_squares, latest_blocks, .. } = self;
         commands.upload(&self.differences, &film.differences.0)?;
-        for (buffers, found) in [(all, Some(&film.of_blocks)), (surfaces, film.of_surfaces.as_ref())] {
-            let Some(found) = found else { continue };
-            commands.upload(&buffers.sums, &found.sums)?;
-            commands.upload(&buffers.squares, &halves(&found.squares))?;
+        let of_surfaces = film.of_surfaces.iter().map(|found| (surface_sums, surface_squares, found));
+        for (sums, squares, found) in of_surfaces.chain([(film_sums, film_squares, &film.of_blocks)]) {
+            commands.upload(sums, &found.sums)?;
+            commands.upload(squares, &halves(&found.squares))?;
         }
         let kept = PART_VALUES as usize * kept_count(film.pixels());
         let mut values = vec![0.0; latest_blocks.count() as usize];
@@ -98,16 +86,16 @@ impl FilmBuffers {
             values[(block.number % KEPT_BLOCKS) as usize * kept..][..kept].copy_from_slice(&block.values);
         }
         commands.upload(latest_blocks, &values)?;
-        for one_hits in [one_hits, &of_blocks.one_hits] {
+        for one_hits in [&self.one_hits, &self.one_hits_of_blocks] {
             commands.upload(one_hits, &film.one_hits)?;
         }
         if let Some(parts) = &film.parts {
             commands.upload(&self.part_sums, parts)?;
         }
-        for part_totals in [part_totals, &of_blocks.part_totals] {
+        for part_totals in [&self.part_totals, &self.part_totals_of_blocks] {
             commands.upload(part_totals, &film.part_totals)?;
         }
-        for anomalies in [anomalies, &of_blocks.anomalies] {
+        for anomalies in [&self.anomalies, &self.anomalies_of_blocks] {
             commands.upload(anomalies, &film.anomalies)?;
         }
         commands.submit()
@@ -115,7 +103,13 @@ impl FilmBuffers {
 
     /// Copies the film to the host, which makes it of the copies when it is wanted: that of whole blocks, or where there is none, of all
     /// rounds; `is_cut` where the latest of these was cut short.
-    pub(super) fn read(&self, commands: &mut Commands, plan: &ScenePlan, state: &RunState, is_cut: bool) -> Result<Later<SceneFilm>> {
+    pub(super) fn read(
+        &self,
+        commands: &mut Commands,
+        plan: &ScenePlan,
+        state: &RunState<SceneFilm>,
+        is_cut: bool,
+    ) -> Result<Later<SceneFilm>> {
         let pixels = plan.sensor.pixels() as usize;
         // Where a block is whole, nothing counts of the one under way.
         let is_whole = state.blocks() > 0;
@@ -129,19 +123,17 @@ impl FilmBuffers {
                 Some((commands.copy_out(&self.part_totals, all)?, all - count))
             }
         };
-        let FilmBuffers { latest_blocks, of_blocks, .. } = self;
+        let FilmBuffers { sums_of_block, film_sums, film_squares, surface_sums_of_block, surface_sums, surface_squares, .. } = self;
+        let (film_sums, surface_sums) = if is_whole { (film_sums, surface_sums) } else { (sums_of_block, surface_sums_of_block) };
         let (one_hits, part_totals, anomalies) = match is_whole {
-            true => (&of_blocks.one_hits, &of_blocks.part_totals, &of_blocks.anomalies),
+            true => (&self.one_hits_of_blocks, &self.part_totals_of_blocks, &self.anomalies_of_blocks),
             false => (&self.one_hits, &self.part_totals, &self.anomalies),
         };
         let seen = if plan.film.sees_light { pixels } else { 0 };
-        let mut of = |buffers: &BlockBuffers, pixels: usize| -> Result<_> {
-            let sums = commands.copy_out(if is_whole { &buffers.sums } else { &buffers.under_way }, 3 * pixels)?;
-            Ok((sums, commands.copy_out(&buffers.squares, 6 * pixels)?))
-        };
-        let (all, surfaces) = (of(&self.all, pixels)?, of(&self.surfaces, seen)?);
+        let all = (commands.copy_out(film_sums, 3 * pixels)?, commands.copy_out(film_squares, 6 * pixels)?);
+        let surfaces = (commands.copy_out(surface_sums, 3 * seen)?, commands.copy_out(surface_squares, 6 * seen)?);
         let kept = PART_VALUES as usize * kept_count(pixels);
-        let latest = commands.copy_out(latest_blocks, latest_blocks.count() as usize)?;
+        let latest = commands.copy_out(&self.latest_blocks, self.latest_blocks.count() as usize)?;
         let one_hits = commands.copy_out(one_hits, HIT_KINDS as usize * pixels)?;
         let part_totals = commands.copy_out(part_totals, PART_COUNT as usize)?;
         let anomalies = commands.copy_out(anomalies, ANOMALY_WORDS)?;

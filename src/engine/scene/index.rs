@@ -27,20 +27,13 @@ pub fn cells(round: Round, map: &MapPlan, radius: f32) -> CellPush {
 }
 
 /// Sorts the map, which holds so many photons where that is known, by the buckets of its cells.
-pub fn build(
-    commands: &mut Commands,
-    round: Round,
-    photons: &PhotonBuffers,
-    map_plan: &MapPlan,
-    cells_push: &CellPush,
-    stored: Option<u32>,
-) -> Result<()> {
+pub fn build(commands: &mut Commands, round: Round, map_plan: &MapPlan, cells_push: &CellPush, stored: Option<u32>) -> Result<()> {
     let stored = stored.map_or(0, u64::from);
     let handle = |commands: &mut Commands, stored, bytes| commands.count(Handled { stored, bytes, ..Handled::default() });
     handle(commands, stored, 0);
     let plan = round.plan;
-    let totals = &photons.totals[usize::from(map_plan.caustic_only)];
-    let PhotonBuffers { map, sorted_map, counters, cells, ranks, block_sums, dispatch_args, .. } = photons;
+    let PhotonBuffers { map, sorted_map, counters, cells, ranks, sums_of_cells, dispatch_args, totals, .. } = round.photons();
+    let totals = &totals[usize::from(map_plan.caustic_only)];
     let buckets = cells_push.bucket_mask + 1;
     commands.scope("count", |commands| {
         // The fill counts itself.
@@ -52,7 +45,7 @@ pub fn build(
     })?;
     commands.scope("scan", |commands| {
         handle(commands, 0, map_plan.bytes_of_scanning());
-        scan(commands, cells, block_sums, buckets + 1, plan.settings.group_size)
+        scan(commands, cells, sums_of_cells, buckets + 1, plan.settings.group_size)
     })?;
     commands.scope("sort", |commands| {
         handle(commands, stored, map_plan.bytes_of_sorting(stored));

@@ -3,15 +3,14 @@
 
 use std::collections::HashMap;
 
-use super::resources::PhotonBuffers;
+use super::Round;
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, Commands, Gpu, Memory};
+use crate::gpu::{Buffer, Commands, Memory};
 use crate::ledger::Fates;
 use crate::photon::MapPhoton;
 use crate::plan::scene::MapPlan;
 
-pub struct KeptMaps<'gpu> {
-    gpu: &'gpu Gpu,
+pub struct KeptMaps {
     /// By round, and whether it is the caustic map.
     maps: HashMap<(u32, bool), KeptMap>,
     /// Maps for which there is no room are traced again.
@@ -31,9 +30,9 @@ struct KeptMap {
     is_partial: bool,
 }
 
-impl<'gpu> KeptMaps<'gpu> {
-    pub fn new(gpu: &'gpu Gpu, most_bytes: u64) -> KeptMaps<'gpu> {
-        KeptMaps { gpu, maps: HashMap::new(), most_bytes, round: 0, open: [false; 2] }
+impl KeptMaps {
+    pub fn new(most_bytes: u64) -> KeptMaps {
+        KeptMaps { maps: HashMap::new(), most_bytes, round: 0, open: [false; 2] }
     }
 
     /// Begins a map of a round; whether its photons are kept, and need not be traced.
@@ -49,18 +48,18 @@ impl<'gpu> KeptMaps<'gpu> {
     }
 
     /// Keeps the photons that are in the map, if there is room.
-    pub fn keep(&mut self, commands: &mut Commands, photons: &PhotonBuffers, map: &MapPlan) -> Result<()> {
+    pub fn keep(&mut self, commands: &mut Commands, round: Round, map: &MapPlan) -> Result<()> {
         let held = self.bytes();
         let kept = self.maps.get_mut(&(self.round, map.caustic_only)).expect("the map was begun");
-        let count = u64::from(commands.read(&photons.counters, 1)?[0].min(map.capacity));
+        let count = u64::from(commands.read(&round.photons().counters, 1)?[0].min(map.capacity));
         if kept.is_partial || count == 0 {
             return Ok(());
         }
         let has_room = held + count * size_of::<MapPhoton>() as u64 <= self.most_bytes;
-        let part = has_room.then(|| self.gpu.buffer("kept photons", count, Memory::Device));
+        let part = has_room.then(|| commands.gpu().buffer("kept photons", count, Memory::Device));
         match part {
             Some(Ok(part)) => {
-                commands.copy(&photons.map, &part, count);
+                commands.copy(&round.photons().map, &part, count);
                 kept.parts.push(part);
             }
             Some(Err(error)) if !matches!(error, Error::OutOfMemory { .. }) => return Err(error),

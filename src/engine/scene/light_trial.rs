@@ -8,7 +8,7 @@ use super::points::in_pieces;
 use crate::constants::{DOMAIN_LIGHTS, SEEN, SEEN_BY_GATHER};
 use crate::error::Result;
 use crate::gpu::kernels::TryLights;
-use crate::gpu::{Commands, Extent, Gpu, Kernel, Memory, Module};
+use crate::gpu::{Commands, Extent, Kernel, Memory, Module};
 use crate::plan::light_choice::LightChoice;
 use crate::plan::scene::ScenePlan;
 use crate::records::{Draws, Receiver, TrialRay, TryLightsPush, VisiblePoint};
@@ -49,30 +49,22 @@ fn places(rays: &[TrialRay]) -> impl Iterator<Item = Receiver> {
 
 /// Learns how shadow rays choose lights at these points and round about, and photons at what rays from there met too: a lamp that
 /// lights no point lights what lights it.
-pub fn learn(
-    gpu: &Gpu,
-    commands: &mut Commands,
-    round: Round,
-    tree: LightTree,
-    asked: &[Receiver],
-    rays: &[TrialRay],
-) -> Result<LightChoice> {
-    let (of_asked, ray_count) = what_clusters_add(gpu, commands, round, &tree, asked)?;
+pub fn learn(commands: &mut Commands, round: Round, tree: LightTree, asked: &[Receiver], rays: &[TrialRay]) -> Result<LightChoice> {
+    let (of_asked, ray_count) = what_clusters_add(commands, round, &tree, asked)?;
     let places: Vec<Receiver> = places(rays).collect();
-    let (of_places, _) = what_clusters_add(gpu, commands, round, &tree, &places)?;
+    let (of_places, _) = what_clusters_add(commands, round, &tree, &places)?;
     Ok(LightChoice::learned(round.geometry, tree, (asked, &of_asked), (&places, &of_places), ray_count))
 }
 
 /// Of each point and cluster, by so many shadow rays.
-fn what_clusters_add(gpu: &Gpu, commands: &mut Commands, round: Round, tree: &LightTree, points: &[Receiver]) -> Result<(Vec<f32>, u32)> {
+fn what_clusters_add(commands: &mut Commands, round: Round, tree: &LightTree, points: &[Receiver]) -> Result<(Vec<f32>, u32)> {
     if points.is_empty() {
         return Ok((Vec::new(), 1));
     }
     let pair_count = (points.len() * tree.cluster_count) as u32;
     let ray_count = (RAYS / pair_count).clamp(RAYS_OF_PAIR.0, RAYS_OF_PAIR.1);
-    let receivers = gpu.buffer::<Receiver>("points of the trial", points.len() as u64, Memory::Device)?;
-    let found = gpu.buffer::<f32>("what lights add", u64::from(pair_count), Memory::Device)?;
-    commands.upload(&receivers, points)?;
+    let receivers = commands.uploaded("points of the trial", points)?;
+    let found = commands.gpu().buffer::<f32>("what lights add", u64::from(pair_count), Memory::Device)?;
     let draws = Draws { seed: words(round.plan.settings.seed), round: 0, domain: DOMAIN_LIGHTS };
     let (most, work) = (round.plan.items_at_once(ray_count), 64 * u64::from(ray_count));
     in_pieces(commands, round.plan, pair_count, most, work, |commands, first_pair, end_pair| {

@@ -5,25 +5,21 @@ use std::time::Instant;
 
 use glam::DVec3;
 
-use super::film::SceneFilm;
 use super::film_buffers::FilmBuffers;
 use super::kept_maps::KeptMaps;
 use super::on_gpu::{SceneOnGpu, constants, modules, task};
 use super::resources::SceneResources;
 use crate::constants::{SHOW_ALL, SHOW_ERROR};
 use crate::engine::Control;
-use crate::engine::error::bound::FilmError;
-use crate::engine::run::{self, Run, World};
+use crate::engine::run::{self, Run};
 use crate::error::Result;
 use crate::gpu::kernels::{Display, ShowPhotons, ShowScene};
-use crate::gpu::{Buffer, Commands, Extent, Gpu, Kernel};
-use crate::ledger::Ledger;
+use crate::gpu::{Buffer, Extent, Gpu, Kernel};
 use crate::plan::scene::ScenePlan;
 use crate::plan::sensor::Sensor;
 use crate::records::{ShowPhotonsPush, ShowScenePush};
 use crate::scene::geometry::Geometry;
 use crate::scene::{Camera, Projection};
-use crate::timings::Timings;
 
 /// Of the device's memory, for photons that need not be traced again when the camera moves.
 const SHARE_FOR_KEPT_MAPS: u64 = 4;
@@ -32,10 +28,9 @@ const SHARE_FOR_KEPT_MAPS: u64 = 4;
 const DOT: u32 = 2;
 
 pub struct LiveScene<'a> {
-    run: Run<'a, SceneOnGpu<'a>>,
+    pub run: Run<'a, SceneOnGpu<'a>>,
     geometry: &'a Geometry,
     plan: &'a ScenePlan,
-    device: (&'a Gpu, usize),
     cancelled: &'a AtomicBool,
     camera: Camera,
 }
@@ -58,24 +53,19 @@ impl<'a> LiveScene<'a> {
     ) -> Result<LiveScene<'a>> {
         let shown = [ShowScene::MODULE, Display::MODULE, ShowPhotons::MODULE];
         let modules = [modules(plan, gpu.facts()), shown.into()].concat();
-        let (mut commands, pipelines_before) = run::commands(gpu, &modules, constants(plan), plan.settings.math, Instant::now())?;
-        let resources = commands.scope("set-up", |commands| SceneResources::new(gpu, commands, geometry, plan, &[]))?;
+        let mut commands = run::commands(gpu, &modules, constants(plan), plan.settings.math, Instant::now())?;
+        let resources = commands.scope("set-up", |commands| SceneResources::new(commands, geometry, plan, &[]))?;
         commands.submit()?;
         let most_bytes = gpu.facts().usable_memory_bytes.saturating_sub(plan.bytes) / SHARE_FOR_KEPT_MAPS;
         let mut world = SceneOnGpu::new(geometry, Some(camera.clone()), plan, resources, cancelled);
-        world.kept = Some(KeptMaps::new(gpu, most_bytes));
-        let device = (gpu, pipelines_before);
-        let run = Run::new(world, commands, task(plan, device), &mut Control::quiet(cancelled))?;
-        Ok(LiveScene { run, geometry, plan, device, cancelled, camera: camera.clone() })
+        world.kept = Some(KeptMaps::new(most_bytes));
+        let run = Run::new(world, commands, task(geometry, plan), &mut Control::quiet(cancelled))?;
+        Ok(LiveScene { run, geometry, plan, cancelled, camera: camera.clone() })
     }
 
     /// One more round, unless all have been.
     pub fn round(&mut self) -> Result<()> {
-        if !self.run.has_ended() {
-            self.run.round(&mut Control::quiet(self.cancelled))?;
-            self.run.collect()?;
-        }
-        Ok(())
+        self.run.round_to_look_at(self.cancelled)
     }
 
     /// Begins anew from another camera. Photons that are kept need not be traced again.
@@ -83,15 +73,7 @@ impl<'a> LiveScene<'a> {
         let Run { world, recorder, .. } = &mut self.run;
         world.look_from(recorder, camera.clone());
         self.camera = camera.clone();
-        self.run.begin_anew(task(self.plan, self.device), &mut Control::quiet(self.cancelled))
-    }
-
-    pub fn has_ended(&self) -> bool {
-        self.run.has_ended()
-    }
-
-    pub fn rounds(&self) -> u32 {
-        self.run.state.rounds()
+        self.run.begin_anew(task(self.geometry, self.plan), &mut Control::quiet(self.cancelled))
     }
 
     /// Rounds whose photons are kept, and the bytes of these.
@@ -99,32 +81,10 @@ impl<'a> LiveScene<'a> {
         self.run.world.kept.as_ref().map_or((0, 0), |kept| (kept.rounds(), kept.bytes()))
     }
 
-    /// Of the photons of all rounds, those under way among them.
-    pub fn ledger(&self) -> Ledger {
-        self.run.state.ledger()
-    }
-
-    /// Times since the last call.
-    pub fn take_timings(&mut self) -> Timings {
-        std::mem::take(self.run.recorder.timings())
-    }
-
-    /// The film as far as blocks are whole, and its error as users are told of it.
-    pub fn look(&mut self) -> Result<(SceneFilm, FilmError)> {
-        let film = self.run.film()?;
-        let error = self.run.world.error(&film).stated();
-        Ok((film, error))
-    }
-
-    pub fn commands(&mut self) -> &mut Commands<'a> {
-        &mut self.run.recorder
-    }
-
     /// Records what is shown of the film: light or its error, of which `mean` is the mean of the picture.
     pub fn show(&mut self, shows: u32, mean: f64, shown: &Buffer<glam::Vec4>) -> Result<()> {
         let Run { world, recorder, state } = &mut self.run;
-        let FilmBuffers { all, part_sums, part_totals, .. } = &world.resources.film;
-        let (film_sums, film_squares, sums_of_block) = (&all.sums, &all.squares, &all.under_way);
+        let FilmBuffers { sums_of_block, film_sums, film_squares, part_sums, part_totals, .. } = &world.resources.film;
         let shows = if shows == SHOW_ERROR || self.plan.keeps_parts() { shows } else { SHOW_ALL };
         let push = ShowScenePush {
             pixel_count: self.plan.sensor.pixels(),

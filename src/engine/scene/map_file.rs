@@ -16,6 +16,7 @@ use sha2::{Digest, Sha256};
 
 use super::identity::scene_hash;
 use crate::constants::{ARRIVED_CAUSTIC, ARRIVED_DIRECT, ARRIVED_INDIRECT, TALLY_ROWS};
+use crate::engine::run::saved::read_header;
 use crate::error::{Error, Result};
 use crate::gpu::MappedFile;
 use crate::ledger::{Fates, Ledger};
@@ -310,7 +311,10 @@ impl MapFile {
             return Err(cut_off());
         }
         let hash = hash.iter().map(|byte| format!("{byte:02x}")).collect();
-        let header = read_header(header)?;
+        let header: Header = read_header(header, FORMAT)?;
+        // They are printed.
+        let [program, device, scene] = [&header.program, &header.device, &header.scene].map(|text| one_line(text));
+        let header = Header { program, device, scene, ..header };
         if let Some(fault) = header.fault(start as u64) {
             return Err(format!("contradicts itself: {fault}"));
         }
@@ -391,20 +395,4 @@ impl MapFile {
         }
         Ok(())
     }
-}
-
-/// Before anything else of the header is read, its format, as it may look otherwise in another one.
-fn read_header(bytes: &[u8]) -> std::result::Result<Header, String> {
-    let header: serde_json::Value = serde_json::from_slice(bytes).map_err(|_| "has no header".to_owned())?;
-    if header["format"].as_u64() != Some(FORMAT.into()) {
-        let (format, program) = (&header["format"], header["program"].as_str().unwrap_or("unknown"));
-        let own = env!("CARGO_PKG_VERSION");
-        let program = one_line(program);
-        return Err(format!("is of format {format} (photonmill {program}), and this is photonmill {own}, which reads format {FORMAT}"));
-    }
-    let header: Header = serde_json::from_value(header)
-        .map_err(|error| format!("has a header that is not understood ({})", one_line(&error.to_string())))?;
-    // They are printed.
-    let [program, device, scene] = [&header.program, &header.device, &header.scene].map(|text| one_line(text));
-    Ok(Header { program, device, scene, ..header })
 }

@@ -5,8 +5,7 @@ use std::time::{Duration, Instant};
 
 use super::kept_maps::KeptMaps;
 use super::map_file::MapFile;
-use super::resources::PhotonBuffers;
-use super::{Round, estimate, index, radius_class, trace};
+use super::{Round, SceneFilm, estimate, index, radius_class, trace};
 use crate::engine::run::RunState;
 use crate::error::Result;
 use crate::gpu::Commands;
@@ -34,7 +33,6 @@ pub(super) struct StoredPhotons<'a> {
 
 /// A map, and the grids that its points need.
 pub(super) struct MapInRound<'a> {
-    pub(super) photons: &'a PhotonBuffers,
     pub(super) map: &'a MapPlan,
     pub(super) grids: &'a [Range<u32>],
 }
@@ -45,12 +43,9 @@ pub(super) fn one_stored_map(
     round: Round,
     in_round: &MapInRound,
     stored: &mut StoredPhotons,
-    state: &mut RunState,
+    state: &mut RunState<SceneFilm>,
 ) -> Result<u32> {
-    let MapInRound { photons, map, .. } = in_round;
-    if round.plan.cuts_discs() {
-        commands.scope("cuts", |commands| estimate::cut_discs(commands, round, map))?;
-    }
+    let (map, photons) = (in_round.map, round.photons());
     let which = usize::from(map.caustic_only);
     state.hand_out(which, map.photons);
     stored.open[which].add(&Fates { emitted: 0, ..stored.file.fates(round.number, map.name).clone() });
@@ -73,12 +68,9 @@ pub(super) fn one_map(
     deadline: Option<Instant>,
     timed_chunk: &mut u32,
     mut kept: Option<&mut KeptMaps>,
-    state: &mut RunState,
+    state: &mut RunState<SceneFilm>,
 ) -> Result<u32> {
     let map = in_round.map;
-    if round.plan.cuts_discs() {
-        commands.scope("cuts", |commands| estimate::cut_discs(commands, round, map))?;
-    }
     let mut traced = 0;
     while traced < map.photons {
         let began = Instant::now();
@@ -88,8 +80,8 @@ pub(super) fn one_map(
         let most = if deadline.is_some() { *timed_chunk } else { map.chunk_photons };
         let count = most.min(map.chunk_photons).min(map.photons - traced);
         state.hand_out(usize::from(map.caustic_only), count);
-        trace::trace(commands, round, in_round.photons, map, (traced, count), &mut |commands, stored| {
-            kept.as_mut().map_or(Ok(()), |kept| kept.keep(commands, in_round.photons, map))?;
+        trace::trace(commands, round, map, (traced, count), &mut |commands, stored| {
+            kept.as_mut().map_or(Ok(()), |kept| kept.keep(commands, round, map))?;
             gather_in_grids(commands, round, in_round, stored)
         })?;
         traced += count;
@@ -108,12 +100,9 @@ pub(super) fn one_kept_map(
     round: Round,
     in_round: &MapInRound,
     kept: &KeptMaps,
-    state: &mut RunState,
+    state: &mut RunState<SceneFilm>,
 ) -> Result<u32> {
-    let MapInRound { photons, map, .. } = in_round;
-    if round.plan.cuts_discs() {
-        commands.scope("cuts", |commands| estimate::cut_discs(commands, round, map))?;
-    }
+    let (map, photons) = (in_round.map, round.photons());
     state.hand_out(usize::from(map.caustic_only), map.photons);
     for part in kept.parts(map) {
         commands.copy(part, &photons.map, part.count());
@@ -126,18 +115,18 @@ pub(super) fn one_kept_map(
 /// Adds the photons that are in the map, whose number may be known, to the estimates of all points. Points of radii that differ much look photons up in grids of
 /// their own.
 fn gather_in_grids(commands: &mut Commands, round: Round, map: &MapInRound, stored: Option<u32>) -> Result<()> {
-    let MapInRound { photons, map, grids } = *map;
+    let MapInRound { map, grids } = *map;
     for (grid, classes) in grids.iter().enumerate() {
         if commands.timestamps_left() < TIMESTAMPS_PER_GRID || commands.is_full(round.plan.work_per_submission) {
             commands.submit()?;
         }
         let radius = radius_class::radius_of_class(round.plan.widest_radius(map, round.number), classes.start);
         let cells = CellPush { counts_stored: u32::from(grid == 0), ..index::cells(round, map, radius) };
-        commands.scope("index", |commands| index::build(commands, round, photons, map, &cells, stored))?;
+        commands.scope("index", |commands| index::build(commands, round, map, &cells, stored))?;
         commands.scope("gather", |commands| {
             let stored = stored.map_or(0, u64::from);
             commands.count(Handled { stored, bytes: map.bytes_of_reading(stored), ..Handled::default() });
-            estimate::gather(commands, round, photons, map, classes.clone(), cells)
+            estimate::gather(commands, round, map, classes.clone(), cells)
         })?;
     }
     Ok(())

@@ -44,7 +44,7 @@ use glam::DVec3;
 
 pub use film::SceneFilm;
 pub use identity::scene_hash;
-pub use on_gpu::{constants, light, light_from, modules};
+pub use on_gpu::{constants, light, light_from, modules, task};
 pub use on_several::light_on;
 
 use crate::engine::error::bound::FilmError;
@@ -58,7 +58,7 @@ use crate::scene::geometry::Geometry;
 use crate::scene::sensors::with_sensors;
 use crate::scene::{Camera, Scene};
 use crate::settings::scene::SceneSettings;
-use resources::SceneResources;
+use resources::{PhotonBuffers, SceneResources};
 
 /// What a run leaves behind: the fates are those of the global map's photons and of the caustic map's.
 pub type RunResult = run::RunResult<ScenePlan, SceneFilm>;
@@ -87,6 +87,13 @@ pub struct Round<'a> {
     pub geometry: &'a Geometry,
     pub plan: &'a ScenePlan,
     pub number: u32,
+}
+
+impl<'a> Round<'a> {
+    /// Of a plan that has maps.
+    pub fn photons(self) -> &'a PhotonBuffers {
+        self.resources.photons.as_ref().expect("maps have photons")
+    }
 }
 
 /// What light is asked of.

@@ -13,16 +13,15 @@ use super::map_in_round::{FIRST_TIMED_CHUNK, MapInRound, StoredPhotons, one_kept
 use super::resources::SceneResources;
 use super::{Round, RunResult, View, estimate, index, points, radius_class, trace};
 use crate::constants::{PART_COUNT, TALLY_COPIES};
-use crate::engine::error::bound::FilmError;
 use crate::engine::nonfinite_values::NonfiniteValues;
-use crate::engine::run::saved::{SavedFilm, SavedRun};
+use crate::engine::run::saved::{SavedFilm, SavedRun, WorldFilm};
 use crate::engine::run::watch::Later;
 use crate::engine::run::{self, RunState, Task, World};
 use crate::engine::{Control, tallies, totals};
 use crate::error::Result;
 use crate::gpu::kernels::*;
 use crate::gpu::{Commands, Constants, DeviceFacts, Gpu, Interrupt, Kernel, Module};
-use crate::ledger::{Fates, Losses};
+use crate::ledger::Fates;
 use crate::plan::buffers::PART_VALUES;
 use crate::plan::film::{BiasPlan, FilmPlan};
 use crate::plan::latest_blocks::kept_count;
@@ -71,7 +70,7 @@ pub fn constants(plan: &ScenePlan) -> Constants {
 /// Timestamps that a round may need.
 const TIMESTAMPS_PER_ROUND: u32 = 64;
 
-pub(super) struct SceneOnGpu<'a> {
+pub struct SceneOnGpu<'a> {
     geometry: &'a Geometry,
     /// Of a picture.
     camera: Option<Camera>,
@@ -83,7 +82,7 @@ pub(super) struct SceneOnGpu<'a> {
     /// Photons that are not traced but read; `None` where they are traced.
     stored: Option<StoredPhotons<'a>>,
     /// Maps of this run that are kept to be looked at again; `None` where nobody does.
-    pub(super) kept: Option<KeptMaps<'a>>,
+    pub(super) kept: Option<KeptMaps>,
     /// Photons that a chunk of the global and of the caustic map may have where time may be up.
     timed_chunks: [u32; 2],
     /// A round was cut short, of which parts of light may have come to that of the block under way.
@@ -100,17 +99,17 @@ pub fn light(gpu: &Gpu, view: &View, plan: ScenePlan, control: &mut Control) -> 
 pub fn light_from(gpu: &Gpu, view: &View, plan: ScenePlan, map: Option<&MapFile>, control: &mut Control) -> Result<RunResult> {
     let started = Instant::now();
     let modules = if map.is_some() { of_film(&plan, gpu.facts()) } else { modules(&plan, gpu.facts()) };
-    let (mut commands, pipelines_before) = run::commands(gpu, &modules, constants(&plan), plan.settings.math, started)?;
+    let mut commands = run::commands(gpu, &modules, constants(&plan), plan.settings.math, started)?;
     let trial = plan.trial.as_ref().map(|trial| ("trial", Duration::from_secs_f64(trial.seconds)));
     for (name, duration) in [("plan", plan.planned_in)].into_iter().chain(trial) {
         commands.timings().count(name);
         commands.timings().add(Span::of_host(name, Duration::ZERO, duration));
     }
-    let resources = commands.scope("set-up", |commands| SceneResources::new(gpu, commands, view.geometry, &plan, view.phases))?;
+    let resources = commands.scope("set-up", |commands| SceneResources::new(commands, view.geometry, &plan, view.phases))?;
     commands.warm_up()?;
     commands.submit()?;
     let identity = control.keep.identity(|name| identity(name, view, &plan, map.map(|map| map.hash.as_str()), gpu.facts()))?;
-    let task = Task { identity, ..task(&plan, (gpu, pipelines_before)) };
+    let task = Task { identity, ..task(view.geometry, &plan) };
     control.keep.check_resumed(|saved| can_go_on(saved, &plan, &task))?;
     let none = || [Fates::of_scene(plan.settings.bounces), Fates::of_scene(plan.settings.bounces)];
     let stored = map.map(|file| StoredPhotons { file, open: none(), open_of_blocks: none() });
@@ -119,14 +118,13 @@ pub fn light_from(gpu: &Gpu, view: &View, plan: ScenePlan, map: Option<&MapFile>
         world.find_radii(&mut commands)?;
     }
     if let Some((_, saved)) = &control.keep.resume {
-        let SavedFilm::Scene(film) = &saved.film else { unreachable!("identities of two worlds differ") };
-        world.resources.film.restore(&mut commands, film)?;
+        world.resources.film.restore(&mut commands, SceneFilm::of(&saved.film))?;
     }
     run::run(world, commands, &plan, task, control)
 }
 
 /// Whether the buffers of a plan take what was saved.
-fn can_go_on(saved: &SavedRun, plan: &ScenePlan, task: &Task) -> bool {
+fn can_go_on(saved: &SavedRun, plan: &ScenePlan, task: &Task<SceneFilm>) -> bool {
     let SavedFilm::Scene(film) = &saved.film else { return false };
     let read_alike = |film: &FilmPlan| (film.bias, film.sees_light, film.rounds_per_block);
     let pixels = plan.sensor.pixels() as usize;
@@ -136,11 +134,10 @@ fn can_go_on(saved: &SavedRun, plan: &ScenePlan, task: &Task) -> bool {
         && film.part_totals.len() == PART_COUNT as usize
 }
 
-/// What a run of a plan is to do, on a device with its pipelines before the run.
-pub(super) fn task<'a>(plan: &ScenePlan, device: (&'a Gpu, usize)) -> Task<'a> {
+/// What a run of a plan is to do.
+pub fn task<'a>(geometry: &'a Geometry, plan: &'a ScenePlan) -> Task<'a, SceneFilm> {
     let photons_per_round = plan.traced_maps().map(|map| u64::from(map.photons)).sum();
     Task {
-        device: Some(device),
         identity: None,
         sensor: Some(plan.sensor),
         stop: plan.settings.stop,
@@ -154,6 +151,9 @@ pub(super) fn task<'a>(plan: &ScenePlan, device: (&'a Gpu, usize)) -> Task<'a> {
         counts_photons: false,
         // Of the global map and of the caustic map.
         fates: vec![Fates::of_scene(plan.settings.bounces); 2],
+        can_go_on: true,
+        error: Box::new(|film| film.error(plan.film.confidence)),
+        losses: Box::new(|film, fates| losses(geometry, plan, fates, film)),
     }
 }
 
@@ -162,7 +162,7 @@ impl<'a> World for SceneOnGpu<'a> {
     type Film = SceneFilm;
 
     /// There must be a first round: when the time is up in it, it ends with the photons that it has by then.
-    fn trace(&mut self, commands: &mut Commands<'a>, state: &mut RunState, _: u32) -> Result<()> {
+    fn trace(&mut self, commands: &mut Commands<'a>, state: &mut RunState<SceneFilm>, _: u32) -> Result<()> {
         let deadline = state.deadline();
         let is_first = state.rounds() == 0;
         commands.set_interrupt(Some(Interrupt { cancelled: self.cancelled, deadline: deadline.filter(|_| !is_first) }));
@@ -176,7 +176,7 @@ impl<'a> World for SceneOnGpu<'a> {
         commands.timestamps_left() < TIMESTAMPS_PER_ROUND || commands.is_full(self.plan.work_per_submission / 2)
     }
 
-    fn end_block(&mut self, commands: &mut Commands<'a>, _: &RunState) -> Result<()> {
+    fn end_block(&mut self, commands: &mut Commands<'a>, _: &RunState<SceneFilm>) -> Result<()> {
         if let Some(StoredPhotons { open, open_of_blocks, .. }) = &mut self.stored {
             open_of_blocks.clone_from(open);
         }
@@ -190,7 +190,7 @@ impl<'a> World for SceneOnGpu<'a> {
         Ok(())
     }
 
-    fn collect(&mut self, commands: &mut Commands<'a>, state: &mut RunState) -> Result<()> {
+    fn collect(&mut self, commands: &mut Commands<'a>, state: &mut RunState<SceneFilm>) -> Result<()> {
         let Some(photons) = &self.resources.photons else { return commands.submit() };
         if let Some(StoredPhotons { open, open_of_blocks, .. }) = &mut self.stored {
             commands.submit()?;
@@ -208,8 +208,8 @@ impl<'a> World for SceneOnGpu<'a> {
             for (tallies, totals) in [(tallies, totals), (&photons.tallies_of_blocks[which], &photons.totals_of_blocks[which])] {
                 read_backs.push((commands.copy_out(tallies, copies)?, commands.copy_out(totals, totals::WORDS as usize)?));
             }
-            tallies::clear(commands, tallies);
-            totals::clear(commands, totals);
+            commands.clear(tallies);
+            commands.clear(totals);
         }
         commands.submit()?;
         let mut counted = read_backs
@@ -227,16 +227,8 @@ impl<'a> World for SceneOnGpu<'a> {
         Ok(())
     }
 
-    fn film(&mut self, commands: &mut Commands<'a>, state: &RunState) -> Result<Later<SceneFilm>> {
+    fn film(&mut self, commands: &mut Commands<'a>, state: &RunState<SceneFilm>) -> Result<Later<SceneFilm>> {
         self.resources.film.read(commands, self.plan, state, self.is_cut)
-    }
-
-    fn error(&self, film: &SceneFilm) -> FilmError {
-        film.error(self.plan.film.confidence)
-    }
-
-    fn losses(&self, film: &SceneFilm, fates: &[Fates]) -> Losses {
-        losses(self.geometry, self.plan, fates, film)
     }
 
     fn nonfinite_values(&mut self, commands: &mut Commands<'a>) -> Result<Option<NonfiniteValues>> {
@@ -268,11 +260,13 @@ impl<'a> SceneOnGpu<'a> {
     /// Finds the radii of visible points, which those of round 0 decide, where that round is not the first to be done.
     fn find_radii(&mut self, commands: &mut Commands) -> Result<()> {
         let SceneOnGpu { geometry, camera, plan, resources, grids, .. } = self;
-        let Some(photons) = &resources.photons else { return Ok(()) };
+        if resources.photons.is_none() {
+            return Ok(());
+        }
         let round = Round { resources, geometry, plan, number: 0 };
         *grids = Some(commands.scope("radii", |commands| {
             points::see(commands, round, camera.as_ref())?;
-            radius_class::find(commands, round, photons, camera.as_ref())
+            radius_class::find(commands, round, camera.as_ref())
         })?);
         // Nothing of what was seen counts.
         resources.film.forget_seen(commands);
@@ -280,7 +274,7 @@ impl<'a> SceneOnGpu<'a> {
     }
 
     /// One round. When its time is up, it takes no further chunk of photons.
-    fn one_round(&mut self, commands: &mut Commands, deadline: Option<Instant>, state: &mut RunState) -> Result<()> {
+    fn one_round(&mut self, commands: &mut Commands, deadline: Option<Instant>, state: &mut RunState<SceneFilm>) -> Result<()> {
         let SceneOnGpu { geometry, camera, plan, resources, grids, stored, kept, timed_chunks, .. } = self;
         let camera = camera.as_ref();
         let round = Round { resources, geometry, plan, number: state.round() };
@@ -289,24 +283,29 @@ impl<'a> SceneOnGpu<'a> {
             let sums = 3 * u64::from(plan.visible_points()) * u64::from(plan.arrival_sets);
             commands.fill(&resources.estimates, 0, sums, 0);
         }
-        if let Some(photons) = resources.photons.as_ref().filter(|_| plan.traced_maps().next().is_some()) {
+        if plan.traced_maps().next().is_some() {
             if plan.film.bias == BiasPlan::Blocks {
                 commands.fill(&resources.near_sums, 0, plan.near_sums(), 0);
             }
             let grids = match grids {
                 Some(grids) => grids,
-                None => grids.insert(commands.scope("radii", |commands| radius_class::find(commands, round, photons, camera))?),
+                None => grids.insert(commands.scope("radii", |commands| radius_class::find(commands, round, camera))?),
             };
             let mut traced = [0; 2];
             for map in plan.traced_maps() {
-                let in_round = MapInRound { photons, map, grids: &grids[usize::from(map.caustic_only)] };
+                let in_round = MapInRound { map, grids: &grids[usize::from(map.caustic_only)] };
                 let is_kept = kept.as_mut().is_some_and(|kept| kept.begin(round.number, map));
-                let of_map = commands.scope(map.name, |commands| match (&mut *stored, &mut *kept) {
-                    (Some(stored), _) => one_stored_map(commands, round, &in_round, stored, state),
-                    (_, Some(kept)) if is_kept => one_kept_map(commands, round, &in_round, kept, state),
-                    (_, kept) => {
-                        let timed_chunk = &mut timed_chunks[usize::from(map.caustic_only)];
-                        one_map(commands, round, &in_round, deadline, timed_chunk, kept.as_mut(), state)
+                let of_map = commands.scope(map.name, |commands| {
+                    if plan.cuts_discs() {
+                        commands.scope("cuts", |commands| estimate::cut_discs(commands, round, map))?;
+                    }
+                    match (&mut *stored, &mut *kept) {
+                        (Some(stored), _) => one_stored_map(commands, round, &in_round, stored, state),
+                        (_, Some(kept)) if is_kept => one_kept_map(commands, round, &in_round, kept, state),
+                        (_, kept) => {
+                            let timed_chunk = &mut timed_chunks[usize::from(map.caustic_only)];
+                            one_map(commands, round, &in_round, deadline, timed_chunk, kept.as_mut(), state)
+                        }
                     }
                 })?;
                 traced[usize::from(map.caustic_only)] = of_map;

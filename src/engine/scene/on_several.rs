@@ -1,15 +1,12 @@
 //! A run of a scene on all devices that there are, whatever becomes of them.
 
-use super::losses::losses;
 use super::map_file::MapFile;
-use super::{RunResult, SceneFilm, View, light_from, trial};
+use super::on_gpu::task;
+use super::{RunResult, View, light_from, trial};
 use crate::engine::run::retry::{Failed, run_on};
-use crate::engine::run::saved::SavedFilm;
-use crate::engine::run::several_devices::Work;
 use crate::engine::{self, Control};
 use crate::error::Result;
 use crate::gpu::Gpu;
-use crate::ledger::Fates;
 use crate::plan::scene::ScenePlan;
 use crate::scene::Scene;
 use crate::settings::stop::Stop;
@@ -40,24 +37,7 @@ pub fn light_on(
         plan.settings.stop = stop;
         light_from(gpu, view, plan, map, control)
     };
-    let photons_per_round = plan.maps().map(|map| u64::from(map.photons)).sum();
-    let work = Work {
-        run: &run,
-        film: |film| match film {
-            SavedFilm::Scene(film) => film,
-            SavedFilm::Room(_) => unreachable!("a scene was lit"),
-        },
-        error: &|film: &SceneFilm| film.error(plan.film.confidence),
-        losses: &|film: &SceneFilm, fates: &[Fates]| losses(geometry, plan, fates, film),
-        can_go_on: true,
-        stop: plan.settings.stop,
-        alpha: plan.settings.alpha,
-        rounds: plan.settings.rounds,
-        rounds_per_block: plan.film.rounds_per_block,
-        bounces: plan.settings.bounces,
-        photons_per_round,
-    };
-    let mut lit = run_on(gpus, &work, failed, control)?;
+    let mut lit = run_on(gpus, &task(geometry, plan), &run, failed, control)?;
     // With its goals, which no device had.
     lit.plan.settings.stop = plan.settings.stop;
     Ok(lit)

@@ -317,7 +317,7 @@ fn picture_rounds(run: &ScenePlan, first: Division, rounds: &Rounds, pilot_photo
     let a_path = paths + f64::from(first.shadow_rays) * shadow_rays;
     let of_pixels = round + f64::from(SAMPLES) * a_path;
     let of_maps = |map: &MapPlan| {
-        let share = (PIXELS_OF_MAP / f64::from(run.sensor.pixels())).min(1.0);
+        let share = (f64::from(PIXELS_OF_MAP) / f64::from(run.sensor.pixels())).min(1.0);
         let photons = f64::from(pilot_photons) * photons[usize::from(map.caustic_only)];
         2.0 * (round + photons) + f64::from(FEW_SAMPLES + MANY_SAMPLES) * share * a_path
     };

@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicBool;
 use glam::DVec3;
 
 use super::film::GLOBAL_PHOTON;
+use super::trial::few_points;
 use super::{RunResult, SceneFilm, View, light};
 use crate::constants::PART_COUNT;
 use crate::engine::error::bias_batches;
@@ -28,7 +29,7 @@ pub const SAMPLES: u32 = SAMPLES_PER_BLOCK;
 const SEED: u64 = 0x0070_696c_6f74;
 /// Pixels that tell enough of a map, whose light varies little from one to the next; and paths through each, to tell what varies from path
 /// to path from what varies with the photons.
-pub const PIXELS_OF_MAP: f64 = 4096.0;
+pub const PIXELS_OF_MAP: u32 = 4096;
 pub const FEW_SAMPLES: u32 = 1;
 pub const MANY_SAMPLES: u32 = 8;
 
@@ -98,19 +99,9 @@ impl PilotRounds<'_> {
         let PilotRounds { view, run, .. } = *self;
         let seed = bias_batches::seed(SEED, 0);
         let settings = SceneSettings { samples: SAMPLES, shadow_rays, rounds: self.size.rounds, seed, ..self.settings() };
-        let (sensor, phases, footprint) = match run.sensor {
-            Sensor::Picture { width, height } => {
-                let (sensor, footprint) = fewer(width, height, f64::from(self.size.pixels));
-                (sensor, Vec::new(), footprint)
-            }
-            Sensor::Receivers { .. } => {
-                let all = &view.phases[0];
-                let some: Vec<_> = all.iter().step_by(all.len().div_ceil(self.size.pixels as usize)).copied().collect();
-                (Sensor::Receivers { count: some.len() as u32 }, vec![some], 1.0)
-            }
-        };
+        let (sensor, phases) = few_points(view, run.sensor, self.size.pixels);
         let view = View { phases: &phases, ..*view };
-        let plan = ScenePlan { footprint, ..self.plan(&view, &settings, sensor)? };
+        let plan = self.plan(&view, &settings, sensor)?;
         let samples = plan.samples();
         let paths = f64::from(plan.paths()) * f64::from(self.size.rounds);
         let lit = self.light(&view, plan)?;
@@ -150,11 +141,8 @@ impl PilotRounds<'_> {
         let PilotRounds { view, run, .. } = *self;
         let look = |light_of: LightOf, samples: u32| {
             let settings = SceneSettings { samples, shadow_rays, rounds, seed: bias_batches::seed(SEED, 1), ..self.settings() };
-            let (sensor, footprint) = match (light_of, run.sensor) {
-                (LightOf::GlobalMap | LightOf::CausticMap, Sensor::Picture { width, height }) => fewer(width, height, PIXELS_OF_MAP),
-                _ => (run.sensor, 1.0),
-            };
-            let plan = ScenePlan { light_of, footprint, ..self.plan(view, &settings, sensor)? };
+            let sensor = if light_of == LightOf::Paths { run.sensor } else { few_points(view, run.sensor, PIXELS_OF_MAP).0 };
+            let plan = ScenePlan { light_of, ..self.plan(view, &settings, sensor)? };
             Ok(self.light(view, plan)?.film)
         };
         let mean = |film: &SceneFilm| film.surface_means().map(DVec3::element_sum).sum::<f64>() / film.pixels() as f64;
@@ -230,7 +218,7 @@ impl PilotRounds<'_> {
         }
     }
 
-    /// With what the run's own trial has found.
+    /// With what the run's own trial has found. Pixels keep their size, however far apart they are.
     fn plan(&self, view: &View, settings: &SceneSettings, sensor: Sensor) -> Result<ScenePlan> {
         let of_run = &self.run.settings;
         let apart = |neighbours: u32, photons: u32, caustic_only: bool| over_usual(neighbours, caustic_only) / f64::from(photons);
@@ -240,7 +228,9 @@ impl PilotRounds<'_> {
                 / apart(of_run.caustic_neighbours, of_run.caustic_photons, true),
         ];
         let trial = self.run.trial.as_ref().map(|trial| trial.scaled(times.map(f64::sqrt)));
-        ScenePlan::with_trial(self.scene, view.geometry, settings, sensor, &engine::limits(self.gpu.facts()), trial)
+        let plan = ScenePlan::with_trial(self.scene, view.geometry, settings, sensor, &engine::limits(self.gpu.facts()), trial)?;
+        let columns = |sensor: Sensor| f64::from(sensor.size().0.max(1));
+        Ok(ScenePlan { footprint: columns(sensor) / columns(self.run.sensor), ..plan })
     }
 
     fn light(&self, view: &View, plan: ScenePlan) -> Result<RunResult> {
@@ -254,11 +244,4 @@ impl PilotRounds<'_> {
 fn flights(fates: &Fates) -> f64 {
     let count: u64 = fates.bounces.iter().map(|bounce| bounce.stored + bounce.absorbed + bounce.escaped + bounce.dropped).sum();
     count as f64 / fates.emitted.max(1) as f64
-}
-
-/// About so many pixels at most, spread over a picture, and the side of each over that between two.
-fn fewer(width: u32, height: u32, pixels: f64) -> (Sensor, f64) {
-    let smaller = (pixels / (f64::from(width) * f64::from(height))).sqrt().min(1.0);
-    let length = |length: u32| ((f64::from(length) * smaller) as u32).max(1);
-    (Sensor::Picture { width: length(width), height: length(height) }, f64::from(length(width)) / f64::from(width))
 }

@@ -44,7 +44,7 @@ pub fn radius_of_class(widest: f64, class: u32) -> f32 {
 
 /// Finds the radii of the visible points of a round. Says of each map, the global and the caustic one, which grids its points need,
 /// each by the classes that it serves.
-pub fn find(commands: &mut Commands, round: Round, photons: &PhotonBuffers, camera: Option<&Camera>) -> Result<[Vec<Range<u32>>; 2]> {
+pub fn find(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Result<[Vec<Range<u32>>; 2]> {
     let Round { resources, plan, .. } = round;
     let SceneResources { scene, visible_points, radius_classes, clearances, film, .. } = resources;
     let class_counts = &film.class_counts;
@@ -57,7 +57,7 @@ pub fn find(commands: &mut Commands, round: Round, photons: &PhotonBuffers, came
         commands.dispatch(Clearance { scene, visible_points, clearances }, &push, Extent::Items(u64::from(end_point - first_point)))
     })?;
     for map in plan.maps() {
-        of_map(commands, round, photons, map, camera)?;
+        of_map(commands, round, map, camera)?;
     }
     let counts = commands.read(class_counts, 2 * RADIUS_CLASSES as usize)?;
     let (global, caustic) = counts.split_at(RADIUS_CLASSES as usize);
@@ -92,13 +92,13 @@ fn grids(counts: &[u32], usual: u32) -> Vec<Range<u32>> {
 const FAR: f64 = 16_384.0;
 
 /// From the finest grid to the widest, each for the points that had too few photons in the one before.
-fn of_map(commands: &mut Commands, round: Round, buffers: &PhotonBuffers, map: &MapPlan, camera: Option<&Camera>) -> Result<()> {
+fn of_map(commands: &mut Commands, round: Round, map: &MapPlan, camera: Option<&Camera>) -> Result<()> {
     let Round { resources, plan, geometry, .. } = round;
     let Some(classes) = map.classes else { return Ok(()) };
     let trial = plan.trial.as_ref().expect("classes come from a trial");
     let TrialPhotons { kept, share } = &trial.photons[usize::from(map.caustic_only)];
-    commands.upload(&buffers.map, kept)?;
-    commands.fill(&buffers.counters, 0, 1, kept.len() as u32);
+    commands.upload(&round.photons().map, kept)?;
+    commands.fill(&round.photons().counters, 0, 1, kept.len() as u32);
     // The trial's radii, whatever the run makes of them.
     let widest = map.radius / trial.factor.unwrap_or(1.0) * classes.widest();
     let (eye, pixel_share) = match (plan.sensor, camera) {
@@ -120,7 +120,7 @@ fn of_map(commands: &mut Commands, round: Round, buffers: &PhotonBuffers, map: &
             photon_capacity: kept.len() as u32,
             ..index::cells(round, map, radius_of_class(widest, first_class))
         };
-        index::build(commands, round, buffers, map, &cells, None)?;
+        index::build(commands, round, map, &cells, None)?;
         let (points, most) = (plan.visible_points(), plan.points_at_once());
         in_pieces(commands, plan, points, most, TESTS_PER_POINT, |commands, first_point, end_point| {
             let push = RadiusClassPush {
@@ -139,7 +139,7 @@ fn of_map(commands: &mut Commands, round: Round, buffers: &PhotonBuffers, map: &
             };
             let SceneResources { scene, visible_points, radius_classes, clearances, film, .. } = resources;
             let class_counts = &film.class_counts;
-            let PhotonBuffers { cells, sorted_map, .. } = buffers;
+            let PhotonBuffers { cells, sorted_map, .. } = round.photons();
             let kernel = RadiusClass { scene, visible_points, cells, sorted_map, radius_classes, clearances, class_counts };
             commands.dispatch(kernel, &push, Extent::Items(u64::from(end_point - first_point)))
         })?;

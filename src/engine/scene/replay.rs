@@ -54,10 +54,10 @@ pub fn light_paths(
     let plan = &plan.by_flights();
     assert!(chunk.1 <= map.chunk_photons && flights <= map.bounces, "{chunk:?}, {flights} flights of {map:?}");
     let mut commands = Commands::new(gpu, constants(plan), Instant::now())?;
-    let resources = SceneResources::new(gpu, &mut commands, geometry, plan, &[])?;
-    let buffers = resources.photons.as_ref().expect("a map has photons");
+    let resources = SceneResources::new(&mut commands, geometry, plan, &[])?;
     let round = Round { resources: &resources, geometry, plan, number };
-    trace::emit(&mut commands, round, buffers, map, chunk)?;
+    let buffers = round.photons();
+    trace::emit(&mut commands, round, map, chunk)?;
     let mut paths = vec![commands.read(&buffers.paths[0], chunk.1 as usize)?];
     let mut traced = 0;
     let mut left = chunk.1;
@@ -66,14 +66,8 @@ pub fn light_paths(
         // Each flight starts with an empty map, so that there is always room.
         commands.fill(&buffers.counters, 0, 3, 0);
         commands.fill(&buffers.counters, 1, 1, left);
-        trace::trace_flight(
-            &mut commands,
-            round,
-            buffers,
-            map,
-            Flight { bounce, list: 0, parity, is_asked: false },
-            Extent::Items(u64::from(left)),
-        )?;
+        let flight = Flight { bounce, list: 0, parity, is_asked: false };
+        trace::trace_flight(&mut commands, round, map, flight, Extent::Items(u64::from(left)))?;
         traced += 1;
         left = commands.read(&buffers.counters, 3)?[2];
         if left == 0 {

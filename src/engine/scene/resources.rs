@@ -3,7 +3,7 @@
 use super::film_buffers::FilmBuffers;
 use crate::engine::planned::{Planned, buffers};
 use crate::error::Result;
-use crate::gpu::{Buffer, Commands, Gpu, kernels};
+use crate::gpu::{Buffer, Commands, kernels};
 use crate::photon::MapPhoton;
 use crate::plan::buffers::{NONFINITE_VALUES, scene};
 use crate::plan::light_choice::LightChoice;
@@ -26,11 +26,11 @@ buffers! {
             triangles: planned.filled(commands, scene::TRIANGLES, &geometry.triangles)?,
             planes: planned.filled(commands, scene::PLANES, &geometry.plane_words())?,
             normals: planned.filled(commands, scene::NORMALS, &geometry.normals)?,
-            uvs: planned.filled(commands, scene::TEXTURE_COORDINATES, &geometry.uvs)?,
-            colours: planned.filled(commands, scene::VERTEX_COLOURS, &geometry.colours)?,
+            uvs: planned.filled(commands, scene::UVS, &geometry.uvs)?,
+            vertex_colours: planned.filled(commands, scene::VERTEX_COLOURS, &geometry.colours)?,
             materials: planned.filled(commands, scene::MATERIALS, &geometry.materials)?,
             layered_materials: planned.filled(commands, scene::LAYERED_MATERIALS, &geometry.layered_materials)?,
-            triangle_layers: planned.filled(commands, scene::LAYERS_OF_TRIANGLES, &geometry.triangle_layers)?,
+            triangle_layers: planned.filled(commands, scene::TRIANGLE_LAYERS, &geometry.triangle_layers)?,
             albedos: planned.filled(commands, scene::ALBEDOS, if plan.keeps(Effect::Layers) { &albedo::TABLE } else { &[] })?,
             textures: planned.filled(commands, scene::TEXTURES, &geometry.textures)?,
             texels,
@@ -76,14 +76,8 @@ buffers! {
 impl SceneResources {
     /// Makes the buffers and records the upload of what never changes. `phases` are sets of receivers
     /// of equal length; none for a picture.
-    pub fn new(
-        gpu: &Gpu,
-        commands: &mut Commands,
-        geometry: &Geometry,
-        plan: &ScenePlan,
-        phases: &[Vec<Receiver>],
-    ) -> Result<SceneResources> {
-        SceneResources::made(&Planned { gpu, buffers: plan.buffers(geometry) }, commands, geometry, plan, phases)
+    pub fn new(commands: &mut Commands, geometry: &Geometry, plan: &ScenePlan, phases: &[Vec<Receiver>]) -> Result<SceneResources> {
+        SceneResources::made(&Planned { gpu: commands.gpu(), buffers: plan.buffers(geometry) }, commands, geometry, plan, phases)
     }
 }
 
@@ -91,7 +85,7 @@ buffers! {
     /// Photons in flight and their map; both maps of a round use the same ones in turn.
     pub struct PhotonBuffers(planned: &Planned, commands: &mut Commands, plan: &ScenePlan) {
         /// Paths entering even bounces and odd bounces.
-        paths: [Buffer<LightPath>; 2] = [planned.one(scene::EVEN_LIGHT_PATHS)?, planned.one(scene::ODD_LIGHT_PATHS)?],
+        paths: [Buffer<LightPath>; 2] = planned.several(scene::PATHS)?,
         map: Buffer<MapPhoton> = planned.one(scene::MAP)?,
         sorted_map: Buffer<MapPhoton> = planned.one(scene::SORTED_MAP)?,
         /// Length of the map, then the paths entering each bounce.
@@ -101,20 +95,20 @@ buffers! {
         cells: Buffer<u32> = planned.one(scene::CELLS)?,
         /// Place of each photon among those of its bucket.
         ranks: Buffer<u32> = planned.one(scene::RANKS)?,
-        block_sums: Vec<Buffer<u32>> = planned.all(scene::SUMS_OF_CELLS)?,
+        sums_of_cells: Vec<Buffer<u32>> = planned.all(scene::SUMS_OF_CELLS)?,
         /// Points with so many candidates that several invocations share them: how many, the most candidates, and each one
         /// with its candidates.
-        crowded: Buffer<u32> = planned.one(scene::CROWDED_POINTS)?,
+        crowded_points: Buffer<u32> = planned.one(scene::CROWDED_POINTS)?,
         /// What keeps photons in order; `None` where they come as they do.
         order: Option<OrderBuffers> = (plan.builder() == Builder::Scan).then(|| OrderBuffers::made(planned)).transpose()?,
         /// Fates of the submission under way, one tally a bounce: of the global map's photons, and of the
         /// caustic map's.
-        tallies: [Buffer<Tally>; 2] = [planned.zeroed(commands, scene::GLOBAL_TALLIES)?, planned.zeroed(commands, scene::CAUSTIC_TALLIES)?],
+        tallies: [Buffer<Tally>; 2] = planned.several_zeroed(commands, scene::TALLIES)?,
         /// Photons stored and what limits cost, of each map.
-        totals: [Buffer<u32>; 2] = [planned.zeroed(commands, scene::GLOBAL_TOTALS)?, planned.zeroed(commands, scene::CAUSTIC_TOTALS)?],
+        totals: [Buffer<u32>; 2] = planned.several_zeroed(commands, scene::TOTALS)?,
         /// Both as the latest whole block left them.
-        tallies_of_blocks: [Buffer<Tally>; 2] = [planned.zeroed(commands, scene::GLOBAL_TALLIES_OF_BLOCKS)?, planned.zeroed(commands, scene::CAUSTIC_TALLIES_OF_BLOCKS)?],
-        totals_of_blocks: [Buffer<u32>; 2] = [planned.zeroed(commands, scene::GLOBAL_TOTALS_OF_BLOCKS)?, planned.zeroed(commands, scene::CAUSTIC_TOTALS_OF_BLOCKS)?],
+        tallies_of_blocks: [Buffer<Tally>; 2] = planned.several_zeroed(commands, scene::TALLIES_OF_BLOCKS)?,
+        totals_of_blocks: [Buffer<u32>; 2] = planned.several_zeroed(commands, scene::TOTALS_OF_BLOCKS)?,
     }
 }
 
@@ -122,6 +116,6 @@ buffers! {
     /// Survivors of a bounce, for prefix sums over them.
     pub struct OrderBuffers(planned: &Planned) {
         survivors: Buffer<u32> = planned.one(scene::SURVIVORS)?,
-        block_sums: Vec<Buffer<u32>> = planned.all(scene::SUMS_OF_SURVIVORS)?,
+        sums_of_survivors: Vec<Buffer<u32>> = planned.all(scene::SUMS_OF_SURVIVORS)?,
     }
 }

@@ -53,28 +53,28 @@ enum Start {
 pub fn trace(
     commands: &mut Commands,
     round: Round,
-    photons: &PhotonBuffers,
     map: &MapPlan,
     chunk: (u32, u32),
     gather: &mut dyn FnMut(&mut Commands, Option<u32>) -> Result<()>,
 ) -> Result<()> {
-    commands.fill(&photons.counters, 0, map.counter_count(), 0);
+    let counters = &round.photons().counters;
+    commands.fill(counters, 0, map.counter_count(), 0);
     let mut start = Start::Lights(chunk);
     let mut first_bounce = 0;
     loop {
         let flights = map.segment_bounces.min(map.bounces - first_bounce);
-        let parity = commands.scope("trace", |commands| segment(commands, round, photons, map, start, flights))?;
+        let parity = commands.scope("trace", |commands| segment(commands, round, map, start, flights))?;
         first_bounce += flights;
         let slots = has_slots(round.plan).then(|| chunk.1 * if map.lands_once { 1 } else { flights });
         if let Some(slots) = slots {
-            commands.fill(&photons.counters, 0, 1, slots);
+            commands.fill(counters, 0, 1, slots);
         }
         if first_bounce == map.bounces {
             return gather(commands, None);
         }
-        let counters = commands.read(&photons.counters, map.counter_count() as usize)?;
-        let left = counters[if is_persistent(round.plan) { 1 } else { 1 + flights as usize }];
-        let stored = counters[0];
+        let counts = commands.read(counters, map.counter_count() as usize)?;
+        let left = counts[if is_persistent(round.plan) { 1 } else { 1 + flights as usize }];
+        let stored = counts[0];
         // Slots may be empty.
         let known = slots.is_none().then_some(stored);
         if left == 0 {
@@ -85,9 +85,9 @@ pub fn trace(
         if is_full {
             gather(commands, known)?;
         }
-        commands.fill(&photons.counters, 0, map.counter_count(), 0);
+        commands.fill(counters, 0, map.counter_count(), 0);
         if !is_full {
-            commands.fill(&photons.counters, 0, 1, stored);
+            commands.fill(counters, 0, 1, stored);
         }
         // Paths that keep their slots leave gaps among those that go on.
         let count = if slots.is_some() { chunk.1 } else { left };
@@ -97,18 +97,18 @@ pub fn trace(
 
 /// The photons that a map holds of a round.
 pub fn stored(commands: &mut Commands, round: Round, map: &MapPlan) -> Result<Vec<MapPhoton>> {
-    let buffers = round.resources.photons.as_ref().expect("a map has photons");
     let mut found = Vec::new();
-    let mut take = |commands: &mut Commands, _: Option<u32>| {
-        let count = commands.read(&buffers.counters, 1)?[0].min(map.capacity);
-        let entries = commands.read(&buffers.map, count as usize)?;
-        found.extend(entries.into_iter().filter(|photon| photon.plane != NONE));
-        Ok(())
-    };
     for chunk in map.chunks() {
-        trace(commands, round, buffers, map, chunk, &mut take)?;
+        trace(commands, round, map, chunk, &mut |commands, _| Ok(found.extend(in_map(commands, round, map)?)))?;
     }
     Ok(found)
+}
+
+/// The photons that are in the map now, without empty slots.
+pub fn in_map(commands: &mut Commands, round: Round, map_plan: &MapPlan) -> Result<impl Iterator<Item = MapPhoton> + use<>> {
+    let PhotonBuffers { counters, map, .. } = round.photons();
+    let count = commands.read(counters, 1)?[0].min(map_plan.capacity);
+    Ok(commands.read(map, count as usize)?.into_iter().filter(|photon| photon.plane != NONE))
 }
 
 /// Whether the map has slots, some of them empty.
@@ -121,19 +121,19 @@ fn is_persistent(plan: &ScenePlan) -> bool {
 }
 
 /// So many flights of each photon; says where those are that are left.
-fn segment(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, start: Start, flights: u32) -> Result<usize> {
+fn segment(commands: &mut Commands, round: Round, map: &MapPlan, start: Start, flights: u32) -> Result<usize> {
     if is_persistent(round.plan) {
-        return trace_persistent(commands, round, photons, map, start, flights);
+        return trace_persistent(commands, round, map, start, flights);
     }
     let (count, mut parity, first_bounce) = match start {
         Start::Lights(chunk) => {
-            emit(commands, round, photons, map, chunk)?;
+            emit(commands, round, map, chunk)?;
             commands.count(Handled { photons: chunk.1.into(), ..Handled::default() });
             (chunk.1, 0, 0)
         }
         Start::List { count, parity, first_bounce } => (count, parity, first_bounce),
     };
-    commands.fill(&photons.counters, 1, 1, count);
+    commands.fill(&round.photons().counters, 1, 1, count);
     for list in 0..flights {
         if commands.timestamps_left() < TIMESTAMP_RESERVE {
             commands.submit()?;
@@ -142,11 +142,11 @@ fn segment(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: 
         let extent = if list == 0 || has_slots(round.plan) {
             Extent::Items(u64::from(count))
         } else {
-            dispatch_size(commands, photons, round.plan, 1 + list, map.chunk_photons)?;
-            Extent::Indirect(&photons.dispatch_args)
+            dispatch_size(commands, round, 1 + list, map.chunk_photons)?;
+            Extent::Indirect(&round.photons().dispatch_args)
         };
         let is_asked = list + 1 == flights && first_bounce + flights < map.bounces;
-        trace_flight(commands, round, photons, map, Flight { bounce: first_bounce + list, list, parity, is_asked }, extent)?;
+        trace_flight(commands, round, map, Flight { bounce: first_bounce + list, list, parity, is_asked }, extent)?;
         parity = 1 - parity;
     }
     commands.add_work(WORK_PER_PHOTON * u64::from(count));
@@ -180,19 +180,12 @@ fn store(plan: &ScenePlan, map: &MapPlan) -> PhotonStore {
 }
 
 /// So many flights of each photon, which keeps its invocation; says where those are that are left.
-fn trace_persistent(
-    commands: &mut Commands,
-    round: Round,
-    photons: &PhotonBuffers,
-    map: &MapPlan,
-    start: Start,
-    flights: u32,
-) -> Result<usize> {
+fn trace_persistent(commands: &mut Commands, round: Round, map: &MapPlan, start: Start, flights: u32) -> Result<usize> {
     let Round { resources, geometry, plan, .. } = round;
     let SceneResources { scene, nonfinite_values, .. } = resources;
-    let PhotonBuffers { paths, counters, map: map_buffer, .. } = photons;
+    let PhotonBuffers { paths, counters, map: map_buffer, tallies, totals, .. } = round.photons();
     let which = usize::from(map.caustic_only);
-    let (tallies, totals) = (&photons.tallies[which], &photons.totals[which]);
+    let (tallies, totals) = (&tallies[which], &totals[which]);
     let (mut first, end, parity, first_bounce) = match start {
         Start::Lights((first, count)) => (first, first + count, 0, 0),
         Start::List { count, parity, first_bounce } => (0, count, parity, first_bounce),
@@ -241,10 +234,10 @@ fn photons_at_once(commands: &Commands, plan: &ScenePlan) -> u32 {
 const LEAST_PHOTONS: u32 = 1 << 12;
 
 /// Writes the paths of a chunk as they leave the lights.
-pub fn emit(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, chunk: (u32, u32)) -> Result<()> {
+pub fn emit(commands: &mut Commands, round: Round, map: &MapPlan, chunk: (u32, u32)) -> Result<()> {
     let Round { resources, geometry, .. } = round;
     let SceneResources { scene, nonfinite_values, .. } = resources;
-    let next_paths = &photons.paths[0];
+    let next_paths = &round.photons().paths[0];
     let push = EmissionPush { draws: draws(round, map), emission: emission(geometry, map, chunk) };
     let kernel = EmitScene { scene, next_paths, nonfinite_values };
     commands.dispatch(kernel, &push, Extent::Items(u64::from(chunk.1)))
@@ -260,14 +253,7 @@ pub struct Flight {
     pub is_asked: bool,
 }
 
-pub fn trace_flight(
-    commands: &mut Commands,
-    round: Round,
-    photons: &PhotonBuffers,
-    map: &MapPlan,
-    flight: Flight,
-    extent: Extent,
-) -> Result<()> {
+pub fn trace_flight(commands: &mut Commands, round: Round, map: &MapPlan, flight: Flight, extent: Extent) -> Result<()> {
     let Round { resources, plan, .. } = round;
     let SceneResources { scene, nonfinite_values, .. } = resources;
     let Flight { bounce, list, parity, is_asked } = flight;
@@ -281,8 +267,8 @@ pub fn trace_flight(
         path_capacity: map.chunk_photons,
     };
     let which = usize::from(map.caustic_only);
-    let (tallies, totals) = (&photons.tallies[which], &photons.totals[which]);
-    let PhotonBuffers { paths, counters, map, sorted_map, order, .. } = photons;
+    let PhotonBuffers { paths, counters, map, sorted_map, order, tallies, totals, .. } = round.photons();
+    let (tallies, totals) = (&tallies[which], &totals[which]);
     let (paths, next_paths) = (&paths[parity], &paths[1 - parity]);
     macro_rules! trace {
         ($kernel:ident { $next_paths:expr $(, $more:ident)* }) => {
@@ -302,21 +288,21 @@ pub fn trace_flight(
         Builder::Ballot => trace!(TraceSceneBallot { next_paths }),
         Builder::Group => trace!(TraceSceneGroup { next_paths }),
         Builder::Scan => {
-            let Some(OrderBuffers { survivors, block_sums }) = order else { panic!("the plan has no order to keep") };
+            let Some(OrderBuffers { survivors, sums_of_survivors }) = order else { panic!("the plan has no order to keep") };
             // Nobody needs the sorted map before the photons of all bounces are there.
             let landed = sorted_map;
             let item_count = survivor_count(plan, push.path_capacity);
             commands.fill(survivors, 0, u64::from(item_count), 0);
             trace!(TraceSceneScan { paths, survivors, landed })?;
-            scan(commands, survivors, block_sums, item_count, plan.settings.group_size)?;
+            scan(commands, survivors, sums_of_survivors, item_count, plan.settings.group_size)?;
             commands.dispatch(ScanMoveScene { paths, next_paths, map, counters, tallies, totals, survivors, landed }, &push, extent)
         }
         Builder::Persistent | Builder::Cpu => panic!("{} has no flights of all photons", plan.builder().name()),
     }
 }
 
-fn dispatch_size(commands: &mut Commands, photons: &PhotonBuffers, plan: &ScenePlan, counter: u32, capacity: u32) -> Result<()> {
-    let PhotonBuffers { counters, dispatch_args, .. } = photons;
-    let push = DispatchSizePush::new(counter, capacity, plan.settings.group_size);
+fn dispatch_size(commands: &mut Commands, round: Round, counter: u32, capacity: u32) -> Result<()> {
+    let PhotonBuffers { counters, dispatch_args, .. } = round.photons();
+    let push = DispatchSizePush::new(counter, capacity, round.plan.settings.group_size);
     commands.dispatch(DispatchSize { counters, dispatch_args }, &push, Extent::Groups(1, 1))
 }

@@ -97,13 +97,13 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, lights: Option<Li
     )?;
     let began = Instant::now();
     let mut commands = Commands::new(gpu, constants(&plan), began)?;
-    let resources = SceneResources::new(gpu, &mut commands, view.geometry, &plan, &phases)?;
+    let resources = SceneResources::new(&mut commands, view.geometry, &plan, &phases)?;
     let round = Round { resources: &resources, geometry: view.geometry, plan: &plan, number: 0 };
-    let seen = see(gpu, &mut commands, round, view.camera)?;
+    let seen = see(&mut commands, round, view.camera)?;
 
     let mut trial = Trial::default();
     let points = light_trial::points(&phases, &seen.points, &view.geometry.planes);
-    let rays = if casts_rays { trial_rays::cast(gpu, &mut commands, round, &points)? } else { Vec::new() };
+    let rays = if casts_rays { trial_rays::cast(&mut commands, round, &points)? } else { Vec::new() };
     if !plan.openings().is_empty() {
         trial.openings = openings(&rays);
         // The scene's from here on.
@@ -112,7 +112,7 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, lights: Option<Li
         }
     }
     if let Some(lights) = lights {
-        let lights = light_trial::learn(gpu, &mut commands, round, lights, &points, &rays)?;
+        let lights = light_trial::learn(&mut commands, round, lights, &points, &rays)?;
         commands.upload(&resources.scene.emitters, &lights.emitters)?;
         trial.lights = Some(Arc::new(lights));
     }
@@ -139,7 +139,7 @@ fn settings_of_trial(of_run: &SceneSettings) -> SceneSettings {
 }
 
 /// What sees at most so many points of those that a run asks about, evenly spread: a smaller picture, or some of the receivers.
-fn few_points(view: &View, sensor: Sensor, most: u32) -> (Sensor, Vec<Vec<Receiver>>) {
+pub(super) fn few_points(view: &View, sensor: Sensor, most: u32) -> (Sensor, Vec<Vec<Receiver>>) {
     match sensor {
         Sensor::Picture { width, height } => {
             let smaller = (f64::from(most) / (f64::from(width) * f64::from(height))).sqrt().min(1.0);
@@ -160,10 +160,10 @@ struct Seen {
     clearances: Vec<f32>,
 }
 
-fn see(gpu: &Gpu, commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Result<Seen> {
+fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Result<Seen> {
     points::see(commands, round, camera)?;
     let count = round.plan.visible_points();
-    let clearances = gpu.buffer::<f32>("clearances", u64::from(count), Memory::Device)?;
+    let clearances = commands.gpu().buffer::<f32>("clearances", u64::from(count), Memory::Device)?;
     let SceneResources { scene, visible_points, .. } = round.resources;
     let kernel = Clearance { scene, visible_points, clearances: &clearances };
     commands.dispatch(kernel, &ClearancePush { first_point: 0, end_point: count, rank: MEDIAN }, Extent::Items(u64::from(count)))?;

@@ -71,9 +71,9 @@ pub fn survey(gpu: &Gpu, job: &Job, map: impl Fn(&ScenePlan) -> Option<&MapPlan>
     let plan = job.plan(gpu, &job.settings)?;
     let Some(map) = map(&plan) else { return Ok(None) };
     let mut commands = Commands::new(gpu, scene::constants(&plan), Instant::now())?;
-    let resources = SceneResources::new(gpu, &mut commands, job.geometry, &plan, &[])?;
-    let buffers = resources.photons.as_ref().expect("there is a map");
+    let resources = SceneResources::new(&mut commands, job.geometry, &plan, &[])?;
     let round = Round { resources: &resources, geometry: job.geometry, plan: &plan, number: 0 };
+    let buffers = round.photons();
     points::see(&mut commands, round, Some(&job.scene.first_camera()))?;
     let seen = commands.read(&resources.visible_points, plan.visible_points() as usize)?;
     let asking: Vec<VisiblePoint> = seen.into_iter().filter(|point| point.arrivals & map.stored != 0).collect();
@@ -96,7 +96,7 @@ pub fn survey(gpu: &Gpu, job: &Job, map: impl Fn(&ScenePlan) -> Option<&MapPlan>
         Ok(())
     };
     for chunk in map.chunks() {
-        trace::trace(&mut commands, round, buffers, map, chunk, &mut look)?;
+        trace::trace(&mut commands, round, map, chunk, &mut look)?;
     }
     let samples = asking.len().div_ceil(step).max(1);
     Ok(Some(Survey { stored: stored as f64, per_estimate: found as f64 / samples as f64, asking_points: asking.len() as f64 }))

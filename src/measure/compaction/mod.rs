@@ -244,7 +244,7 @@ impl Trial<'_> {
             Place::Scene(scene, geometry) => {
                 let plan = self.scene_plan(scene, geometry, builder)?;
                 let mut commands = Commands::new(self.gpu, scene::constants(&plan), Instant::now())?;
-                let resources = SceneResources::new(self.gpu, &mut commands, geometry, &plan, &[])?;
+                let resources = SceneResources::new(&mut commands, geometry, &plan, &[])?;
                 let round = Round { resources: &resources, geometry, plan: &plan, number: 0 };
                 scene_trace::stored(&mut commands, round, global_map(&plan))?.into_iter().map(bytemuck::cast).collect()
             }
@@ -261,9 +261,9 @@ impl Trial<'_> {
                 let plan = RoomPlan::new(&room, &settings, &engine::limits(self.gpu.facts()))?;
                 self.gpu.prepare(&trace::modules(&plan), &constants(&plan))?;
                 let mut commands = Commands::new(self.gpu, constants(&plan), Instant::now())?;
-                let resources = RoomResources::new(self.gpu, &mut commands, &room, &plan)?;
+                let resources = RoomResources::new(&mut commands, &room, &plan)?;
                 self.turns(commands, |commands, turn| {
-                    tallies::clear(commands, &resources.tallies);
+                    commands.clear(&resources.tallies);
                     for ranges in plan.chunks() {
                         commands.scope(turn, |commands| trace::chunk(commands, &resources, &plan, 0, &ranges))?;
                         commands.submit()?;
@@ -275,13 +275,13 @@ impl Trial<'_> {
                 let plan = self.scene_plan(scene, geometry, builder)?;
                 self.gpu.prepare(&scene_trace::modules(&plan), &scene::constants(&plan))?;
                 let mut commands = Commands::new(self.gpu, scene::constants(&plan), Instant::now())?;
-                let resources = SceneResources::new(self.gpu, &mut commands, geometry, &plan, &[])?;
+                let resources = SceneResources::new(&mut commands, geometry, &plan, &[])?;
                 let (round, map) = (Round { resources: &resources, geometry, plan: &plan, number: 0 }, global_map(&plan));
-                let buffers = resources.photons.as_ref().expect("a map has photons");
+                let buffers = round.photons();
                 self.turns(commands, |commands, turn| {
-                    tallies::clear(commands, &buffers.tallies[0]);
+                    commands.clear(&buffers.tallies[0]);
                     for chunk in map.chunks() {
-                        commands.scope(turn, |commands| scene_trace::trace(commands, round, buffers, map, chunk, &mut |_, _| Ok(())))?;
+                        commands.scope(turn, |commands| scene_trace::trace(commands, round, map, chunk, &mut |_, _| Ok(())))?;
                         commands.submit()?;
                     }
                     tallies::read(commands, &buffers.tallies[0], plan.tally_rows())

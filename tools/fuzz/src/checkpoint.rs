@@ -6,7 +6,7 @@ use super::change::Random;
 use super::mutation::{self, MutateBytes};
 use super::sealed::{Run, mutate, two_files};
 use super::{refused, seeds};
-use photonmill::engine::saved::{SavedFilm, SavedRun};
+use photonmill::engine::run::saved::{SavedFilm, SavedRun};
 use photonmill::engine::scene::SceneFilm;
 use photonmill::output::colour::Tone;
 use photonmill::output::merge_report;

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::time::Duration;
 
 use photonmill::engine::End;
-use photonmill::engine::watch::Progress;
+use photonmill::engine::run::watch::Progress;
 use photonmill::error::{Error as Failure, Result};
 use photonmill::gpu::Gpu;
 use photonmill::output::scene_report;

@@ -1,25 +1,24 @@
 //! A bounce whose survivors keep their order, by prefix sums: reduce, then scan.
 
 use crate::engine::prefix_sum::scan;
+use crate::engine::room::Chunk;
 use crate::engine::room::resources::{OrderBuffers, RoomResources};
 use crate::error::Result;
 use crate::gpu::kernels::{ScanMoveRoom, TraceRoomScan};
 use crate::gpu::{Buffer, Commands, Extent};
 use crate::path::StoredPath;
-use crate::plan::RoomPlan;
 use crate::records::TracePush;
 
 /// Survivors are counted by work group, the counts summed, and the survivors moved to where they belong.
 pub fn one_bounce<'a>(
     commands: &mut Commands,
-    resources: &RoomResources,
-    plan: &RoomPlan,
+    Chunk { resources, plan, .. }: Chunk,
     [paths, next_paths]: [&Buffer<StoredPath>; 2],
     push: &TracePush,
     extent: impl Fn() -> Extent<'a>,
 ) -> Result<()> {
     let RoomResources { room, photons, origins, counters, tallies, nonfinite_values, order, .. } = resources;
-    let Some(OrderBuffers { survivors, block_sums, weights }) = order else { panic!("the plan has no order to keep") };
+    let Some(OrderBuffers { survivors, sums_of_survivors, weights }) = order else { panic!("the plan has no order to keep") };
     // Groups that no path is left for count none, and so does the place behind the last, which becomes the sum of all.
     commands.clear(survivors);
     commands.dispatch(
@@ -27,6 +26,6 @@ pub fn one_bounce<'a>(
         push,
         extent(),
     )?;
-    scan(commands, survivors, block_sums, survivors.count() as u32, plan.settings.group_size)?;
+    scan(commands, survivors, sums_of_survivors, survivors.count() as u32, plan.settings.group_size)?;
     commands.dispatch(ScanMoveRoom { paths, next_paths, photons, origins, counters, tallies, survivors, weights }, push, extent())
 }
