@@ -60,7 +60,7 @@ impl PreparedScene {
     }
 }
 
-impl Inputs<'_> {
+impl Inputs {
     /// For an image: keeps the parts of each pixel's light apart where they are shown, but not of a run that goes on with one that has none.
     /// Fails where the image is to be denoised and cannot be.
     pub fn for_image(mut self, shows_parts: bool, resumed: Option<&SavedRun>) -> Result<Self> {
@@ -70,7 +70,7 @@ impl Inputs<'_> {
     }
 }
 
-impl Prepared<'_> {
+impl Prepared {
     /// Runs to the end; the image is what came of it.
     pub fn image(&self, gpus: &mut Vec<Gpu>, checkpoints: &mut Checkpoints, observer: &Observer) -> Result<Image> {
         let blocks_with_gaps = blocks_with_gaps(checkpoints.resumed());

@@ -11,7 +11,7 @@ use super::axes::{self, Configuration, Group, Line};
 use super::point::Shot;
 use super::reference::{Reference, wall_points};
 use crate::engine::room::{self, film::estimate_walls};
-use crate::engine::scene::{self, RunResult, Target, View};
+use crate::engine::scene::{RunResult, Target};
 use crate::engine::watch::End;
 use crate::engine::{self, Control};
 use crate::error::{Error, Result};
@@ -20,10 +20,7 @@ use crate::ledger::Ledger;
 use crate::output::colour::ColourPicture;
 use crate::output::command;
 use crate::output::image::view_of_values;
-use crate::plan::scene::ScenePlan;
-use crate::plan::sensor::Sensor;
-use crate::plan::work_division::Free;
-use crate::scene::geometry::Geometry;
+use crate::render::{Observer, PreparedScene};
 use crate::scene::open_box::open_box;
 use crate::scene::{Camera, Light, Mesh, Scene};
 use crate::settings::scene::{Effect, SceneSettings};
@@ -37,9 +34,7 @@ pub struct Subject {
     pub quantity: String,
     pub reference: Reference,
     pub groups: Vec<Group>,
-    scene: Scene,
-    /// Of the scene as it is.
-    geometry: Rc<Geometry>,
+    scene: Rc<PreparedScene>,
     camera: Option<Camera>,
     /// Points and normals, where no camera looks.
     receivers: Vec<(DVec3, DVec3)>,
@@ -79,15 +74,16 @@ impl Subject {
     /// Quantities of a scene; making their references may take a while.
     pub fn all(gpu: &Gpu, scene: &Scene, request: &Request, cancelled: &AtomicBool, tell: &mut dyn FnMut(&str)) -> Result<Vec<Subject>> {
         let Request { scene: name, size, photons, reference_samples, .. } = request.clone();
-        let geometry = Rc::new(Geometry::new(scene)?);
+        let prepared = Rc::new(PreparedScene::new(scene.clone()));
+        // Fails before references are made, which takes long.
+        prepared.geometry(&Observer::default())?;
         let camera = scene.first_camera();
         let pixels = pixels_of(&camera, size);
         let subject = |quantity: &str, reference: &Reference, groups, (camera, receivers)| Subject {
             quantity: quantity.to_owned(),
             reference: reference.clone(),
             groups,
-            scene: scene.clone(),
-            geometry: geometry.clone(),
+            scene: prepared.clone(),
             camera,
             receivers,
             side: size,
@@ -101,7 +97,7 @@ impl Subject {
                 format!("cannot be studied with {option}: its reference is of its own light; leave that out, or name another scene");
             return Err(Error::setting("SCENE", &name, allowed));
         }
-        let of_scene = |is_picture: bool| scene_axes(gpu, scene, &geometry, request, is_picture.then_some(pixels));
+        let of_scene = |is_picture: bool| scene_axes(gpu, &prepared, request, is_picture.then_some(pixels));
         if name == "open-box" {
             tell("reference: radiosity of the box");
             let reference = Reference::walls(&RoomSettings::default(), size)?;
@@ -124,7 +120,7 @@ impl Subject {
         let reference = if unknown_to_paths(scene) {
             tell("reference: a long run of photonmill itself, as path tracing cannot find the caustics of lights without a surface");
             let seconds = (request.budget / OF_OWN_REFERENCE).as_secs_f64();
-            own_reference(gpu, scene, &geometry, &camera, pixels, seconds, cancelled)?
+            own_reference(gpu, &prepared, &camera, pixels, seconds, cancelled)?
         } else {
             tell(&format!(
                 "reference: path tracing of {width} x {height} pixels, {reference_samples} samples per pixel, unless it is in the cache"
@@ -175,11 +171,7 @@ impl Subject {
         let began = Instant::now();
         let stop = Stop { error: Some(error), ..Stop::default() };
         let settings = SceneSettings { rounds: MOST_ROUNDS, stop, ..SceneSettings::default() };
-        let target = self.target();
-        let view = View { geometry: &self.geometry, camera: target.camera(), phases: &target.phases(&self.geometry) };
-        let plan = scene::trial::plan(gpu, &self.scene, &view, &settings, target.sensor())?;
-        let free = Free { samples: self.camera.is_some(), ..Free::ALL };
-        let pilot = scene::pilot::choose(gpu, &self.scene, &view, &plan, free, cancelled)?;
+        let pilot = self.scene.prepare_with(&settings, self.target())?.choose(gpu, cancelled)?;
         let expected = pilot.as_ref().map_or(0.0, |pilot| 1e-9 * pilot.rounds.until(pilot.chosen, error).1);
         Ok(Chosen {
             gpu_ms: pilot.as_ref().map_or(0.0, |pilot| pilot.spent),
@@ -199,7 +191,7 @@ impl Subject {
         cancelled: &AtomicBool,
     ) -> Result<Option<(Shot, u32)>> {
         let stop = Stop { seconds: Some(most.as_secs_f64()), ..chosen.settings.stop };
-        let lit = self.light(gpu, SceneSettings { seed, stop, ..chosen.settings.clone() }, &mut Control::quiet(cancelled))?;
+        let lit = self.light(gpu, &SceneSettings { seed, stop, ..chosen.settings.clone() }, &mut Control::quiet(cancelled))?;
         if cancelled.load(Ordering::Relaxed) {
             return Err(Error::Interrupted);
         }
@@ -260,7 +252,7 @@ impl Subject {
             }
             Line::Scene(settings) => {
                 let settings = SceneSettings { rounds, seed, ..settings.clone() };
-                self.shot_of(&self.light(gpu, settings, &mut control)?)
+                self.shot_of(&self.light(gpu, &settings, &mut control)?)
             }
         };
         if cancelled.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(shot) }
@@ -278,15 +270,9 @@ impl Subject {
         self.camera.as_ref().map_or(Target::Points(&self.receivers), |camera| Target::Picture(camera, self.pixels))
     }
 
-    fn light(&self, gpu: &Gpu, settings: SceneSettings, control: &mut Control) -> Result<RunResult> {
-        let geometry = match settings.without.as_slice() {
-            [] => self.geometry.clone(),
-            without => Rc::new(Geometry::new(&self.scene.without(without))?),
-        };
-        let target = self.target();
-        let view = View { geometry: &geometry, camera: target.camera(), phases: &target.phases(&geometry) };
-        let plan = scene::trial::plan(gpu, &self.scene, &view, &settings, target.sensor())?;
-        scene::light(gpu, &view, plan, control)
+    fn light(&self, gpu: &Gpu, settings: &SceneSettings, control: &mut Control) -> Result<RunResult> {
+        let prepared = self.scene.prepare_with(settings, self.target())?;
+        prepared.light(gpu, prepared.plan_on(gpu, settings)?, control)
     }
 }
 
@@ -301,8 +287,7 @@ fn unknown_to_paths(scene: &Scene) -> bool {
 /// A reference by photonmill itself, where no other method has one: with other random numbers than any run that it judges.
 fn own_reference(
     gpu: &Gpu,
-    scene: &Scene,
-    geometry: &Geometry,
+    scene: &PreparedScene,
     camera: &Camera,
     pixels: [u32; 2],
     seconds: f64,
@@ -310,13 +295,9 @@ fn own_reference(
 ) -> Result<Reference> {
     let stop = Stop { seconds: Some(seconds), ..Stop::default() };
     let settings = SceneSettings { rounds: MOST_ROUNDS, stop, seed: OWN_SEED, ..SceneSettings::default() };
-    let target = Target::Picture(camera, pixels);
-    let view = View { geometry, camera: target.camera(), phases: &[] };
-    let plan = scene::trial::plan(gpu, scene, &view, &settings, target.sensor())?;
-    let chosen =
-        scene::pilot::choose(gpu, scene, &view, &plan, Free::ALL, cancelled)?.map_or(settings.clone(), |pilot| pilot.set(&settings));
-    let plan = scene::trial::plan(gpu, scene, &view, &chosen, target.sensor())?;
-    let lit = scene::light(gpu, &view, plan, &mut Control::quiet(cancelled))?.finished()?;
+    let prepared = scene.prepare_with(&settings, Target::Picture(camera, pixels))?;
+    let chosen = prepared.choose(gpu, cancelled)?.map_or(settings.clone(), |pilot| pilot.set(&settings));
+    let lit = prepared.light(gpu, prepared.plan_on(gpu, &chosen)?, &mut Control::quiet(cancelled))?.finished()?;
     let (film, error) = (&lit.film, lit.error());
     let all = |value: &dyn Fn(usize) -> DVec3| (0..film.pixels()).flat_map(|pixel| value(pixel).to_array()).collect::<Vec<f64>>();
     let surfaces = film.surface_means().collect::<Vec<_>>();
@@ -360,12 +341,12 @@ fn shot(values: Vec<f64>, timings: &Timings, ledger: Ledger) -> Shot {
     }
 }
 
-fn scene_axes(gpu: &Gpu, scene: &Scene, geometry: &Geometry, request: &Request, picture: Option<[u32; 2]>) -> Result<Vec<Group>> {
+fn scene_axes(gpu: &Gpu, scene: &PreparedScene, request: &Request, picture: Option<[u32; 2]>) -> Result<Vec<Group>> {
     let settings = SceneSettings { photons: request.photons, caustic_photons: request.photons, block: Some(1), ..SceneSettings::default() };
-    let [width, height] = picture.unwrap_or([request.size; 2]);
-    let sensor = Sensor::Picture { width, height };
-    let plan = ScenePlan::new(scene, geometry, &settings, sensor, &engine::limits(gpu.facts()))?;
+    let camera = scene.scene.first_camera();
+    let prepared = scene.prepare_with(&settings, Target::Picture(&camera, picture.unwrap_or([request.size; 2])))?;
+    let plan = prepared.plan_within(&engine::limits(gpu.facts()))?;
     let kept: Vec<Effect> = plan.decisions.iter().filter(|decision| decision.kept).map(|decision| decision.effect).collect();
-    let radius = plan.global.as_ref().map(|map| map.radius * geometry.unit);
-    Ok(axes::of_scene(request.photons, &kept, radius, geometry.triangles.len() <= FEW_TRIANGLES, picture.is_some()))
+    let radius = plan.global.as_ref().map(|map| map.radius * prepared.geometry.unit);
+    Ok(axes::of_scene(request.photons, &kept, radius, prepared.geometry.triangles.len() <= FEW_TRIANGLES, picture.is_some()))
 }
