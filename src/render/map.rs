@@ -27,7 +27,7 @@ pub struct WrittenMap {
     pub failed: Option<Error>,
 }
 
-impl Prepared<'_> {
+impl Prepared {
     /// Traces the photons of all rounds into a file. The rounds should be of a block each, as they know nothing of each other.
     pub fn write_map(&self, gpu: &mut Gpu, output: &Destination, observer: &Observer) -> Result<WrittenMap> {
         let (scene, geometry, settings) = (&*self.scene, &*self.geometry, &self.inputs.settings);

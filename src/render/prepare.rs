@@ -5,7 +5,7 @@
 
 use std::borrow::Cow;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use glam::DVec3;
@@ -22,7 +22,7 @@ use crate::engine::run::retry::until_done;
 use crate::engine::run::saved::SavedRun;
 use crate::engine::scene::map_file::MapFile;
 use crate::engine::scene::pilot::{self, Pilot};
-use crate::engine::scene::{RunResult, Target, View, bias, light_on, scene_hash, trial};
+use crate::engine::scene::{RunResult, Target, View, bias, light_from, light_on, scene_hash, trial};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::oidn::Denoiser;
@@ -36,14 +36,15 @@ use crate::plan::sensor::Sensor;
 use crate::plan::work_division::{Division, Free};
 use crate::records::Receiver;
 use crate::scene::geometry::Geometry;
+use crate::scene::picture_size::PictureSize;
 use crate::scene::sensors::with_sensors;
 use crate::scene::{Camera, Scene};
 use crate::settings::scene::SceneSettings;
 use crate::text::counted;
 
 /// A request whose files are open and whose settings are allowed; of the scene nothing is read yet.
-pub struct Inputs<'a> {
-    pub request: &'a RenderRequest,
+pub struct Inputs {
+    pub request: RenderRequest,
     /// What the request asks for; a pilot may choose some of it.
     pub settings: SceneSettings,
     /// Photons that need not be traced.
@@ -55,9 +56,9 @@ pub struct Inputs<'a> {
     pub(super) denoiser: Option<Denoiser>,
 }
 
-impl<'a> Inputs<'a> {
+impl Inputs {
     /// Fails where a file cannot be used, or a value is not allowed.
-    pub fn open(request: &'a RenderRequest) -> Result<Inputs<'a>> {
+    pub fn open(request: &RenderRequest) -> Result<Inputs> {
         let map = request.map.as_ref().map(|path| MapFile::open("map", path)).transpose()?;
         if let Some((map, rounds)) = map.as_ref().zip(request.rounds).filter(|(map, rounds)| *rounds > map.rounds()) {
             let allowed = format!("must be at most {}, the rounds that the file of `map` holds", map.rounds());
@@ -68,7 +69,7 @@ impl<'a> Inputs<'a> {
     }
 
     /// The same with files that are open.
-    pub(super) fn with(request: &'a RenderRequest, map: Option<MapFile>, tuned: Option<TunedSettings>) -> Result<Inputs<'a>> {
+    pub(super) fn with(request: &RenderRequest, map: Option<MapFile>, tuned: Option<TunedSettings>) -> Result<Inputs> {
         let settings = request.settings(tuned.as_ref().map(TunedSettings::settings).as_ref());
         let settings = match &map {
             Some(map) => SceneSettings { rounds: request.rounds.unwrap_or(map.rounds()), ..map.settings(&settings) },
@@ -76,11 +77,11 @@ impl<'a> Inputs<'a> {
         };
         settings.validate()?;
         let save_settings = request.save_settings.as_ref().map(|path| Destination::open("save_settings", path)).transpose()?;
-        Ok(Inputs { request, settings, map, tuned, save_settings, denoiser: None })
+        Ok(Inputs { request: request.clone(), settings, map, tuned, save_settings, denoiser: None })
     }
 
     /// For an image of which nothing says when it ends: an error ends it, or the time that suits the device.
-    pub fn ended(self, kind: &str) -> Inputs<'a> {
+    pub fn ended(self, kind: &str) -> Inputs {
         Inputs { settings: self.request.ended(self.settings, kind), ..self }
     }
 }
@@ -97,8 +98,8 @@ pub enum Receivers<'a> {
 }
 
 /// What is rendered: a scene with the geometry that is left of it, and what receives its light.
-pub struct Prepared<'a> {
-    pub inputs: Inputs<'a>,
+pub struct Prepared {
+    pub inputs: Inputs,
     pub scene: Arc<Scene>,
     pub geometry: Arc<Geometry>,
     pub sensor: Sensor,
@@ -130,18 +131,18 @@ impl std::ops::Deref for Run {
 }
 
 /// Reads the scene of a request and makes ready what is asked of it.
-pub fn prepare<'a>(inputs: Inputs<'a>, receivers: Receivers, observer: &Observer) -> Result<Prepared<'a>> {
+pub fn prepare(inputs: Inputs, receivers: Receivers, observer: &Observer) -> Result<Prepared> {
     if matches!(receivers, Receivers::Image(None)) {
         inputs.request.check_camera()?;
     }
-    let scene = PreparedScene::read(inputs.request, observer)?;
+    let scene = PreparedScene::read(&inputs.request, observer)?;
     scene.prepare(inputs, receivers, observer)
 }
 
 impl PreparedScene {
     /// Makes ready what a request asks of this scene, whatever the scene's name in it. Refuses another light than the scene was read with.
-    pub fn prepare<'a>(&self, inputs: Inputs<'a>, receivers: Receivers, observer: &Observer) -> Result<Prepared<'a>> {
-        let (request, settings) = (inputs.request, &inputs.settings);
+    pub fn prepare(&self, inputs: Inputs, receivers: Receivers, observer: &Observer) -> Result<Prepared> {
+        let (request, settings) = (&inputs.request, &inputs.settings);
         self.check_read_as(request)?;
         // Photons of a file are those of the scene alone.
         let scene = match receivers {
@@ -175,9 +176,19 @@ impl PreparedScene {
         let free = request.free(camera.is_some());
         Ok(Prepared { inputs, scene, geometry, sensor, camera, phases, point, free })
     }
+
+    /// The same with settings that are not of a request. A pilot may choose all that it can.
+    pub fn prepare_with(&self, settings: &SceneSettings, target: Target) -> Result<Prepared> {
+        let (size, receivers) = match target {
+            Target::Picture(camera, [width, height]) => (Some(PictureSize::WidthAndHeight(width, height)), Receivers::Image(Some(camera))),
+            Target::Points(points) => (None, Receivers::Points(points)),
+        };
+        let inputs = Inputs::open(&RenderRequest { size, ..RenderRequest::default() })?;
+        self.prepare(Inputs { settings: settings.clone(), ..inputs }, receivers, &Observer::default())
+    }
 }
 
-impl Prepared<'_> {
+impl Prepared {
     pub fn view(&self) -> View<'_> {
         View { geometry: &self.geometry, camera: self.camera.as_ref(), phases: &self.phases }
     }
@@ -196,15 +207,19 @@ impl Prepared<'_> {
         self.of_map(ScenePlan::new(&self.scene, &self.geometry, &self.inputs.settings, self.sensor, limits)?)
     }
 
-    /// What a device does, with what a trial round finds; of a device that works to its end.
-    pub fn plan_on(&self, gpu: &Gpu) -> Result<ScenePlan> {
-        self.of_map(trial::plan(gpu, &self.scene, &self.view(), &self.inputs.settings, self.sensor)?)
+    /// What a device does with these settings, and with what a trial round finds; of a device that works to its end.
+    pub fn plan_on(&self, gpu: &Gpu, settings: &SceneSettings) -> Result<ScenePlan> {
+        self.of_map(trial::plan(gpu, &self.scene, &self.view(), settings, self.sensor)?)
     }
 
-    /// What a device does, with what a trial round finds.
-    fn plan(&self, gpu: &mut Gpu, settings: &SceneSettings, observer: &Observer) -> Result<ScenePlan> {
-        let plan = |gpu: &Gpu| trial::plan(gpu, &self.scene, &self.view(), settings, self.sensor);
-        self.of_map(until_done(gpu, &observer.failed(), plan)?)
+    /// What a pilot chooses; `None` where there is nothing to choose. Of a device that works to its end.
+    pub fn choose(&self, gpu: &Gpu, cancelled: &AtomicBool) -> Result<Option<Pilot>> {
+        pilot::choose_for(gpu, &self.scene, &self.view(), &self.inputs.settings, self.sensor, self.free, cancelled)
+    }
+
+    /// Runs a plan, and nothing before or after it; on a device that works to its end.
+    pub fn light(&self, gpu: &Gpu, plan: ScenePlan, control: &mut Control) -> Result<RunResult> {
+        light_from(gpu, &self.view(), plan, self.inputs.map.as_ref(), control)
     }
 
     fn of_map(&self, plan: ScenePlan) -> Result<ScenePlan> {
@@ -217,9 +232,7 @@ impl Prepared<'_> {
         let mut found = None;
         if settings.stop.has_goal() && self.free != Free::default() {
             observer.tell(Event::Status("looking for the best settings"));
-            let choose =
-                |gpu: &Gpu| pilot::choose_for(gpu, &self.scene, &self.view(), settings, self.sensor, self.free, observer.cancelled);
-            found = until_done(gpu, &observer.failed(), choose)?;
+            found = until_done(gpu, &observer.failed(), |gpu: &Gpu| self.choose(gpu, observer.cancelled))?;
         }
         if let Some(pilot) = &found {
             observer.tell(Event::Pilot(pilot, &settings.stop, self.point));
@@ -292,7 +305,7 @@ impl Prepared<'_> {
             let rounds = settings.rounds;
             observer.warn(format!("`rounds` {rounds} is less than the {done} rounds of `resume`, all of which are kept"));
         }
-        let mut plan = self.plan(&mut gpus[0], &settings, observer)?;
+        let mut plan = until_done(&mut gpus[0], &observer.failed(), |gpu: &Gpu| self.plan_on(gpu, &settings))?;
         if let Some(warning) = scene_report::radius_warning(&plan, &self.geometry, self.point) {
             observer.warn(warning);
         }

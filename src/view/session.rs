@@ -118,7 +118,7 @@ impl<'a> Session<'a> {
                 let mut inputs = Inputs::open(&request)?;
                 inputs.settings.keeps_parts = true;
                 let prepared = scene.prepare(inputs, Receivers::Image(Some(&self.camera.camera)), &Observer::default())?;
-                let plan = prepared.plan_on(self.gpu)?;
+                let plan = prepared.plan_on(self.gpu, &prepared.inputs.settings)?;
                 let live = LiveScene::new(self.gpu, &prepared.geometry, &self.camera.camera, &plan, self.request.cancelled)?;
                 self.take_plan(&plan, &prepared.geometry, choices);
                 self.frames(Live::Scene(Box::new(live)), &picture, events, presenter, choices)
@@ -377,7 +377,7 @@ impl<'a> Session<'a> {
 
     fn command(&self, choices: &Choices) -> String {
         let command = if self.status.is_box { "" } else { "render" };
-        command_line(command, &self.image_request(choices), "picture.png")
+        command_line(command, &self.image_request(choices), &["-o", "picture.png"])
     }
 }
 

@@ -9,7 +9,7 @@ use super::estimate_check;
 use super::lamps;
 use super::lit::sides;
 use super::prelude::*;
-use photonmill::engine::scene::{RunResult, Target, render};
+use photonmill::engine::scene::{RunResult, Target};
 use photonmill::verify::selfcheck::Estimate;
 
 /// Settings of which rooms of many triangles and few, with sheets of two sides and without, have one set of kernels.

@@ -7,7 +7,7 @@ use glam::dvec3;
 use super::known::of_any_room;
 use super::prelude::*;
 use crate::tests::engine::unseen_light::room_without_floor;
-use photonmill::engine::scene::{self, RunResult, Target, View, trial};
+use photonmill::engine::scene::{RunResult, Target, View, trial};
 
 fn lamp_of(radiance: f32) -> Material {
     Material { emission: Vec3::splat(radiance), ..matt(0.0) }
@@ -154,7 +154,7 @@ pub fn screened(mut rooms: Scene) -> Scene {
 pub fn scattered_light(gpu: &Gpu, ratio: f32, by_sight: bool) -> Check<Complaint> {
     let settings = SceneSettings { photons: 1 << 15, ..usual() };
     let all = |scene: &Scene| match by_sight {
-        true => scene::render(gpu, scene, &settings, Target::Points(&points())).unwrap(),
+        true => render(gpu, scene, &settings, Target::Points(&points())).unwrap(),
         false => lit(gpu, scene, &settings, &points(), false),
     };
     let [alone, found] = [all(&rooms(&[1.0])), all(&rooms(&[1.0, ratio]))];

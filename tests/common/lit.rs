@@ -5,6 +5,7 @@ use std::ops::Range;
 use super::estimate_check;
 use super::prelude::*;
 use photonmill::engine::scene::{self, RunResult, Target, View, trial};
+use photonmill::render::PreparedScene;
 use photonmill::verify::selfcheck::Estimate;
 
 /// The default settings with blocks of one round: few rounds tell the error well.
@@ -15,6 +16,12 @@ pub fn by_rounds() -> SceneSettings {
 /// Builders of a scene that trace in ways of their own.
 const SCENE_BUILDERS: [Builder; 2] = [Builder::Ballot, Builder::Persistent];
 pub const BOTH: [Illumination; 2] = [Illumination::Split, Illumination::Photons];
+
+/// Lights a scene to the end of the run, with default radii from a trial round.
+pub fn render(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, target: Target) -> Result<RunResult, Error> {
+    let prepared = PreparedScene::new(scene.clone()).prepare_with(settings, target)?;
+    prepared.light(gpu, prepared.plan_on(gpu, settings)?, &mut Control::default())
+}
 
 /// The geometry of a scene and what a device would do with it, or why not.
 pub fn scene_plan(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, sensor: Sensor) -> Result<(Geometry, ScenePlan), Error> {

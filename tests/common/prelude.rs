@@ -29,7 +29,7 @@ pub use super::aimed::{mean_and_error, mean_of_all};
 pub use super::family::Family;
 pub use super::lit::{
     BOTH, assert_builders_agree, beam, by_rounds, cone, disc, every_kind_of_light, fixed_radius, flights, glass, grid, irradiances, lamp,
-    level, mapped, matt, mean_red, means, mirror, moved, point, radiances, received, red, red_check, same_light, scene, scene_of,
+    level, mapped, matt, mean_red, means, mirror, moved, point, radiances, received, red, red_check, render, same_light, scene, scene_of,
     scene_plan, scene_plan_within, seen, shaft, shining, square_picture, standard_errors, sun, tessellated, texture,
 };
 pub use super::program::{Place, text};

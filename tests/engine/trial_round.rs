@@ -170,7 +170,7 @@ fn a_room_too_small_for_its_scene_has_an_unknown_bias() {
 /// The spheres, with radii by a trial round.
 fn rendered(gpu: &Gpu, settings: &SceneSettings, size: [u32; 2]) -> scene::RunResult {
     let scene = scene("cornell-spheres");
-    scene::render(gpu, &scene, settings, Target::Picture(&scene.first_camera(), size)).unwrap()
+    render(gpu, &scene, settings, Target::Picture(&scene.first_camera(), size)).unwrap()
 }
 
 /// Radii by density know no builder or chunk: films are the same to the bit.

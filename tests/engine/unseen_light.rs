@@ -6,7 +6,7 @@ use crate::common::prelude::*;
 use glam::dvec3;
 use photonmill::engine::End;
 use photonmill::engine::room::film::{estimate_walls, irradiance_weights};
-use photonmill::engine::scene::{RunResult, Target, render};
+use photonmill::engine::scene::{RunResult, Target};
 use photonmill::settings::stop::Stop;
 
 /// Walls of a room over [-2, 2] x [-2, 2], as high as 3 m, that face inwards; and its ceiling but for a hole in the middle.

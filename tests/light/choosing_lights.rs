@@ -327,7 +327,7 @@ fn glowing_panes_look_as_they_shine() {
     for illumination in BOTH {
         let settings =
             SceneSettings { photons: 20_000, caustic_photons: 20_000, rounds: 32, radius: Some(0.1), illumination, ..by_rounds() };
-        let lit = scene::render(&gpu, &scene, &settings, Target::Picture(&camera, [10; 2])).unwrap();
+        let lit = render(&gpu, &scene, &settings, Target::Picture(&camera, [10; 2])).unwrap();
         let verdict = Verdict::new(&means(&lit), &standard_errors(&lit), 32, &judged, None);
         assert!(verdict.agrees(), "{illumination:?}: {verdict}");
     }

@@ -9,7 +9,7 @@ use crate::common::rectangles::{self, Rectangle};
 use crate::tests::engine::unseen_light::room_without_floor;
 use crate::tests::light::skies::{a_patch_of_sun_keeps_its_rays, a_sun_that_shines_in_has_as_many_rays_as_without_openings, sky, sunny};
 use glam::dvec3;
-use photonmill::engine::scene::{RunResult, Target, render};
+use photonmill::engine::scene::{RunResult, Target};
 use photonmill::scene::sky::Sky;
 
 /// Half the edge of the hole, which has 1 % of 80 m2 of walls.

@@ -6,7 +6,7 @@ use crate::common::estimate_check;
 use crate::common::prelude::*;
 use crate::tests::light::openings::{direct, room_under};
 use glam::dvec3;
-use photonmill::engine::scene::{Target, render};
+use photonmill::engine::scene::Target;
 use photonmill::scene::material::Coverage;
 use photonmill::scene::sky::Sky;
 

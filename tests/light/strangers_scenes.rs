@@ -14,7 +14,7 @@ use crate::common::prelude::*;
 use crate::common::rectangles::{self, Rectangle};
 use crate::common::sources::read;
 use glam::dvec3;
-use photonmill::engine::scene::{RunResult, Target, render};
+use photonmill::engine::scene::{RunResult, Target};
 use photonmill::settings::stop::LEAST_BLOCKS;
 
 struct Case {

@@ -7,7 +7,7 @@ use crate::common::plates::{Place, Plates};
 use crate::common::prelude::*;
 use crate::common::{estimate_check, known, planted, sheets};
 use crate::tests::materials::media;
-use photonmill::engine::scene::{self, RunResult, Target};
+use photonmill::engine::scene::{RunResult, Target};
 use photonmill::scene::material::{Coverage, Layers, Medium, NormalMap};
 use photonmill::scene::texture::Filter;
 use photonmill::verify::judge::lobes::{Frame, Inputs, Lobes};
@@ -53,7 +53,7 @@ const SEEDS: u32 = 4;
 fn runs(gpu: &Gpu, scene: &Scene, rounds: u32, camera: &Camera, size: [u32; 2]) -> Runs {
     let of = |seed: u32| {
         let settings = SceneSettings { seed: seed.into(), photons: 10_000, caustic_photons: 10_000, rounds, ..by_rounds() };
-        scene::render(gpu, scene, &settings, Target::Picture(camera, size)).unwrap()
+        render(gpu, scene, &settings, Target::Picture(camera, size)).unwrap()
     };
     let all: Vec<RunResult> = (1..=SEEDS).map(of).collect();
     let pixels = all[0].film.pixels();

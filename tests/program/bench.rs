@@ -132,11 +132,10 @@ fn the_roofline_counts_every_dispatch() {
         let settings = RoomSettings { builder, photons: 600, mesh: 4, bounces: 3, chunk: Some(300), ..RoomSettings::default() };
         check(builder.name(), &room::time(&gpu, rates, &settings, &never).unwrap());
     }
-    let scene = scene("cornell-spheres");
-    let geometry = Geometry::new(&scene).unwrap();
+    let scene = scene::named("cornell-spheres");
     for illumination in BOTH {
         let settings = SceneSettings { photons: 600, caustic_photons: 500, bounces: 3, chunk: Some(400), illumination, ..by_rounds() };
-        let job = Job { name: "cornell-spheres", scene: &scene, geometry: &geometry, size: (8, 8), settings };
+        let job = Job { name: "cornell-spheres", scene: &scene, size: (8, 8), settings };
         check("cornell-spheres", &scene::time(&gpu, rates, &job, &never).unwrap());
     }
 }

@@ -38,8 +38,6 @@ pub mod trace;
 pub mod trial;
 mod trial_rays;
 
-use std::borrow::Cow;
-
 use glam::DVec3;
 
 pub use film::SceneFilm;
@@ -48,16 +46,12 @@ pub use on_gpu::{constants, light, light_from, modules, task};
 pub use on_several::light_on;
 
 use crate::engine::error::bound::FilmError;
-use crate::engine::{Control, run};
-use crate::error::Result;
-use crate::gpu::Gpu;
+use crate::engine::run;
 use crate::plan::scene::ScenePlan;
 use crate::plan::sensor::Sensor;
 use crate::records::Receiver;
+use crate::scene::Camera;
 use crate::scene::geometry::Geometry;
-use crate::scene::sensors::with_sensors;
-use crate::scene::{Camera, Scene};
-use crate::settings::scene::SceneSettings;
 use resources::{PhotonBuffers, SceneResources};
 
 /// What a run leaves behind: the fates are those of the global map's photons and of the caustic map's.
@@ -133,16 +127,4 @@ impl<'a> Target<'a> {
 pub fn receiver(geometry: &Geometry, (position, normal): (DVec3, DVec3)) -> Receiver {
     let normal = normal.as_vec3();
     Receiver { position: geometry.to_local(position), normal, shading_normal: normal }
-}
-
-/// Lights a scene to the end of the run, with default radii from a trial round.
-pub fn render(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, target: Target) -> Result<RunResult> {
-    let scene = &match target {
-        Target::Points(points) => with_sensors(scene, points, settings),
-        Target::Picture(..) => Cow::Borrowed(scene),
-    };
-    let geometry = Geometry::new(&scene.without(&settings.without))?;
-    let view = View { geometry: &geometry, camera: target.camera(), phases: &target.phases(&geometry) };
-    let plan = trial::plan(gpu, scene, &view, settings, target.sensor())?;
-    light(gpu, &view, plan, &mut Control::default())
 }

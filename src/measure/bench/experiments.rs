@@ -9,8 +9,8 @@ use super::scene::{self, Job, named, radius_for, survey};
 use super::{Bench, Lab, Size};
 use crate::error::Result;
 use crate::measure::compaction::{self, Map};
+use crate::render::{Prepared, PreparedScene};
 use crate::rng::Rng;
-use crate::scene::geometry::Geometry;
 use crate::settings::scene::{Illumination, SceneSettings};
 use crate::settings::{Builder, Preset, RoomSettings};
 
@@ -133,11 +133,10 @@ fn index(lab: &Lab) -> Result<Vec<Pass>> {
     let of_room = room((wanted / share) as u32)?;
 
     lab.go_on()?;
-    let (scene, geometry) = named("cornell")?;
+    let scene = named("cornell");
     let job = |photons: u32| Job {
         name: "cornell, all photons stored",
         scene: &scene,
-        geometry: &geometry,
         size: (64, 64),
         settings: SceneSettings { photons, bounces: 16, illumination: Illumination::Photons, block: Some(1), ..SceneSettings::default() },
     };
@@ -157,11 +156,10 @@ const PER_ESTIMATE: f64 = 50.0;
 fn gather(lab: &Lab) -> Result<Vec<Pass>> {
     let wanted = lab.choose(1e4, 1e5, 1e6);
     let size = lab.choose((96, 54), (480, 270), (1920, 1080));
-    let (scene, geometry) = named("cornell")?;
+    let scene = named("cornell");
     let job = |photons: u32, radius: Option<f64>, size: (u32, u32)| Job {
         name: "cornell, picture",
         scene: &scene,
-        geometry: &geometry,
         size,
         settings: SceneSettings { photons, radius, block: Some(1), ..SceneSettings::default() },
     };
@@ -170,7 +168,8 @@ fn gather(lab: &Lab) -> Result<Vec<Pass>> {
     let mut radius = None;
     for _ in 0..2 {
         let job = job(photons, radius, size);
-        radius = match (survey(lab.gpu, &job, |plan| plan.global.as_ref())?, job.plan(lab.gpu, &job.settings)?.global) {
+        let (Prepared { geometry, .. }, plan) = job.prepare(lab.gpu, &job.settings)?;
+        radius = match (survey(lab.gpu, &job, |plan| plan.global.as_ref())?, plan.global) {
             (Some(survey), Some(map)) => Some(radius_for(&geometry, &survey, map.radius * geometry.unit, PER_ESTIMATE)),
             _ => None,
         };
@@ -179,18 +178,17 @@ fn gather(lab: &Lab) -> Result<Vec<Pass>> {
 }
 
 fn cornell(lab: &Lab) -> Result<Vec<Pass>> {
-    let (scene, geometry) = named("cornell")?;
+    let scene = named("cornell");
     let photons = lab.choose(FEW, 1 << 16, 1 << 22);
     let settings = SceneSettings { photons, bounces: 16, illumination: Illumination::Photons, block: Some(1), ..SceneSettings::default() };
-    let job = Job { name: "cornell, photons alone", scene: &scene, geometry: &geometry, size: lab.image_size(), settings };
+    let job = Job { name: "cornell, photons alone", scene: &scene, size: lab.image_size(), settings };
     by_two_builders(lab, &job)
 }
 
 fn mesh(lab: &Lab) -> Result<Vec<Pass>> {
-    let scene = ball_room(lab.choose(2_500, 25_000, 250_000));
-    let geometry = Geometry::new(&scene)?;
+    let scene = PreparedScene::new(ball_room(lab.choose(2_500, 25_000, 250_000)));
     let settings = SceneSettings { photons: lab.choose(FEW, 1 << 16, 1 << 21), block: Some(1), ..SceneSettings::default() };
-    by_two_builders(lab, &Job { name: BALL_ROOM, scene: &scene, geometry: &geometry, size: lab.image_size(), settings })
+    by_two_builders(lab, &Job { name: BALL_ROOM, scene: &scene, size: lab.image_size(), settings })
 }
 
 fn by_two_builders(lab: &Lab, job: &Job) -> Result<Vec<Pass>> {

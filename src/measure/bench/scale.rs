@@ -10,8 +10,8 @@ use super::room::{self, DROPPED};
 use super::scene::{self, Job};
 use crate::error::Result;
 use crate::measure::line_fit::LineFit;
+use crate::render::{Observer, PreparedScene};
 use crate::rng::Rng;
-use crate::scene::geometry::Geometry;
 use crate::scene::{Mesh, Scene, built_in};
 use crate::settings::scene::SceneSettings;
 use crate::settings::{Builder, RoomSettings};
@@ -178,15 +178,14 @@ fn of_photons(lab: &Lab, size: u64) -> Result<Step> {
 }
 
 fn of_triangles(lab: &Lab, size: u64) -> Result<Step> {
-    let scene = ball_room(size as u32);
-    let geometry = Geometry::new(&scene)?;
+    let scene = PreparedScene::new(ball_room(size as u32));
     let settings = SceneSettings { photons: lab.choose(1 << 12, 1 << 15, 1 << 20), block: Some(1), ..SceneSettings::default() };
-    let job = Job { name: BALL_ROOM, scene: &scene, geometry: &geometry, size: lab.image_size(), settings };
+    let job = Job { name: BALL_ROOM, scene: &scene, size: lab.image_size(), settings };
     let timed = scene::time(lab.gpu, &lab.rates, &job, lab.cancelled)?;
     let shown = ["visible points", "global/trace", "global/index", "global/gather"];
     let passes = timed.passes.iter().filter(|pass| shown.contains(&pass.name.as_str()));
     Ok(Step {
-        size: geometry.triangles.len() as u64,
+        size: scene.geometry(&Observer::default())?.triangles.len() as u64,
         passes: passes.map(|pass| PassTime { pass: pass.name.clone(), ms: pass.ms }).collect(),
         peak_bytes: timed.memory.peak_device_bytes,
         stated_bytes: timed.stated_bytes,

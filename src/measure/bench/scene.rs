@@ -10,49 +10,39 @@ use super::pass::{Cost, SLOW_OPERATION, Work, bytes, scan_dispatches};
 use super::rates::{PHILOX_PRODUCTS, Rates};
 use super::room::{Counts, DROPPED, REPEATS, Timed};
 use crate::engine::scene::resources::SceneResources;
-use crate::engine::scene::{self, Round, RunResult, View, points, trace};
+use crate::engine::scene::{self, Round, Target, points, trace};
 use crate::engine::{self, Control};
 use crate::error::Result;
 use crate::gpu::{Commands, Gpu};
 use crate::photon::MapPhoton;
 use crate::plan::film::BiasPlan;
 use crate::plan::scene::{MapPlan, ScenePlan};
-use crate::plan::sensor::Sensor;
 use crate::records::{LightPath, VisiblePoint};
+use crate::render::{Prepared, PreparedScene};
+use crate::scene::built_in;
 use crate::scene::geometry::Geometry;
-use crate::scene::{Scene, built_in};
 use crate::settings::Builder;
 use crate::settings::scene::{Effect, SceneSettings};
 
-/// A built-in scene, and its geometry.
-pub fn named(name: &str) -> Result<(Scene, Geometry)> {
-    let scene = built_in::by_name(name).expect("it is built in");
-    let geometry = Geometry::new(&scene)?;
-    Ok((scene, geometry))
+/// A built-in scene.
+pub fn named(name: &str) -> PreparedScene {
+    PreparedScene::new(built_in::by_name(name).expect("it is built in"))
 }
 
 /// A scene, what looks at it, and how.
 pub struct Job<'a> {
     pub name: &'a str,
-    pub scene: &'a Scene,
-    pub geometry: &'a Geometry,
+    pub scene: &'a PreparedScene,
     pub size: (u32, u32),
     pub settings: SceneSettings,
 }
 
 impl Job<'_> {
-    pub fn plan(&self, gpu: &Gpu, settings: &SceneSettings) -> Result<ScenePlan> {
-        let (width, height) = self.size;
-        let sensor = Sensor::Picture { width, height };
-        ScenePlan::new(self.scene, self.geometry, settings, sensor, &engine::limits(gpu.facts()))
-    }
-
-    /// A run to its end.
-    pub fn light(&self, gpu: &Gpu, settings: SceneSettings, cancelled: &AtomicBool) -> Result<RunResult> {
-        let plan = self.plan(gpu, &settings)?;
-        let camera = self.scene.first_camera();
-        let view = View { geometry: self.geometry, camera: Some(&camera), phases: &[] };
-        scene::light(gpu, &view, plan, &mut Control::quiet(cancelled))?.finished()
+    /// What the first camera sees, and how that is found without a trial round: radii are those by the scene's area.
+    pub fn prepare(&self, gpu: &Gpu, settings: &SceneSettings) -> Result<(Prepared, ScenePlan)> {
+        let prepared = self.scene.prepare_with(settings, Target::Picture(&self.scene.scene.first_camera(), self.size.into()))?;
+        let plan = prepared.plan_within(&engine::limits(gpu.facts()))?;
+        Ok((prepared, plan))
     }
 }
 
@@ -66,15 +56,16 @@ pub struct Survey {
     pub asking_points: f64,
 }
 
-/// Traces the first round's photons of a map and looks at it from the host.
+/// Traces the first round's photons of a map and looks at it from the host: it reads buffers that a run keeps to itself.
 pub fn survey(gpu: &Gpu, job: &Job, map: impl Fn(&ScenePlan) -> Option<&MapPlan>) -> Result<Option<Survey>> {
-    let plan = job.plan(gpu, &job.settings)?;
+    let (prepared, plan) = job.prepare(gpu, &job.settings)?;
+    let geometry = &*prepared.geometry;
     let Some(map) = map(&plan) else { return Ok(None) };
     let mut commands = Commands::new(gpu, scene::constants(&plan), Instant::now())?;
-    let resources = SceneResources::new(&mut commands, job.geometry, &plan, &[])?;
-    let round = Round { resources: &resources, geometry: job.geometry, plan: &plan, number: 0 };
+    let resources = SceneResources::new(&mut commands, geometry, &plan, &[])?;
+    let round = Round { resources: &resources, geometry, plan: &plan, number: 0 };
     let buffers = round.photons();
-    points::see(&mut commands, round, Some(&job.scene.first_camera()))?;
+    points::see(&mut commands, round, prepared.camera.as_ref())?;
     let seen = commands.read(&resources.visible_points, plan.visible_points() as usize)?;
     let asking: Vec<VisiblePoint> = seen.into_iter().filter(|point| point.arrivals & map.stored != 0).collect();
     let step = (asking.len() / SAMPLES).max(1);
@@ -116,15 +107,16 @@ pub fn time(gpu: &Gpu, rates: &Rates, job: &Job, cancelled: &AtomicBool) -> Resu
 const RUNS: u32 = 3;
 
 fn time_once(gpu: &Gpu, rates: &Rates, job: &Job, cancelled: &AtomicBool) -> Result<Timed> {
-    let run = |rounds: u32| job.light(gpu, SceneSettings { alpha: 1.0, rounds, ..job.settings.clone() }, cancelled);
     let rounds = DROPPED + REPEATS;
+    let (prepared, plan) = job.prepare(gpu, &SceneSettings { alpha: 1.0, rounds, ..job.settings.clone() })?;
     gpu.forget_peaks();
-    let lit = run(rounds)?;
+    let lit = prepared.light(gpu, plan, &mut Control::quiet(cancelled))?.finished()?;
     let memory = gpu.held_memory();
     let surveys = [survey(gpu, job, |plan| plan.global.as_ref())?, survey(gpu, job, |plan| plan.caustic.as_ref())?];
     let counts = [0, 1].map(|map: usize| Counts::of(&lit.fates[map], rounds));
-    let model = Model { job, plan: &lit.plan, counts, surveys };
-    let workload = format!("{}, {}, {} triangles", job.name, lit.plan.builder().name(), job.geometry.triangles.len());
+    let triangles = prepared.geometry.triangles.len();
+    let model = Model { triangles, plan: &lit.plan, counts, surveys };
+    let workload = format!("{}, {}, {} triangles", job.name, lit.plan.builder().name(), triangles);
     let timed = Timed::of(&lit, (rounds, DROPPED), &workload, rates, |pass| model.work(pass), memory);
     Ok(Timed { stated_bytes: lit.plan.bytes, ..timed })
 }
@@ -145,7 +137,7 @@ const CUT_OPERATIONS: f64 = 2.0 * SLOW_OPERATION + 20.0;
 const WEIGH_OPERATIONS: f64 = 4.0 * SLOW_OPERATION + 20.0;
 
 struct Model<'a> {
-    job: &'a Job<'a>,
+    triangles: usize,
     plan: &'a ScenePlan,
     /// Of the global map and of the caustic map.
     counts: [Counts; 2],
@@ -155,7 +147,7 @@ struct Model<'a> {
 impl Model<'_> {
     /// A ray that meets one leaf of a hierarchy as full as can be; nodes and triangles are taken to stay in caches.
     fn ray_operations(&self) -> f64 {
-        let triangles = self.job.geometry.triangles.len() as f64;
+        let triangles = self.triangles as f64;
         if !self.plan.keeps(Effect::Bvh) {
             return triangles * TRIANGLE_OPERATIONS;
         }

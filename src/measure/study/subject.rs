@@ -7,29 +7,27 @@ use std::time::{Duration, Instant};
 use glam::{DVec3, Vec3};
 
 use super::Request;
-use super::axes::{self, Configuration, Group, Line};
+use super::axes::{self, Configuration, Group};
 use super::point::Shot;
 use super::reference::{Reference, wall_points};
 use crate::engine::room::{self, film::estimate_walls};
 use crate::engine::run::watch::End;
-use crate::engine::scene::{self, RunResult, Target, View};
+use crate::engine::scene::{RunResult, Target};
 use crate::engine::{self, Control};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::ledger::Ledger;
 use crate::output::colour::ColourPicture;
-use crate::output::command;
 use crate::output::image::view_of_values;
-use crate::plan::scene::ScenePlan;
-use crate::plan::sensor::Sensor;
-use crate::plan::work_division::Free;
-use crate::scene::geometry::Geometry;
+use crate::render::image::command_line;
+use crate::render::values::Variant;
+use crate::render::{Observer, Percent, PreparedScene, RenderRequest};
 use crate::scene::open_box::open_box;
+use crate::scene::picture_size::PictureSize;
 use crate::scene::{Camera, Light, Mesh, Scene};
 use crate::settings::scene::{Effect, SceneSettings};
 use crate::settings::stop::Stop;
-use crate::settings::{Builder, Preset, RoomSettings};
-use crate::text::quoted;
+use crate::settings::{Builder, RoomSettings};
 use crate::timings::Timings;
 use crate::verify::judge::radiosity::inward;
 
@@ -37,9 +35,7 @@ pub struct Subject {
     pub quantity: String,
     pub reference: Reference,
     pub groups: Vec<Group>,
-    scene: Scene,
-    /// Of the scene as it is.
-    geometry: Rc<Geometry>,
+    scene: Rc<PreparedScene>,
     camera: Option<Camera>,
     /// Points and normals, where no camera looks.
     receivers: Vec<(DVec3, DVec3)>,
@@ -47,9 +43,8 @@ pub struct Subject {
     side: u32,
     /// Of the camera's picture.
     pixels: [u32; 2],
-    /// The scene as the user named it, and options of its light and its camera.
-    name: String,
-    view: Vec<String>,
+    /// The scene as the user named it, its light and its camera.
+    view: RenderRequest,
 }
 
 /// What a pilot has chosen for an error.
@@ -79,21 +74,23 @@ impl Subject {
     /// Quantities of a scene; making their references may take a while.
     pub fn all(gpu: &Gpu, scene: &Scene, request: &Request, cancelled: &AtomicBool, tell: &mut dyn FnMut(&str)) -> Result<Vec<Subject>> {
         let Request { scene: name, size, photons, reference_samples, .. } = request.clone();
-        let geometry = Rc::new(Geometry::new(scene)?);
+        let view = RenderRequest::of_words(&request.view).expect("they are options of a request");
+        let view = RenderRequest { scene: name.clone(), ..view };
+        let prepared = Rc::new(PreparedScene::new(scene.clone()));
+        // Fails before references are made, which takes long.
+        prepared.geometry(&Observer::default())?;
         let camera = scene.first_camera();
         let pixels = pixels_of(&camera, size);
         let subject = |quantity: &str, reference: &Reference, groups, (camera, receivers)| Subject {
             quantity: quantity.to_owned(),
             reference: reference.clone(),
             groups,
-            scene: scene.clone(),
-            geometry: geometry.clone(),
+            scene: prepared.clone(),
             camera,
             receivers,
             side: size,
             pixels,
-            name: name.clone(),
-            view: request.view.clone(),
+            view: view.clone(),
         };
         let has_known_light = name == "open-box" || Reference::floor(&name, size).is_some();
         if let Some(option) = request.view.first().filter(|_| has_known_light) {
@@ -101,7 +98,7 @@ impl Subject {
                 format!("cannot be studied with {option}: its reference is of its own light; leave that out, or name another scene");
             return Err(Error::setting("SCENE", &name, allowed));
         }
-        let of_scene = |is_picture: bool| scene_axes(gpu, scene, &geometry, request, is_picture.then_some(pixels));
+        let of_scene = |is_picture: bool| scene_axes(gpu, &prepared, &view, request, is_picture.then_some(pixels));
         if name == "open-box" {
             tell("reference: radiosity of the box");
             let reference = Reference::walls(&RoomSettings::default(), size)?;
@@ -124,7 +121,7 @@ impl Subject {
         let reference = if unknown_to_paths(scene) {
             tell("reference: a long run of photonmill itself, as path tracing cannot find the caustics of lights without a surface");
             let seconds = (request.budget / OF_OWN_REFERENCE).as_secs_f64();
-            own_reference(gpu, scene, &geometry, &camera, pixels, seconds, cancelled)?
+            own_reference(gpu, &prepared, &camera, pixels, seconds, cancelled)?
         } else {
             tell(&format!(
                 "reference: path tracing of {width} x {height} pixels, {reference_samples} samples per pixel, unless it is in the cache"
@@ -141,33 +138,28 @@ impl Subject {
 
     /// What repeats a run.
     pub fn command(&self, configuration: &Configuration, rounds: u32, seed: u64) -> String {
-        match &configuration.line {
-            Line::Paper(settings) => {
-                let job = command::main_job(Preset::Modified, &RoomSettings { rounds, seed, ..settings.clone() });
-                let warm_up = if settings.builder == Builder::Cpu { "" } else { WARM_UP };
-                format!("{job} --irradiance irradiance{warm_up}")
-            }
-            Line::Scene(settings) => {
-                let settings = SceneSettings { rounds, seed, ..settings.clone() };
-                command::on_scene(&self.job(), &settings) + WARM_UP
-            }
+        let request = configuration.request_of(rounds, seed).brief();
+        if !configuration.is_of_paper() {
+            return self.command_of(request);
         }
+        let others: &[&str] = &["--irradiance", "irradiance", WARM_UP];
+        // The CPU needs no warm-up.
+        let is_on_cpu = request.variant == Some(Variant::Of(Builder::Cpu));
+        command_line("", &request, if is_on_cpu { &others[..2] } else { others })
     }
 
-    fn job(&self) -> String {
+    fn command_of(&self, request: RenderRequest) -> String {
         let [width, height] = self.pixels;
+        let size = Some(PictureSize::WidthAndHeight(width, height));
         match self.camera {
-            Some(_) => {
-                let words: Vec<String> = [&self.name].into_iter().chain(&self.view).cloned().map(quoted).collect();
-                format!("render {} --size {width}x{height} -o picture.exr", words.join(" "))
-            }
-            None => format!("probe {} --points {POINTS} -o irradiance.csv", quoted(self.name.clone())),
+            Some(_) => command_line("render", &RenderRequest { size, ..request }, &["-o", "picture.exr", WARM_UP]),
+            None => command_line("probe", &request, &["--points", POINTS, "-o", "irradiance.csv", WARM_UP]),
         }
     }
 
     /// What repeats a run with nothing set but its error.
     pub fn command_to(&self, error: f64, seed: u64) -> String {
-        format!("photonmill {} --error {}% --seed {seed}{WARM_UP}", self.job(), 100.0 * error)
+        self.command_of(RenderRequest { error: Some(Percent::of_share(error)), seed: Some(seed), ..self.view.clone() })
     }
 
     /// What a pilot chooses for an error.
@@ -175,11 +167,7 @@ impl Subject {
         let began = Instant::now();
         let stop = Stop { error: Some(error), ..Stop::default() };
         let settings = SceneSettings { rounds: MOST_ROUNDS, stop, ..SceneSettings::default() };
-        let target = self.target();
-        let view = View { geometry: &self.geometry, camera: target.camera(), phases: &target.phases(&self.geometry) };
-        let plan = scene::trial::plan(gpu, &self.scene, &view, &settings, target.sensor())?;
-        let free = Free { samples: self.camera.is_some(), ..Free::ALL };
-        let pilot = scene::pilot::choose(gpu, &self.scene, &view, &plan, free, cancelled)?;
+        let pilot = self.scene.prepare_with(&settings, self.target())?.choose(gpu, cancelled)?;
         let expected = pilot.as_ref().map_or(0.0, |pilot| 1e-9 * pilot.rounds.until(pilot.chosen, error).1);
         Ok(Chosen {
             gpu_ms: pilot.as_ref().map_or(0.0, |pilot| pilot.spent),
@@ -199,7 +187,7 @@ impl Subject {
         cancelled: &AtomicBool,
     ) -> Result<Option<(Shot, u32)>> {
         let stop = Stop { seconds: Some(most.as_secs_f64()), ..chosen.settings.stop };
-        let lit = self.light(gpu, SceneSettings { seed, stop, ..chosen.settings.clone() }, &mut Control::quiet(cancelled))?;
+        let lit = self.light(gpu, &SceneSettings { seed, stop, ..chosen.settings.clone() }, &mut Control::quiet(cancelled))?;
         if cancelled.load(Ordering::Relaxed) {
             return Err(Error::Interrupted);
         }
@@ -220,7 +208,7 @@ impl Subject {
             let pixels = values.chunks(3).map(|pixel| DVec3::from_slice(pixel).as_vec3()).collect();
             return ColourPicture { width, height, pixels };
         }
-        if self.name == "open-box" {
+        if self.view.scene == "open-box" {
             let room = open_box(&RoomSettings::default());
             let per_wall = (self.side * self.side) as usize;
             let walls: Vec<(usize, &[f64])> = room.walls().map(|(face, _)| face).zip(values.chunks(per_wall)).collect();
@@ -243,25 +231,22 @@ impl Subject {
 
     /// Whether it is lit by the paper's line.
     pub fn is_of_paper(&self) -> bool {
-        self.groups.iter().flat_map(|group| &group.configurations).any(|configuration| matches!(configuration.line, Line::Paper(_)))
+        self.groups.iter().flat_map(|group| &group.configurations).any(Configuration::is_of_paper)
     }
 
     /// One run.
     pub fn run(&self, gpu: &Gpu, configuration: &Configuration, rounds: u32, seed: u64, cancelled: &AtomicBool) -> Result<Shot> {
         let mut control = Control::quiet(cancelled);
-        let shot = match &configuration.line {
-            Line::Paper(settings) => {
-                let settings = RoomSettings { rounds, seed, ..settings.clone() };
-                let room = open_box(&settings);
-                let outcome = room::run(Some(gpu), &room, &settings, &mut control)?;
-                let walls = estimate_walls(&outcome.film, &room, &outcome.plan);
-                let values = walls.into_iter().flat_map(|wall| wall.irradiance).collect();
-                shot(values, &outcome.timings, outcome.ledger())
-            }
-            Line::Scene(settings) => {
-                let settings = SceneSettings { rounds, seed, ..settings.clone() };
-                self.shot_of(&self.light(gpu, settings, &mut control)?)
-            }
+        let request = configuration.request_of(rounds, seed);
+        let shot = if configuration.is_of_paper() {
+            let settings = request.room_settings();
+            let room = open_box(&settings);
+            let outcome = room::run(Some(gpu), &room, &settings, &mut control)?;
+            let walls = estimate_walls(&outcome.film, &room, &outcome.plan);
+            let values = walls.into_iter().flat_map(|wall| wall.irradiance).collect();
+            shot(values, &outcome.timings, outcome.ledger())
+        } else {
+            self.shot_of(&self.light(gpu, &request.settings(None), &mut control)?)
         };
         if cancelled.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(shot) }
     }
@@ -278,15 +263,9 @@ impl Subject {
         self.camera.as_ref().map_or(Target::Points(&self.receivers), |camera| Target::Picture(camera, self.pixels))
     }
 
-    fn light(&self, gpu: &Gpu, settings: SceneSettings, control: &mut Control) -> Result<RunResult> {
-        let geometry = match settings.without.as_slice() {
-            [] => self.geometry.clone(),
-            without => Rc::new(Geometry::new(&self.scene.without(without))?),
-        };
-        let target = self.target();
-        let view = View { geometry: &geometry, camera: target.camera(), phases: &target.phases(&geometry) };
-        let plan = scene::trial::plan(gpu, &self.scene, &view, &settings, target.sensor())?;
-        scene::light(gpu, &view, plan, control)
+    fn light(&self, gpu: &Gpu, settings: &SceneSettings, control: &mut Control) -> Result<RunResult> {
+        let prepared = self.scene.prepare_with(settings, self.target())?;
+        prepared.light(gpu, prepared.plan_on(gpu, settings)?, control)
     }
 }
 
@@ -301,8 +280,7 @@ fn unknown_to_paths(scene: &Scene) -> bool {
 /// A reference by photonmill itself, where no other method has one: with other random numbers than any run that it judges.
 fn own_reference(
     gpu: &Gpu,
-    scene: &Scene,
-    geometry: &Geometry,
+    scene: &PreparedScene,
     camera: &Camera,
     pixels: [u32; 2],
     seconds: f64,
@@ -310,13 +288,9 @@ fn own_reference(
 ) -> Result<Reference> {
     let stop = Stop { seconds: Some(seconds), ..Stop::default() };
     let settings = SceneSettings { rounds: MOST_ROUNDS, stop, seed: OWN_SEED, ..SceneSettings::default() };
-    let target = Target::Picture(camera, pixels);
-    let view = View { geometry, camera: target.camera(), phases: &[] };
-    let plan = scene::trial::plan(gpu, scene, &view, &settings, target.sensor())?;
-    let chosen =
-        scene::pilot::choose(gpu, scene, &view, &plan, Free::ALL, cancelled)?.map_or(settings.clone(), |pilot| pilot.set(&settings));
-    let plan = scene::trial::plan(gpu, scene, &view, &chosen, target.sensor())?;
-    let lit = scene::light(gpu, &view, plan, &mut Control::quiet(cancelled))?.finished()?;
+    let prepared = scene.prepare_with(&settings, Target::Picture(camera, pixels))?;
+    let chosen = prepared.choose(gpu, cancelled)?.map_or(settings.clone(), |pilot| pilot.set(&settings));
+    let lit = prepared.light(gpu, prepared.plan_on(gpu, &chosen)?, &mut Control::quiet(cancelled))?.finished()?;
     let (film, error) = (&lit.film, lit.error());
     let all = |value: &dyn Fn(usize) -> DVec3| (0..film.pixels()).flat_map(|pixel| value(pixel).to_array()).collect::<Vec<f64>>();
     let surfaces = film.surface_means().collect::<Vec<_>>();
@@ -344,7 +318,7 @@ const BOX_VIEW: usize = 1;
 const BOX_PIXELS: u32 = 240;
 
 /// Runs of a study are timed at the clock of work.
-const WARM_UP: &str = " --warm-up";
+const WARM_UP: &str = "--warm-up";
 
 /// The file beside the page that the commands read points from.
 pub const POINTS: &str = "points.txt";
@@ -360,12 +334,12 @@ fn shot(values: Vec<f64>, timings: &Timings, ledger: Ledger) -> Shot {
     }
 }
 
-fn scene_axes(gpu: &Gpu, scene: &Scene, geometry: &Geometry, request: &Request, picture: Option<[u32; 2]>) -> Result<Vec<Group>> {
-    let settings = SceneSettings { photons: request.photons, caustic_photons: request.photons, block: Some(1), ..SceneSettings::default() };
-    let [width, height] = picture.unwrap_or([request.size; 2]);
-    let sensor = Sensor::Picture { width, height };
-    let plan = ScenePlan::new(scene, geometry, &settings, sensor, &engine::limits(gpu.facts()))?;
+fn scene_axes(gpu: &Gpu, scene: &PreparedScene, view: &RenderRequest, request: &Request, picture: Option<[u32; 2]>) -> Result<Vec<Group>> {
+    let base = RenderRequest { photons: Some(request.photons), block: Some(1), ..view.clone() };
+    let camera = scene.scene.first_camera();
+    let prepared = scene.prepare_with(&base.settings(None), Target::Picture(&camera, picture.unwrap_or([request.size; 2])))?;
+    let plan = prepared.plan_within(&engine::limits(gpu.facts()))?;
     let kept: Vec<Effect> = plan.decisions.iter().filter(|decision| decision.kept).map(|decision| decision.effect).collect();
-    let radius = plan.global.as_ref().map(|map| map.radius * geometry.unit);
-    Ok(axes::of_scene(request.photons, &kept, radius, geometry.triangles.len() <= FEW_TRIANGLES, picture.is_some()))
+    let radius = plan.global.as_ref().map(|map| map.radius * prepared.geometry.unit);
+    Ok(axes::of_scene(base, &kept, radius, prepared.geometry.triangles.len() <= FEW_TRIANGLES, picture.is_some()))
 }

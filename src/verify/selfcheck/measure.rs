@@ -3,13 +3,11 @@
 use glam::DVec3;
 
 use super::Estimate;
-use crate::engine;
-use crate::engine::Control;
-use crate::engine::scene::{self, Target, View};
+use crate::engine::scene::Target;
+use crate::engine::{self, Control};
 use crate::error::Result;
 use crate::gpu::Gpu;
-use crate::plan::scene::ScenePlan;
-use crate::scene::geometry::Geometry;
+use crate::render::PreparedScene;
 use crate::scene::{Camera, Scene};
 use crate::settings::scene::SceneSettings;
 
@@ -27,13 +25,13 @@ pub fn estimate_of(values: &[f64]) -> Estimate {
 /// Mean over all pixels or points and over seeds; the error is of the seeds' spread, since points share
 /// photons. Scenes are grey: the red channel stands for all.
 fn light(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, target: Target) -> Result<Estimate> {
-    let geometry = Geometry::new(scene)?;
-    let view = View { geometry: &geometry, camera: target.camera(), phases: &target.phases(&geometry) };
+    let mut prepared = PreparedScene::new(scene.clone()).prepare_with(settings, target)?;
+    let limits = engine::limits(gpu.facts());
     let means: Vec<f64> = (1..=SEEDS)
         .map(|seed| {
-            let settings = SceneSettings { seed, ..settings.clone() };
-            let plan = ScenePlan::new(scene, &geometry, &settings, target.sensor(), &engine::limits(gpu.facts()))?;
-            let lit = scene::light(gpu, &view, plan, &mut Control::default())?;
+            prepared.inputs.settings.seed = seed;
+            // Radii that no case gives are those by the scene's area: a trial round would make kernels of its own.
+            let lit = prepared.light(gpu, prepared.plan_within(&limits)?, &mut Control::default())?;
             let sum: f64 = lit.film.means().map(|mean| mean.x).sum();
             // What is no number makes the case fail instead of counting as dark.
             Ok(if lit.film.anomalies[..3] == [0, 0, 0] { sum / lit.film.pixels() as f64 } else { f64::NAN })
