@@ -202,60 +202,6 @@ fn mean_check(what: &str, values: impl Iterator<Item = f64>, expected: f64, devi
     z_check(what, sum / count, expected, deviation / count.sqrt())
 }
 
-/// Moments of the places on a disc and of the directions of an emission, and their lengths.
-fn emission_check(law: EmissionLaw, radius: f64, starts: &[(DVec3, DVec3)]) -> Check {
-    let squared = starts.iter().map(|(place, _)| (place.x * place.x + place.y * place.y) / (radius * radius));
-    mean_check("squared distance", squared, 0.5, 0.288_675)?;
-    // Of the cosine, of a tangent's square and of its fourth power: the mean and the mean square. Equal solid angles, and no corners of a
-    // cube.
-    let [cosine, square, fourth]: [(f64, f64); 3] = match law {
-        EmissionLaw::Uniform => [(0.5, 1.0 / 3.0), (1.0 / 3.0, 0.2), (0.2, 1.0 / 9.0)],
-        EmissionLaw::Cosine => [(2.0 / 3.0, 0.5), (0.25, 0.125), (0.125, 7.0 / 128.0)],
-    };
-    let moment = |what: &str, of: &dyn Fn(DVec3) -> f64, (mean, square): (f64, f64)| {
-        mean_check(what, starts.iter().map(|(_, direction)| of(*direction)), mean, (square - mean * mean).sqrt())
-    };
-    moment("cosine", &|d| d.z, cosine)?;
-    for axis in 0..2 {
-        moment("tangent", &|d| d[axis], (0.0, square.0))?;
-        moment("squared tangent", &|d| d[axis].powi(2), square)?;
-        moment("fourth power", &|d| d[axis].powi(4), fourth)?;
-    }
-    let is_unit = |(_, d): &(DVec3, DVec3)| require((d.length() - 1.0).abs() <= 4.0 * U, || format!("{d} is {} long", d.length()));
-    starts.iter().try_for_each(is_unit)
-}
-
-#[test]
-fn discs_and_hemispheres_have_their_moments() {
-    let gpu = device();
-    for law in [EmissionLaw::Uniform, EmissionLaw::Cosine] {
-        let of_one_bounce = RoomSettings { bounces: 1, mesh: 1, rng: Rng::Philox, ..RoomSettings::default() };
-        let settings = RoomSettings { emission: law, photons: 400_001, chunk: Some(400_001), ..of_one_bounce };
-        let scene = open_box(&settings);
-        let host = plan_for_host(&settings);
-        let range = EmissionRange { light: 0, first_photon: 0, count: 200_000 };
-        let local = |paths: Vec<Path>| -> Vec<(DVec3, DVec3)> {
-            // The floor's light: the axes after its own, then its normal.
-            let both = paths.iter().map(|path| (path.position.as_dvec3(), path.direction.as_dvec3()));
-            both.map(|(p, d)| (DVec3::new(p.z, p.x, 0.0), DVec3::new(d.z, d.x, d.y))).collect()
-        };
-        let mut starts = vec![("cpu", local(Tracer::new(&scene, &host).emit(0, &[range])))];
-        if let Some(gpu) = &gpu {
-            starts.push(("device", local(emitted(gpu, &plan_for(gpu, &scene, &settings), 0, range))));
-        }
-        for (builder, starts) in starts {
-            assert_holds(format!("{builder}, {law:?}"), emission_check(law, settings.light_radius, &starts));
-            let linear =
-                starts.iter().map(|(place, d)| (*place * place.truncate().length() / settings.light_radius, *d)).collect::<Vec<_>>();
-            assert_complains("a radius without its square root", emission_check(law, settings.light_radius, &linear));
-            let longer = starts.iter().map(|(place, d)| (*place, *d * 1.000_001)).collect::<Vec<_>>();
-            assert_complains("directions a millionth too long", emission_check(law, settings.light_radius, &longer));
-            let other = if law == EmissionLaw::Uniform { EmissionLaw::Cosine } else { EmissionLaw::Uniform };
-            assert_complains("the other law", emission_check(other, settings.light_radius, &starts));
-        }
-    }
-}
-
 /// The least and the greatest numbers that a generator gives, and those at which sine and cosine change places:
 /// every direction is a unit vector that does not point into its wall, and every flight ends inside the room.
 #[test]
