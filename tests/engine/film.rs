@@ -229,27 +229,6 @@ fn lanes_and_slices_change_no_bit_of_any_group_and_radius() {
     lanes_and_slices(&[(32, 0.05, 13), (128, 0.5, 3), (64, 0.003, 31)]);
 }
 
-/// The device's film and a film of the CPU builder's own photons: the same but for photons on the rim.
-#[test]
-fn the_cpu_builders_film_agrees_to_single_counts() {
-    let Some(gpu) = device() else { return };
-    let settings = RoomSettings::default();
-    let (device, host) = (film(&gpu, &settings), run_on_cpu(&settings).film);
-    assert_eq!((device.channel_count, device.scale), (host.channel_count, host.scale));
-    let differences: Vec<u64> = pairs(&device.sums, &host.sums).map(|(a, b)| a.abs_diff(*b)).collect();
-    let in_reach: u64 = host.sums.iter().sum();
-    assert!(differences.iter().all(|difference| *difference <= 1));
-    assert!(differences.iter().sum::<u64>() as f64 <= 2e-5 * in_reach as f64, "{} of {in_reach}", differences.iter().sum::<u64>());
-
-    // The CPU's own choices change no bit at all.
-    for (threads, gather, chunk) in
-        [(2, Gather::Grid, None), (3, Gather::Brute, None), (1, Gather::Brute, Some(777)), (2, Gather::Grid, Some(64))]
-    {
-        let other = run_on_cpu(&RoomSettings { threads, gather, chunk, ..settings.clone() }).film;
-        assert_same("cpu", &format!("{threads} threads {gather:?} chunks of {chunk:?}"), &other, &host);
-    }
-}
-
 /// A radius is inclusive, and in units of texels every number is exact, so that ties are ties.
 #[test]
 fn a_photon_on_the_rim_counts() {
