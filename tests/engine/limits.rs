@@ -10,7 +10,7 @@ use photonmill::engine::End;
 use photonmill::engine::scene::resources::SceneResources;
 use photonmill::engine::scene::{self, Round, RunResult, View, trace};
 use photonmill::output::scene_report;
-use photonmill::plan::radius::{mean_squared_radius, squared_radius};
+use photonmill::plan::radius::{mean_squared_radius, of_round, squared_radius};
 use photonmill::settings::stop::Stop;
 use photonmill::timings::Span;
 
@@ -194,8 +194,8 @@ fn photons_stored_of_all_light_are_the_length_of_the_map() {
 fn radii_take_no_sum_over_earlier_rounds() {
     for alpha in [0.1, 0.5, 2.0 / 3.0, 0.99, 1.0] {
         let (mut squared, mut sum) = (1.0, 0.0);
-        for round in 0..5000u32 {
-            let found = squared_radius(alpha, round);
+        for round in 0..10_000u32 {
+            let found = of_round(1.0, alpha, round).powi(2);
             assert!((found / squared - 1.0).abs() < 1e-9, "alpha {alpha}, round {round}: {found}, {squared}");
             sum += squared;
             let mean = mean_squared_radius(alpha, round + 1);

@@ -415,27 +415,6 @@ fn edges_and_corners_are_dark_by_what_lies_beyond_them() {
     println!("covered shares off by {worst:.1e} at most");
 }
 
-/// r_n / r_1 of the schedule with alpha = 2/3, from Gamma(n + alpha) / (Gamma(1 + alpha) n!).
-#[test]
-fn radii_of_ten_thousand_rounds_follow_the_gamma_function() {
-    let furnace = scene("furnace");
-    let settings = SceneSettings { rounds: 10_000, alpha: 2.0 / 3.0, ..furnace_settings(0.25) };
-    let plan = scene_plan_within(&Limits::of_host(), &furnace, &settings, Sensor::Receivers { count: 1 }).unwrap();
-    let map = plan.global.as_ref().unwrap();
-    // ln Gamma(n + a) - ln n! - ln Gamma(1 + a) as a product of the first terms and Stirling's series of the rest.
-    let alpha = 2.0 / 3.0;
-    let stirling =
-        |x: f64| (x - 0.5) * x.ln() - x + 0.5 * (2.0 * PI).ln() + 1.0 / (12.0 * x) - 1.0 / (360.0 * x.powi(3)) + 1.0 / (1260.0 * x.powi(5));
-    let ln_gamma = |x: f64| stirling(x + 20.0) - (0..20).map(|k| (x + f64::from(k)).ln()).sum::<f64>();
-    for (n, printed) in [(10, 0.713), (100, 0.488), (1000, 0.333), (10_000, 0.227)] {
-        let exact = (0.5 * (ln_gamma(f64::from(n) + alpha) - ln_gamma(f64::from(n) + 1.0) - ln_gamma(1.0 + alpha))).exp();
-        let found = plan.radius(map, n - 1) / map.radius;
-        assert!((exact - printed).abs() < 6e-4, "{n}: {exact}");
-        assert_holds(n, relative_check("radius", found, exact, 1e-6));
-        assert_complains("a round too early", relative_check("radius", plan.radius(map, n - 2) / map.radius, exact, 1e-6));
-    }
-}
-
 /// What a device could hold at most: buffers are ranges of 32 bits.
 fn vast() -> Limits {
     Limits {
