@@ -368,11 +368,3 @@ fn built_in_scenes_are_in_the_guide() {
         assert!(text.contains(&format!("`{name}`")), "{name}");
     }
 }
-
-/// The table of the same page is checked by `tests/light/hard_cases.rs`.
-#[test]
-fn planted_faults_are_counted() {
-    let (page, red) = (read("src/guide/hard_cases.md"), read("tests/engine/planted_faults.rs"));
-    let count = red.split_once("const FAULTS: [Fault; ").unwrap().1.split_once(']').unwrap().0;
-    assert!(page.contains(&format!("plants {count} faults")), "{count} faults are planted");
-}
