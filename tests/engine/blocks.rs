@@ -66,7 +66,9 @@ fn small(block: u32, rounds: u32) -> SceneSettings {
 }
 
 /// Of rounds of a block, samples and parts.
-fn parts_come_to_the_bits_of_one(cases: &[(u32, u32, u32)]) {
+#[test]
+fn parts_of_a_run_come_to_the_bits_of_one() {
+    let cases = of_run::<&[_]>(&[(4, 2, 2)], &[(1, 1, 5), (4, 2, 2)]);
     let Some(gpu) = device() else { return };
     for &(block, samples, of) in cases {
         let settings = SceneSettings { samples, ..small(block, 12) };
@@ -92,17 +94,6 @@ fn parts_come_to_the_bits_of_one(cases: &[(u32, u32, u32)]) {
         let (again, _) = kept(&gpu, &settings, Part { resume: Some(saved.clone()), ..Part::default() });
         assert!(again.film == whole.film && again.film.error(0.95) == whole.film.error(0.95));
     }
-}
-
-#[test]
-fn parts_of_a_run_come_to_the_bits_of_one() {
-    parts_come_to_the_bits_of_one(&[(4, 2, 2)]);
-}
-
-#[test]
-#[ignore = "long: minutes on a software device"]
-fn many_parts_of_a_run_come_to_the_bits_of_one() {
-    parts_come_to_the_bits_of_one(&[(1, 1, 5), (4, 2, 2)]);
 }
 
 /// A run that goes on looks at its error where one without a break does, at once if it was saved there.

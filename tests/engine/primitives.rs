@@ -369,7 +369,10 @@ fn indirect_dispatches_are_folded_below_the_limit() {
 }
 
 /// A full row of groups and more: photons of the folded rows are traced like the others.
-fn rounds_around_a_full_row(beyond: &[u32], builders: &[Builder]) {
+#[test]
+fn rounds_around_a_full_row_of_groups_lose_no_photon() {
+    let beyond = of_run::<&[_]>(&[33], &[0, 33]);
+    let builders = of_run::<&[_]>(&[Builder::Ballot, Builder::Persistent], &Builder::ON_GPU);
     let Some(gpu) = device() else { return };
     let row: u32 = 65_535 * 32;
     for photons in beyond.iter().map(|beyond| row + *beyond) {
@@ -386,15 +389,4 @@ fn rounds_around_a_full_row(beyond: &[u32], builders: &[Builder]) {
             assert_holds(format!("{builder:?}"), equal_sums("a folded round", &folded.film.sums, &split.film.sums));
         }
     }
-}
-
-#[test]
-fn rounds_around_a_full_row_of_groups_lose_no_photon() {
-    rounds_around_a_full_row(&[33], &[Builder::Ballot, Builder::Persistent]);
-}
-
-#[test]
-#[ignore = "long: minutes on a software device"]
-fn rounds_around_a_full_row_of_groups_lose_no_photon_of_any_builder() {
-    rounds_around_a_full_row(&[0, 33], &Builder::ON_GPU);
 }

@@ -183,7 +183,9 @@ fn several_devices_come_to_the_bits_of_one() {
 }
 
 /// Which one fails after how many rounds, and how many there are.
-fn failing_devices_are_given_up(cases: &[((usize, u64), usize)]) {
+#[test]
+fn a_device_that_fails_is_given_up() {
+    let cases = of_run::<&[_]>(&[((0, 8), 2)], &[((0, 8), 2), ((2, 2), 3)]);
     let Some(_) = device() else { return };
     let room = room();
     let expected = alone(&room, &settings());
@@ -194,17 +196,6 @@ fn failing_devices_are_given_up(cases: &[((usize, u64), usize)]) {
     }
     let Err(error) = shared(&room, 1, &settings(), Trouble { fails: Some((0, 2)), ..Trouble::default() }) else { panic!("none is left") };
     assert!(matches!(error, Error::Device { .. }), "{error}");
-}
-
-#[test]
-fn a_device_that_fails_is_given_up() {
-    failing_devices_are_given_up(&[((0, 8), 2)]);
-}
-
-#[test]
-#[ignore = "long: minutes on a software device"]
-fn a_device_of_several_that_fails_is_given_up() {
-    failing_devices_are_given_up(&[((0, 8), 2), ((2, 2), 3)]);
 }
 
 /// What was done when a run was ended goes on, on one device or several, to the same end.
