@@ -461,7 +461,9 @@ fn two_hundred_random_rooms_are_right_within_their_errors() {
 }
 
 /// Where every wall emits what it does not scatter, light is pi everywhere, behind boxes too.
-fn cavities_are_even(seeds: &[u64]) {
+#[test]
+fn radiosity_of_a_cavity_is_even() {
+    let seeds = of_run::<&[_]>(&[9], &[0, 9]);
     for seed in seeds {
         let mut room = rooms(*seed).remove(0);
         room.rectangles.iter_mut().for_each(|side| side.emission = DVec3::ONE - side.albedo);
@@ -470,17 +472,6 @@ fn cavities_are_even(seeds: &[u64]) {
         let off = |by: f64| expected.iter().any(|[light, error]| (*light - by * PI).abs().cmpgt(2.0 * *error).any());
         assert!(!off(1.0) && off(1.05), "seed {seed}: {expected:?}");
     }
-}
-
-#[test]
-fn radiosity_of_a_cavity_is_even() {
-    cavities_are_even(&[9]);
-}
-
-#[test]
-#[ignore = "long: with the other tests of the reference"]
-fn radiosity_of_cavities_is_even() {
-    cavities_are_even(&[0, 9]);
 }
 
 /// Of patches half as large light is the same within the error that is taken for it at three points of four, and
