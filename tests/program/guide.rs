@@ -199,16 +199,7 @@ fn place_with_inputs() -> Place {
 
 #[test]
 fn commands_of_readme_and_guide_run() {
-    run_commands(false);
-}
-
-#[test]
-#[ignore = "long: half a minute on a software device"]
-fn all_commands_of_readme_and_guide_run() {
-    run_commands(true);
-}
-
-fn run_commands(all: bool) {
+    let all = is_long_run();
     let Some(_) = device() else { return };
     let place = place_with_inputs();
     let texts: Vec<(String, Vec<String>)> = all_texts().into_iter().map(|(path, text)| (path, commands(&text))).collect();
