@@ -1,17 +1,17 @@
 //! Files as nobody would write them. Whatever the loader takes must become records and a plan: no panic, no
 //! endless loop, no memory without bound, no number that is none.
 
-use std::fmt::Debug;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::Path;
 use std::process::Command;
 use std::sync::atomic::AtomicBool;
 use std::sync::mpsc;
 use std::time::Duration;
 
-use glam::{DVec4, Vec3};
+use crate::common::gltf_file::{self, data_uri, encoded, floats, set_buffer};
+use crate::common::prelude::*;
+use crate::common::rich_file;
+use crate::fuzz::change::{Random, change, pack, parts};
 use image::{ImageFormat, RgbImage};
-use photonmill::engine::Control;
 use photonmill::engine::error::differences::Differences;
 use photonmill::engine::film::{BlockSums, LatestBlocks};
 use photonmill::engine::room;
@@ -21,25 +21,13 @@ use photonmill::engine::scene::map_file::{MapFile, MapWriter};
 use photonmill::engine::watch::{Keep, SaveRun};
 use photonmill::ledger::Fates;
 use photonmill::output::merge_report;
-use photonmill::photon::MapPhoton;
 use photonmill::plan::differences::difference_count;
-use photonmill::plan::scene::ScenePlan;
-use photonmill::plan::sensor::Sensor;
-use photonmill::plan::{Limits, RoomPlan, photons_of};
-use photonmill::rng::Rng;
-use photonmill::scene::geometry::Geometry;
+use photonmill::plan::photons_of;
+use photonmill::scene::Reading;
 use photonmill::scene::material::Layers;
-use photonmill::scene::open_box::open_box;
 use photonmill::scene::sky::Sky;
-use photonmill::scene::{Material, Reading, Scene, built_in};
-use photonmill::settings::scene::SceneSettings;
-use photonmill::settings::{Builder, RoomSettings};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
-
-use crate::common::gltf_file::{self, data_uri, encoded, floats, set_buffer};
-use crate::common::rich_file;
-use crate::fuzz::change::{Random, change, pack, parts};
 
 const BLENDER: &[u8] = include_bytes!("../scenes/blender.glb");
 /// The same mutations each time; `tools/fuzz/run` goes on with others for as long as it is let.
