@@ -2,6 +2,7 @@
 //! the plain way to do it on the host.
 
 use crate::common::prelude::*;
+use crate::fuzz::change::Random;
 use bytemuck::Zeroable;
 use photonmill::constants::{NO_WALL, SCAN_ITEMS};
 use photonmill::engine::prefix_sum::scan;
@@ -15,10 +16,10 @@ use photonmill::records::{DispatchArgs, DispatchSizePush, Tally};
 /// Words that nothing may touch. As an entry of the photon map they are a photon on some wall.
 const GUARD: u32 = 0x5EAD_BEEF;
 
-/// Numbers of a linear congruential generator, 0 to `below` - 1.
+/// Numbers by chance, 0 to `below` - 1.
 fn numbers(count: usize, below: u32) -> Vec<u32> {
-    let step = |state: &u64| Some(state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407));
-    std::iter::successors(Some(12_345u64), step).skip(1).take(count).map(|state| (state >> 33) as u32 % below).collect()
+    let mut random = Random(12_345);
+    (0..count).map(|_| random.below(below as usize) as u32).collect()
 }
 
 /// Fails unless the device's exclusive prefix sums are the running sums, and it leaves alone what stands behind them in the same buffer.
