@@ -1,6 +1,7 @@
 //! Files of runs and of photons, small and made without a device: what fuzzing begins with.
 
 use std::fs::File;
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -31,8 +32,6 @@ use photonmill::scene::{Scene, Surface, built_in};
 use photonmill::settings::scene::SceneSettings;
 use photonmill::settings::{Builder, RoomSettings};
 
-use super::file;
-
 /// Keeps what a run saves last.
 struct Latest(Option<SavedRun>);
 
@@ -61,7 +60,7 @@ pub fn scene() -> (Scene, Geometry) {
 }
 
 /// A part of eight blocks of a picture of four pixels, as far as what it holds must fit.
-fn part_of_picture(share: Share, keeps_parts: bool) -> SavedRun {
+pub fn part_of_picture(share: Share, keeps_parts: bool) -> SavedRun {
     let ((scene, geometry), settings) = (scene(), SceneSettings { keeps_parts, ..SceneSettings::default() });
     let sensor = Sensor::Picture { width: 2, height: 2 };
     let plan = ScenePlan::new(&scene, &geometry, &settings, sensor, &Limits::of_host()).expect("it can be planned").film;
@@ -112,13 +111,13 @@ pub fn runs() -> Vec<Vec<u8>> {
 }
 
 /// A file of photons of two rounds.
-pub fn photon_map() -> Vec<u8> {
-    let ((scene, geometry), path) = (scene(), file("seed.pm"));
+pub fn photon_map(path: &Path) -> Vec<u8> {
+    let (scene, geometry) = scene();
     let settings = SceneSettings { photons: 4, caustic_photons: 4, bounces: 3, ..SceneSettings::default() };
     let sensor = Sensor::Picture { width: 2, height: 2 };
     let plan = ScenePlan::new(&scene, &geometry, &settings, sensor, &Limits::of_host()).expect("it can be planned");
     let write = || {
-        let mut file = File::create(&path)?;
+        let mut file = File::create(path)?;
         let mut writer = MapWriter::new(&mut file, &scene.name, &geometry, &plan, "none")?;
         for _ in 0..2 {
             // As many as no other map has.
@@ -133,7 +132,7 @@ pub fn photon_map() -> Vec<u8> {
             writer.end_round();
         }
         writer.finish()?;
-        std::fs::read(&path)
+        std::fs::read(path)
     };
     write().expect("the file can be written")
 }
