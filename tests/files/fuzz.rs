@@ -6,7 +6,7 @@ use std::process::Command;
 use std::sync::mpsc;
 use std::time::Duration;
 
-use crate::common::gltf_file::{self, data_uri, encoded, floats, set_buffer};
+use crate::common::gltf_file::{self, data_uri, encoded, floats, push, set_buffer};
 use crate::common::prelude::*;
 use crate::common::rich_file;
 use crate::fuzz::change::{Random, change, parts};
@@ -108,10 +108,9 @@ fn square_with(coordinates: [f32; 8]) -> Value {
     bytes.extend(floats(&[0.6, 0.8, 0.0, 1.0].repeat(4)));
     let mut value = gltf_file::square();
     set_buffer(&mut value, &bytes);
-    let add = |list: &mut Value, item: Value| list.as_array_mut().unwrap().push(item);
     value["nodes"][3]["rotation"] = json!([0, 0.6, 0, 0.8]);
     value["meshes"][0]["primitives"][0]["mode"] = json!(4);
-    add(&mut value["meshes"][0]["primitives"], json!({"attributes": {"POSITION": 0, "TEXCOORD_1": 2}, "material": 1, "mode": 5}));
+    push(&mut value["meshes"][0]["primitives"], json!({"attributes": {"POSITION": 0, "TEXCOORD_1": 2}, "material": 1, "mode": 5}));
     let turned = json!({"index": 0, "extensions": {"KHR_texture_transform": {"offset": [0, 1], "rotation": 0.5, "scale": [2, 1]}}});
     let glow = &mut value["materials"][0];
     glow["emissiveTexture"] = json!({"index": 0});
@@ -125,7 +124,7 @@ fn square_with(coordinates: [f32; 8]) -> Value {
     glow["extensions"]["KHR_materials_diffuse_transmission"] =
         json!({"diffuseTransmissionFactor": 1, "diffuseTransmissionColorTexture": {"index": 0}});
     glow["extensions"]["KHR_materials_sheen"] = json!({"sheenColorFactor": [1, 0, 0.5], "sheenRoughnessTexture": turned});
-    add(
+    push(
         &mut value["materials"],
         json!({"name": "glass", "doubleSided": true, "alphaMode": "MASK", "alphaCutoff": 0.25, "extensions": {
             "KHR_materials_ior": {"ior": 1.5}, "KHR_materials_dispersion": {"dispersion": 1000}, "KHR_materials_transmission": {"transmissionFactor": 1},
@@ -133,24 +132,24 @@ fn square_with(coordinates: [f32; 8]) -> Value {
             "KHR_materials_specular": {"specularFactor": 0.5, "specularColorTexture": {"index": 0}}},
          "pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "texCoord": 1}, "roughnessFactor": 0.3}}),
     );
-    add(
+    push(
         &mut value["materials"],
         json!({"name": "old", "extensions": {"KHR_materials_pbrSpecularGlossiness": {
             "diffuseFactor": [1, 1, 1, 1], "specularGlossinessTexture": {"index": 0}, "glossinessFactor": 0.5}}}),
     );
-    add(&mut value["materials"], json!({"name": "sign", "extensions": {"KHR_materials_unlit": {}}}));
+    push(&mut value["materials"], json!({"name": "sign", "extensions": {"KHR_materials_unlit": {}}}));
     for material in [2, 3] {
-        add(&mut value["meshes"][0]["primitives"], json!({"attributes": {"POSITION": 0}, "material": material, "mode": 5}));
+        push(&mut value["meshes"][0]["primitives"], json!({"attributes": {"POSITION": 0}, "material": material, "mode": 5}));
     }
     // Tangents are colours as well.
     let attributes = &mut value["meshes"][0]["primitives"][0]["attributes"];
     (attributes["TANGENT"], attributes["COLOR_0"]) = (json!(4), json!(4));
-    add(&mut value["accessors"], json!({"bufferView": 5, "componentType": 5126, "count": 4, "type": "VEC4"}));
+    push(&mut value["accessors"], json!({"bufferView": 5, "componentType": 5126, "count": 4, "type": "VEC4"}));
     value["textures"] = json!([{"source": 0, "sampler": 0}]);
     value["samplers"] = json!([{"wrapS": 33071, "wrapT": 33648}]);
     value["images"] = json!([{"bufferView": 4, "mimeType": "image/png"}]);
-    add(&mut value["bufferViews"], json!({"buffer": 0, "byteOffset": start, "byteLength": png.len()}));
-    add(&mut value["bufferViews"], json!({"buffer": 0, "byteOffset": tangents_start, "byteLength": 64}));
+    push(&mut value["bufferViews"], json!({"buffer": 0, "byteOffset": start, "byteLength": png.len()}));
+    push(&mut value["bufferViews"], json!({"buffer": 0, "byteOffset": tangents_start, "byteLength": 64}));
     value
 }
 

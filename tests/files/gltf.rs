@@ -2,7 +2,7 @@
 //! of files come to is in tests/files/fuzz.rs.
 
 use super::other_readers::noise;
-use crate::common::gltf_file::{data_uri, encoded, floats, set_buffer, square, square_buffer};
+use crate::common::gltf_file::{add_accessor, data_uri, encoded, floats, push, set_buffer, square, square_buffer};
 use crate::common::prelude::*;
 use image::{ImageFormat, RgbImage, Rgba, RgbaImage};
 use photonmill::output::colour::exr;
@@ -414,22 +414,7 @@ fn pictures_are_whole_and_of_the_kinds_that_gltf_has() {
     assert_refusal(read(&exr(1, 1, &[Vec3::ONE])), &["texture image 'paint'", "neither PNG, JPEG, WebP nor KTX 2"]);
 }
 
-/// Adds to a list, and returns the number of what was added.
-pub fn push(list: &mut Value, item: Value) -> usize {
-    let list = list.as_array_mut().unwrap();
-    list.push(item);
-    list.len() - 1
-}
-
-/// Adds an accessor of numbers in a buffer of its own, and returns its number.
-pub fn add_accessor(value: &mut Value, bytes: &[u8], component: u32, count: usize, kind: &str) -> usize {
-    let uri = data_uri("application/octet-stream", bytes);
-    let buffer = push(&mut value["buffers"], json!({"byteLength": bytes.len(), "uri": uri}));
-    let view = push(&mut value["bufferViews"], json!({"buffer": buffer, "byteOffset": 0, "byteLength": bytes.len()}));
-    push(&mut value["accessors"], json!({"bufferView": view, "componentType": component, "count": count, "type": kind}))
-}
-
-/// The same of an attribute of the square's vertices.
+/// Sets an attribute of the square's vertices, and returns its accessor's number.
 fn set_attribute(value: &mut Value, name: &str, bytes: &[u8], component: u32, count: usize, kind: &str) -> usize {
     let accessor = add_accessor(value, bytes, component, count, kind);
     value["meshes"][0]["primitives"][0]["attributes"][name] = json!(accessor);
