@@ -1,12 +1,13 @@
 //! Runs on several devices: whichever does which block, the result is that of one device to the bit. Here all of them are one device,
 //! opened several times.
 
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use crate::common::lit::Viewed;
 use crate::common::prelude::*;
+use crate::fuzz::seeds::Saved;
 use photonmill::engine::End;
 use photonmill::engine::retry::{Remedy, run_on};
 use photonmill::engine::saved::{SavedFilm, SavedRun};
@@ -46,16 +47,6 @@ struct Came {
     lit: RunResult,
     given_up: u32,
     saved: Vec<SavedRun>,
-}
-
-#[derive(Default)]
-struct All(Vec<SavedRun>);
-
-impl SaveRun for All {
-    fn save(&mut self, run: &Arc<SavedRun>, _: bool) -> Result<(), Error> {
-        self.0.push(SavedRun::clone(run));
-        Ok(())
-    }
 }
 
 fn room() -> Viewed {
@@ -130,7 +121,7 @@ fn shared(room: &Viewed, count: usize, settings: &SceneSettings, trouble: Troubl
         assert_eq!(remedy, Remedy::GivenUp);
         given_up.fetch_add(1, Ordering::Relaxed);
     };
-    let (cancelled, mut all) = (AtomicBool::new(false), All::default());
+    let (cancelled, mut all) = (AtomicBool::new(false), Saved::default());
     let mut progress = |progress: &engine::Progress| {
         if trouble.cancelled_at.is_some_and(|rounds| progress.done >= rounds) {
             cancelled.store(true, Ordering::Relaxed);

@@ -32,12 +32,13 @@ use photonmill::scene::{Scene, Surface, built_in};
 use photonmill::settings::scene::SceneSettings;
 use photonmill::settings::{Builder, RoomSettings};
 
-/// Keeps what a run saves last.
-struct Latest(Option<SavedRun>);
+/// Keeps all that a run saves.
+#[derive(Default)]
+pub struct Saved(pub Vec<SavedRun>);
 
-impl SaveRun for Latest {
+impl SaveRun for Saved {
     fn save(&mut self, run: &Arc<SavedRun>, _: bool) -> photonmill::error::Result<()> {
-        self.0 = Some(SavedRun::clone(run));
+        self.0.push(SavedRun::clone(run));
         Ok(())
     }
 }
@@ -45,11 +46,11 @@ impl SaveRun for Latest {
 /// A part of a run of the paper's box, so small that it takes no time; it goes on with what there is of it.
 pub fn part_of_box(share: Share, resume: Option<SavedRun>) -> photonmill::error::Result<SavedRun> {
     let settings = RoomSettings { photons: 101, rounds: 4, mesh: 2, builder: Builder::Cpu, rng: Rng::Philox, ..RoomSettings::default() };
-    let (never, mut latest) = (AtomicBool::new(false), Latest(None));
+    let (never, mut saved) = (AtomicBool::new(false), Saved::default());
     let resume = resume.map(|run| ("seed".into(), run));
-    let keep = Keep { scene: "open-box", share, resume, every: Duration::ZERO, save: Some(&mut latest), dealt: None };
+    let keep = Keep { scene: "open-box", share, resume, every: Duration::ZERO, save: Some(&mut saved), dealt: None };
     room::run(None, &open_box(&settings), &settings, &mut Control { cancelled: &never, progress: &mut |_| {}, keep })?;
-    Ok(latest.0.expect("a run saves its end"))
+    Ok(saved.0.pop().expect("a run saves its end"))
 }
 
 /// A box with a mirror for a wall, so that photons make a caustic map too.
