@@ -24,6 +24,21 @@ pub fn set_buffer(value: &mut Value, bytes: &[u8]) {
     value["buffers"][0] = json!({"byteLength": bytes.len(), "uri": data_uri("application/octet-stream", bytes)});
 }
 
+/// Adds to a list, and returns the number of what was added.
+pub fn push(list: &mut Value, item: Value) -> usize {
+    let list = list.as_array_mut().unwrap();
+    list.push(item);
+    list.len() - 1
+}
+
+/// Adds an accessor of numbers in a buffer of its own, and returns its number.
+pub fn add_accessor(value: &mut Value, bytes: &[u8], component: u32, count: usize, kind: &str) -> usize {
+    let uri = data_uri("application/octet-stream", bytes);
+    let buffer = push(&mut value["buffers"], json!({"byteLength": bytes.len(), "uri": uri}));
+    let view = push(&mut value["bufferViews"], json!({"buffer": buffer, "byteOffset": 0, "byteLength": bytes.len()}));
+    push(&mut value["accessors"], json!({"bufferView": view, "componentType": component, "count": count, "type": kind}))
+}
+
 /// A unit square in the plane z = 0: positions, normals, coordinates and indices in one buffer.
 pub fn square_buffer() -> Vec<u8> {
     let mut bytes = floats(&[0., 0., 0., 1., 0., 0., 1., 1., 0., 0., 1., 0.]);

@@ -115,6 +115,20 @@ pub fn no_gpu() -> bool {
     std::env::var("PHOTONMILL_NO_GPU").is_ok_and(|value| value == "1")
 }
 
+/// Whether tests take all of their cases, as `tools/test --long` has it.
+pub fn is_long_run() -> bool {
+    let is_long = std::env::var_os("PHOTONMILL_LONG").is_some();
+    if !is_long {
+        work::of_shortened();
+    }
+    is_long
+}
+
+/// What a test takes in the short run, or in the long one.
+pub fn of_run<T>(short: T, long: T) -> T {
+    if is_long_run() { long } else { short }
+}
+
 /// The same without the promise that validation stays silent, for tests that make it speak.
 pub fn open(options: Options) -> Option<Gpu> {
     if no_gpu() {

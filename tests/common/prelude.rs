@@ -35,7 +35,7 @@ pub use super::lit::{
 pub use super::program::{Place, text};
 pub use super::{
     Check, Complaint, Device, JUDGED, Kind, assert_complains, assert_complains_of, assert_holds, closed_box, device, device_with, draws_of,
-    equal_sums, fresh_device, gathered, in_order, no_gpu, on_back_wall, open, outcome_of, pairs, photons, photons_on_cpu, plan_for,
-    plan_for_host, relative_check, require, run, run_on_cpu, run_scene, run_scene_on_cpu, same_photons, same_sums, share_check, streams_of,
-    z_check,
+    equal_sums, fresh_device, gathered, in_order, is_long_run, no_gpu, of_run, on_back_wall, open, outcome_of, pairs, photons,
+    photons_on_cpu, plan_for, plan_for_host, relative_check, require, run, run_on_cpu, run_scene, run_scene_on_cpu, same_photons,
+    same_sums, share_check, streams_of, z_check,
 };

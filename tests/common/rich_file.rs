@@ -4,34 +4,21 @@ use draco_core::{DataType, EncoderBuffer, EncoderOptions, GeometryAttributeType,
 use image::{ImageFormat, RgbImage};
 use serde_json::{Value, json};
 
-use super::gltf_file::{data_uri, encoded, floats, set_buffer, square, square_buffer};
-
-/// Adds an accessor over bytes of its own, in a buffer view of its own, and returns its number.
-pub fn add(value: &mut Value, buffer: &mut Vec<u8>, bytes: &[u8], component: u32, count: usize, kind: &str) -> usize {
-    buffer.resize(buffer.len().next_multiple_of(4), 0);
-    let view = json!({"buffer": 0, "byteOffset": buffer.len(), "byteLength": bytes.len()});
-    buffer.extend(bytes);
-    let views = value["bufferViews"].as_array_mut().unwrap();
-    views.push(view);
-    let accessor = json!({"bufferView": views.len() - 1, "componentType": component, "count": count, "type": kind});
-    let accessors = value["accessors"].as_array_mut().unwrap();
-    accessors.push(accessor);
-    accessors.len() - 1
-}
+use super::gltf_file::{add_accessor, data_uri, encoded, floats, set_buffer, square, square_buffer};
 
 /// The square, with keys of its translation at 1, 2 and 4 s, of its rotation at 0 and 2 s, and a second node whose scale has one key.
 pub fn animated() -> Value {
-    let (mut value, mut buffer) = (square(), square_buffer());
+    let mut value = square();
     let half = std::f32::consts::FRAC_1_SQRT_2;
-    let times = add(&mut value, &mut buffer, &floats(&[1., 2., 4.]), 5126, 3, "SCALAR");
-    let places = add(&mut value, &mut buffer, &floats(&[0., 0., 0., 10., 0., 0., 10., 20., 0.]), 5126, 3, "VEC3");
-    let turn_times = add(&mut value, &mut buffer, &floats(&[0., 2.]), 5126, 2, "SCALAR");
+    let times = add_accessor(&mut value, &floats(&[1., 2., 4.]), 5126, 3, "SCALAR");
+    let places = add_accessor(&mut value, &floats(&[0., 0., 0., 10., 0., 0., 10., 20., 0.]), 5126, 3, "VEC3");
+    let turn_times = add_accessor(&mut value, &floats(&[0., 2.]), 5126, 2, "SCALAR");
     let turns: Vec<u8> =
         [0f32, 0., 0., 1., 0., 0., half, half].iter().flat_map(|of| ((of * 32767.).round() as i16).to_le_bytes()).collect();
-    let turns = add(&mut value, &mut buffer, &turns, 5122, 2, "VEC4");
+    let turns = add_accessor(&mut value, &turns, 5122, 2, "VEC4");
     value["accessors"][turns]["normalized"] = json!(true);
-    let once = add(&mut value, &mut buffer, &floats(&[3.]), 5126, 1, "SCALAR");
-    let wide = add(&mut value, &mut buffer, &floats(&[5., 5., 5.]), 5126, 1, "VEC3");
+    let once = add_accessor(&mut value, &floats(&[3.]), 5126, 1, "SCALAR");
+    let wide = add_accessor(&mut value, &floats(&[5., 5., 5.]), 5126, 1, "VEC3");
     value["nodes"].as_array_mut().unwrap().push(json!({"name": "twin", "mesh": 0}));
     value["scenes"][0]["nodes"].as_array_mut().unwrap().push(json!(5));
     let channel = |sampler: usize, node: usize, path: &str| json!({"sampler": sampler, "target": {"node": node, "path": path}});
@@ -42,22 +29,20 @@ pub fn animated() -> Value {
             {"input": times, "output": places}, {"input": turn_times, "output": turns, "interpolation": "LINEAR"},
             {"input": once, "output": wide, "interpolation": "STEP"}]
     }, {"channels": [], "samplers": []}]);
-    set_buffer(&mut value, &buffer);
     value
 }
 
 /// The square at three places, one of them turned, each twice as large.
 pub fn instanced() -> Value {
-    let (mut value, mut buffer) = (square(), square_buffer());
-    let places = add(&mut value, &mut buffer, &floats(&[0., 0., 0., 5., 0., 0., 0., 7., 0.]), 5126, 3, "VEC3");
-    let turns = add(&mut value, &mut buffer, &[0, 0, 0, 127, 0, 0, 0, 127, 0, 127, 0, 0], 5120, 3, "VEC4");
+    let mut value = square();
+    let places = add_accessor(&mut value, &floats(&[0., 0., 0., 5., 0., 0., 0., 7., 0.]), 5126, 3, "VEC3");
+    let turns = add_accessor(&mut value, &[0, 0, 0, 127, 0, 0, 0, 127, 0, 127, 0, 0], 5120, 3, "VEC4");
     value["accessors"][turns]["normalized"] = json!(true);
-    let scales = add(&mut value, &mut buffer, &floats(&[2.; 9]), 5126, 3, "VEC3");
+    let scales = add_accessor(&mut value, &floats(&[2.; 9]), 5126, 3, "VEC3");
     value["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] =
         json!({"TRANSLATION": places, "ROTATION": turns, "SCALE": scales, "_ID": 0});
     value["extensionsUsed"].as_array_mut().unwrap().push(json!("EXT_mesh_gpu_instancing"));
     value["extensionsRequired"] = json!(["EXT_mesh_gpu_instancing"]);
-    set_buffer(&mut value, &buffer);
     value
 }
 

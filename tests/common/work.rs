@@ -45,6 +45,11 @@ pub fn of_skipped() {
     add(&[("skipped", 1)]);
 }
 
+/// Some cases were left to the long run.
+pub fn of_shortened() {
+    add(&[("shortened", 1)]);
+}
+
 /// The program was started once.
 pub fn of_program() {
     add(&[("programs", 1)]);

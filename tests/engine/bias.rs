@@ -132,7 +132,10 @@ fn the_allowance_covers_edges_shadows_and_bumps() {
 }
 
 /// Intervals of so many seeds in the paper's box.
-fn box_intervals_hold(seeds: u64, radii: &[f64]) {
+#[test]
+fn the_bias_of_the_box_lies_in_its_interval_as_often_as_stated() {
+    let seeds = of_run(12, 50);
+    let radii = of_run::<&[_]>(&[0.2], &[0.2, 0.15, 0.1, 0.07]);
     let gpu = device();
     let gpu = gpu.as_deref();
     for &radius in radii {
@@ -152,22 +155,15 @@ fn box_intervals_hold(seeds: u64, radii: &[f64]) {
     }
 }
 
-#[test]
-fn the_bias_of_the_box_lies_in_its_interval_as_often_as_stated() {
-    box_intervals_hold(12, &[0.2]);
-}
-
-#[test]
-#[ignore = "hundreds of runs: minutes on a software device"]
-fn the_bias_of_the_box_lies_in_its_interval_at_every_radius() {
-    box_intervals_hold(50, &[0.2, 0.15, 0.1, 0.07]);
-}
-
 /// The same of scenes of triangles: name, illumination, radius as a share of the scene. The truth is the difference from
 /// light at a fifth of the radius, at which a 25th of the bias is left.
-fn scene_intervals_hold(seeds: u64, cases: &[(&str, Illumination, f64)], rounds: u32) {
+#[test]
+fn the_bias_of_scenes_lies_in_its_interval_as_often_as_stated() {
+    let (seeds, rounds, names) =
+        of_run::<(_, _, &[_])>((8, 2, &[]), (20, 16, &["open-box", "cornell", "cornell-spheres", "caustic-sphere"]));
+    let pictures = names.iter().flat_map(|name| BOTH.map(|illumination| (*name, illumination, 0.15)));
     let Some(gpu) = device() else { return };
-    for &(name, illumination, radius) in cases {
+    for (name, illumination, radius) in pictures.chain([("disc-over-plane", Illumination::Photons, 0.1)]) {
         let long = Picture::new(name, illumination, radius, 20_000, 99, &gpu);
         let batch = |factor: f64, number: u32| long.batch(&gpu, rounds, factor, number);
         let differences = bias_batches::difference(Measure::Rmse, CONFIDENCE, 0.2, batch).unwrap().unwrap();
@@ -177,20 +173,6 @@ fn scene_intervals_hold(seeds: u64, cases: &[(&str, Illumination, f64)], rounds:
         println!("{name}: {lower:.4} to {upper:.4}");
         assert_coverage(&format!("{name}, {illumination:?}, radius {radius}"), &biases, middle);
     }
-}
-
-#[test]
-fn the_bias_of_scenes_lies_in_its_interval_as_often_as_stated() {
-    scene_intervals_hold(8, &[("disc-over-plane", Illumination::Photons, 0.1)], 2);
-}
-
-#[test]
-#[ignore = "hundreds of runs: minutes on a software device"]
-fn the_bias_of_many_scenes_lies_in_its_interval_as_often_as_stated() {
-    let names = ["open-box", "cornell", "cornell-spheres", "caustic-sphere"];
-    let cases: Vec<_> = names.into_iter().flat_map(|name| BOTH.map(|illumination| (name, illumination, 0.15))).collect();
-    scene_intervals_hold(20, &cases, 16);
-    scene_intervals_hold(20, &[("disc-over-plane", Illumination::Photons, 0.1)], 16);
 }
 
 /// A wall that cuts the disc of the whole radius and not that of the smaller one leaves no edge in the latter; whether it is whole or

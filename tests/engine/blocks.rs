@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use crate::common::lit::Viewed;
 use crate::common::prelude::*;
+use crate::fuzz::seeds::Saved;
 use photonmill::engine::End;
 use photonmill::engine::film::{KeptBlock, LatestBlocks};
 use photonmill::engine::room;
@@ -15,17 +16,6 @@ use photonmill::engine::scene::{self, RunResult};
 use photonmill::error::Result;
 use photonmill::ledger::BounceFates;
 use photonmill::settings::stop::Stop;
-
-/// Keeps the latest of what is saved.
-#[derive(Default)]
-struct Latest(Option<SavedRun>);
-
-impl SaveRun for Latest {
-    fn save(&mut self, run: &std::sync::Arc<SavedRun>, _: bool) -> Result<()> {
-        self.0 = Some(SavedRun::clone(run));
-        Ok(())
-    }
-}
 
 /// What a part of a run is.
 #[derive(Default)]
@@ -49,16 +39,16 @@ fn kept(gpu: &Gpu, settings: &SceneSettings, part: Part) -> (RunResult, SavedRun
 fn try_lit(gpu: &Gpu, settings: &SceneSettings, part: Part) -> (Result<RunResult>, Option<SavedRun>) {
     let viewed = Viewed::new(scene(SCENE));
     let plan = viewed.tried(gpu, settings, square_picture(8));
-    let (cancelled, mut latest) = (AtomicBool::new(false), Latest::default());
+    let (cancelled, mut all) = (AtomicBool::new(false), Saved::default());
     let mut watch = |progress: &engine::Progress| {
         if part.most_rounds.is_some_and(|most| progress.done >= most) {
             cancelled.store(true, Ordering::Relaxed);
         }
     };
     let resume = part.resume.map(|run| (PathBuf::from("a file"), run));
-    let keep = Keep { scene: SCENE, share: part.share, resume, every: Duration::ZERO, save: Some(&mut latest), dealt: None };
+    let keep = Keep { scene: SCENE, share: part.share, resume, every: Duration::ZERO, save: Some(&mut all), dealt: None };
     let lit = scene::light(gpu, &viewed.view(), plan, &mut Control { cancelled: &cancelled, progress: &mut watch, keep });
-    (lit, latest.0)
+    (lit, all.0.pop())
 }
 
 fn small(block: u32, rounds: u32) -> SceneSettings {
@@ -66,7 +56,9 @@ fn small(block: u32, rounds: u32) -> SceneSettings {
 }
 
 /// Of rounds of a block, samples and parts.
-fn parts_come_to_the_bits_of_one(cases: &[(u32, u32, u32)]) {
+#[test]
+fn parts_of_a_run_come_to_the_bits_of_one() {
+    let cases = of_run::<&[_]>(&[(4, 2, 2)], &[(1, 1, 5), (4, 2, 2)]);
     let Some(gpu) = device() else { return };
     for &(block, samples, of) in cases {
         let settings = SceneSettings { samples, ..small(block, 12) };
@@ -92,17 +84,6 @@ fn parts_come_to_the_bits_of_one(cases: &[(u32, u32, u32)]) {
         let (again, _) = kept(&gpu, &settings, Part { resume: Some(saved.clone()), ..Part::default() });
         assert!(again.film == whole.film && again.film.error(0.95) == whole.film.error(0.95));
     }
-}
-
-#[test]
-fn parts_of_a_run_come_to_the_bits_of_one() {
-    parts_come_to_the_bits_of_one(&[(4, 2, 2)]);
-}
-
-#[test]
-#[ignore = "long: minutes on a software device"]
-fn many_parts_of_a_run_come_to_the_bits_of_one() {
-    parts_come_to_the_bits_of_one(&[(1, 1, 5), (4, 2, 2)]);
 }
 
 /// A run that goes on looks at its error where one without a break does, at once if it was saved there.
@@ -181,12 +162,12 @@ fn parts_of_the_box_come_to_the_bits_of_one() {
     let settings =
         RoomSettings { photons: 501, rounds: 9, mesh: 8, rng: Rng::Philox, shininess: [Some(2.0); 5], ..RoomSettings::default() };
     let try_run = |gpu: Option<&Gpu>, rounds, share, resume| -> Result<SavedRun> {
-        let mut latest = Latest::default();
+        let mut all = Saved::default();
         let resume = Option::map(resume, |run| (PathBuf::from("a file"), run));
-        let keep = Keep { scene: "open-box", share, resume, every: Duration::ZERO, save: Some(&mut latest), dealt: None };
+        let keep = Keep { scene: "open-box", share, resume, every: Duration::ZERO, save: Some(&mut all), dealt: None };
         let settings = RoomSettings { rounds, ..settings.clone() };
         room::run(gpu, &open_box(&settings), &settings, &mut Control { keep, ..Control::default() })?;
-        Ok(latest.0.unwrap())
+        Ok(all.0.pop().unwrap())
     };
     let run = |gpu, rounds, share, resume| try_run(gpu, rounds, share, resume).unwrap();
     for gpu in [None, gpu.as_deref()] {

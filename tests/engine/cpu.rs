@@ -100,6 +100,9 @@ fn threads_change_no_bit_of_a_film() {
             assert_eq!(found.fates, expected.fates, "{what}, {threads} threads");
         }
         assert!(expected.film.sums.iter().any(|sum| *sum > 0));
+        if what == "chunks" {
+            assert_eq!(run_on_cpu(&RoomSettings { gather: Gather::Brute, ..settings }).film, expected.film, "by brute force");
+        }
     }
 }
 

@@ -202,7 +202,9 @@ fn count_check(timings: &Timings, settings: &RoomSettings, chunks: u64) -> Check
     require(rows == bounces as usize, || format!("{rows} rows of bounces instead of {bounces}"))
 }
 
-fn timings_nest(many_rounds_of: &[Builder]) {
+#[test]
+fn timings_nest_and_count() {
+    let many_rounds_of = of_run::<&[_]>(&[Builder::Ballot], &Builder::ON_GPU);
     let Some(gpu) = device() else { return };
     for builder in Builder::ON_GPU {
         // 120 bounces of many rounds take more timestamps than one submission has.
@@ -235,17 +237,6 @@ fn timings_nest(many_rounds_of: &[Builder]) {
             assert!((spans - row).abs() <= 1e-6 * row.max(1.0), "{spans} and {row}");
         }
     }
-}
-
-#[test]
-fn timings_nest_and_count() {
-    timings_nest(&[Builder::Ballot]);
-}
-
-#[test]
-#[ignore = "long: minutes on a software device"]
-fn timings_of_many_rounds_nest_and_count() {
-    timings_nest(&Builder::ON_GPU);
 }
 
 /// A run makes no pipeline that its plan has no use for, and a second one none at all.

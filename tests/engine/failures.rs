@@ -12,7 +12,10 @@ const SMALL: &str = "--size 8x8 --photons 500 --caustic-photons 300 --radius 0.0
 
 /// Ends a run by one signal after another, so many of them KILL, goes on from its checkpoint each time, and at last lets it end. (That a
 /// file is whole or not there is what a full disk shows: it takes little time to write one.)
-fn ended_runs_go_on(signals: &[(&str, i32)], kills: usize) {
+#[test]
+fn ended_runs_go_on_to_the_same_bits() {
+    let Some(_) = device() else { return };
+    let (signals, kills) = of_run::<(&[_], _)>((&[("INT", 130)], 1), (&[("INT", 130), ("TERM", 143), ("HUP", 129)], 100));
     let place = Place::new();
     // More rounds than any device does before it is told, and no more than may have other units.
     let line = |rounds: u32, more: &str| on_device(&format!("render cornell {SMALL} --rounds {rounds} {more}"));
@@ -38,21 +41,6 @@ fn ended_runs_go_on(signals: &[(&str, i32)], kills: usize) {
     end("-o a.exr --checkpoint c.pms --resume c.pms");
     end("-o whole.exr");
     assert!(std::fs::read(place.at("a.exr")).unwrap() == std::fs::read(place.at("whole.exr")).unwrap(), "another picture");
-}
-
-#[test]
-fn ended_runs_go_on_to_the_same_bits() {
-    if device().is_some() {
-        ended_runs_go_on(&[("INT", 130)], 1);
-    }
-}
-
-#[test]
-#[ignore = "long: 100 kills"]
-fn runs_killed_at_100_moments_go_on_to_the_same_bits() {
-    if device().is_some() {
-        ended_runs_go_on(&[("INT", 130), ("TERM", 143), ("HUP", 129)], 100);
-    }
 }
 
 /// No file grows beyond four kilobytes, as on a disk that is full: a picture is that small, and a checkpoint or a map is not.
@@ -137,7 +125,9 @@ const SMALLER: &str = "goes on in smaller pieces, with";
 
 /// A device that is lost or whose memory is full goes on to the same bits, in the trial as in any round. What one that is lost for good had
 /// done is in the checkpoint.
-fn failing_devices_go_on(all: bool) {
+#[test]
+fn a_device_that_fails_goes_on_to_the_same_bits() {
+    let all = is_long_run();
     let Some(gpu) = device() else { return };
     // A GPU does several rounds in the millisecond between two checkpoints; two of them wait for no checkpoint, and submit seldom.
     let (rounds, midway_of_two) = if gpu.facts().kind == "cpu" { (40, MIDWAY) } else { (400, MIDWAY / 3) };
@@ -170,17 +160,6 @@ fn failing_devices_go_on(all: bool) {
     }
 }
 
-#[test]
-fn a_device_that_fails_goes_on_to_the_same_bits() {
-    failing_devices_go_on(false);
-}
-
-#[test]
-#[ignore = "long: minutes on a software device"]
-fn a_device_that_fails_anywhere_goes_on_to_the_same_bits() {
-    failing_devices_go_on(true);
-}
-
 /// Photons for a file go on behind the last whole round.
 #[test]
 fn a_map_goes_on_behind_its_last_whole_round() {
@@ -200,7 +179,9 @@ fn a_map_goes_on_behind_its_last_whole_round() {
 }
 
 /// What --memory allows is never exceeded: smaller pieces, and the same bits; too little is refused by what is needed.
-fn memory_is_kept_within(limits: &[(&str, u64)]) {
+#[test]
+fn memory_is_kept_to() {
+    let limits = of_run::<&[_]>(&[("12MiB", 12 << 20)], &[("12MiB", 12 << 20), ("20MiB", 20 << 20), ("12582912", 12 << 20)]);
     let Some(_) = device() else { return };
     let place = Place::new();
     let line = "render cornell --size 24x24 --photons 60000 --rounds 2 --block 1 -q";
@@ -220,17 +201,6 @@ fn memory_is_kept_within(limits: &[(&str, u64)]) {
         (on_device(&format!("{line} -o b.exr --memory -1G")), ["--memory", "512M"].as_slice()),
         ("--variant cpu --memory 1G -o b.png".to_owned(), ["--memory", "--variant cpu"].as_slice()),
     ]);
-}
-
-#[test]
-fn memory_is_kept_to() {
-    memory_is_kept_within(&[("12MiB", 12 << 20)]);
-}
-
-#[test]
-#[ignore = "long: minutes on a software device"]
-fn memory_is_kept_to_whatever_it_is() {
-    memory_is_kept_within(&[("20MiB", 20 << 20), ("12582912", 12 << 20)]);
 }
 
 /// Nothing that is read, and nothing that is no file, is lost to an output; what is asked for and cannot be had is told of.

@@ -38,9 +38,10 @@ pub fn assert_same(what: &str, how: &str, found: &RoomFilm, expected: &RoomFilm)
     assert_holds(&what, equal_sums(&what, &found.sums, &expected.sums));
 }
 
-fn runs_and_builders_and_gathers(effects: Vec<(&str, RoomSettings)>) {
+#[test]
+fn runs_and_builders_and_gathers_give_the_same_bits() {
     let Some(gpu) = device() else { return };
-    for (what, settings) in effects {
+    for (what, settings) in of_run(few_effects(), effects()) {
         let expected = film(&gpu, &settings);
         assert!(expected.sums.iter().filter(|sum| **sum > 0).count() > expected.sums.len() / 2, "{what}: a dark film proves nothing");
         for run in 1..10 {
@@ -56,13 +57,9 @@ fn runs_and_builders_and_gathers(effects: Vec<(&str, RoomSettings)>) {
 }
 
 #[test]
-fn runs_and_builders_and_gathers_give_the_same_bits() {
-    runs_and_builders_and_gathers(few_effects());
-}
-
-fn work_groups_and_chunks(effects: Vec<(&str, RoomSettings)>) {
+fn work_groups_and_chunks_give_the_same_bits() {
     let Some(gpu) = device() else { return };
-    for (what, settings) in effects {
+    for (what, settings) in of_run(few_effects(), effects()) {
         let expected = film(&gpu, &settings);
         let by = |place: usize| RoomSettings { builder: Builder::ON_GPU[place % Builder::ON_GPU.len()], ..settings.clone() };
         let gathers = [Gather::Grid, Gather::Brute];
@@ -78,18 +75,6 @@ fn work_groups_and_chunks(effects: Vec<(&str, RoomSettings)>) {
             assert_same(what, &format!("{other:?}"), &outcome.film, &expected);
         }
     }
-}
-
-#[test]
-fn work_groups_and_chunks_give_the_same_bits() {
-    work_groups_and_chunks(few_effects());
-}
-
-#[test]
-#[ignore = "long: minutes on a software device"]
-fn nothing_changes_the_bits_of_any_effect() {
-    runs_and_builders_and_gathers(effects());
-    work_groups_and_chunks(effects());
 }
 
 #[test]
@@ -200,7 +185,9 @@ fn device_and_cpu_gather_the_same_photons_to_the_same_bits() {
 }
 
 /// However many invocations share a point, and whether they share its candidates in slices: every photon counts once.
-fn lanes_and_slices(cases: &[(u32, f64, u32)]) {
+#[test]
+fn lanes_and_slices_change_no_bit() {
+    let cases = of_run::<&[_]>(&[(128, 0.5, 3)], &[(32, 0.05, 13), (128, 0.5, 3), (64, 0.003, 31)]);
     let Some(gpu) = device() else { return };
     for &(group_size, radius, mesh) in cases {
         let settings = RoomSettings { group_size, radius, mesh, shininess: [Some(2.0); 5], ..RoomSettings::default() };
@@ -215,38 +202,6 @@ fn lanes_and_slices(cases: &[(u32, f64, u32)]) {
         // One submission's work a point, so that dispatches are many.
         let plan = RoomPlan { lanes: 32, pair_tests_per_submission: 1, ..plan.clone() };
         assert_holds("a dispatch for every few points", equal_sums("film", &gathered(&gpu, &plan, &map, 1, None), &expected));
-    }
-}
-
-#[test]
-fn lanes_and_slices_change_no_bit() {
-    lanes_and_slices(&[(128, 0.5, 3)]);
-}
-
-#[test]
-#[ignore = "long: minutes on a software device"]
-fn lanes_and_slices_change_no_bit_of_any_group_and_radius() {
-    lanes_and_slices(&[(32, 0.05, 13), (128, 0.5, 3), (64, 0.003, 31)]);
-}
-
-/// The device's film and a film of the CPU builder's own photons: the same but for photons on the rim.
-#[test]
-fn the_cpu_builders_film_agrees_to_single_counts() {
-    let Some(gpu) = device() else { return };
-    let settings = RoomSettings::default();
-    let (device, host) = (film(&gpu, &settings), run_on_cpu(&settings).film);
-    assert_eq!((device.channel_count, device.scale), (host.channel_count, host.scale));
-    let differences: Vec<u64> = pairs(&device.sums, &host.sums).map(|(a, b)| a.abs_diff(*b)).collect();
-    let in_reach: u64 = host.sums.iter().sum();
-    assert!(differences.iter().all(|difference| *difference <= 1));
-    assert!(differences.iter().sum::<u64>() as f64 <= 2e-5 * in_reach as f64, "{} of {in_reach}", differences.iter().sum::<u64>());
-
-    // The CPU's own choices change no bit at all.
-    for (threads, gather, chunk) in
-        [(2, Gather::Grid, None), (3, Gather::Brute, None), (1, Gather::Brute, Some(777)), (2, Gather::Grid, Some(64))]
-    {
-        let other = run_on_cpu(&RoomSettings { threads, gather, chunk, ..settings.clone() }).film;
-        assert_same("cpu", &format!("{threads} threads {gather:?} chunks of {chunk:?}"), &other, &host);
     }
 }
 
@@ -490,7 +445,10 @@ fn relative_error(found: &RoomFilm, expected: &RoomFilm) -> f64 {
 }
 
 /// What f32 costs: 300 000 weights on each of five texels, added one by one, and on a device slice by slice.
-fn measure_f32_sums(gpu: Option<&Gpu>) {
+#[test]
+fn the_error_of_f32_sums_is_measured() {
+    let gpu = if is_long_run() { device() } else { None };
+    let gpu = gpu.as_deref();
     let weights = RoomSettings { shininess: [Some(2.0); 5], light_power: [3.0, 0.7], ..RoomSettings::default() };
     let settings = RoomSettings { photons: 1_000_000, rng: Rng::Philox, mesh: 1, radius: 0.5, threads: 2, ..weights };
     let films = |sums| {
@@ -506,16 +464,4 @@ fn measure_f32_sums(gpu: Option<&Gpu>) {
         assert!(pair_error < 1e-7, "{builder}: {pair_error}");
         assert!(f32_error > 10.0 * pair_error && f32_error < 1e-2, "{builder}: {f32_error}");
     }
-}
-
-#[test]
-fn the_error_of_f32_sums_is_measured() {
-    measure_f32_sums(None);
-}
-
-#[test]
-#[ignore = "long: minutes on a software device"]
-fn the_error_of_f32_sums_of_a_device_is_measured() {
-    let Some(gpu) = device() else { return };
-    measure_f32_sums(Some(&gpu));
 }

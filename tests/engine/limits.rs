@@ -10,7 +10,7 @@ use photonmill::engine::End;
 use photonmill::engine::scene::resources::SceneResources;
 use photonmill::engine::scene::{self, Round, RunResult, View, trace};
 use photonmill::output::scene_report;
-use photonmill::plan::radius::{mean_squared_radius, squared_radius};
+use photonmill::plan::radius::{mean_squared_radius, of_round, squared_radius};
 use photonmill::settings::stop::Stop;
 use photonmill::timings::Span;
 
@@ -29,9 +29,11 @@ const POINT: [(DVec3, DVec3); 1] = [(DVec3::new(0.5, 0.0, 0.5), DVec3::Y)];
 
 /// Roulette ends paths, and takes nothing: irradiance is pi / (1 - albedo). Finds 20 % with 5 standard errors; the cap of 32 bounces that
 /// was the default took 28 %.
-fn bright_rooms_keep_all(rooms: &[(f32, Builder)]) {
+#[test]
+fn bright_rooms_lose_no_light() {
+    let rooms = [(0.95, Builder::Persistent), (0.95, Builder::Ballot), (0.99, Builder::Persistent)];
     let Some(gpu) = device() else { return };
-    for &(albedo, builder) in rooms {
+    for &(albedo, builder) in &rooms[..of_run(1, 3)] {
         let exact = PI / (1.0 - f64::from(albedo));
         let what = format!("albedo {albedo}, {}", builder.name());
         let settings = SceneSettings { builder: Some(builder), radius: Some(0.4), alpha: 1.0, ..settings() };
@@ -48,21 +50,12 @@ fn bright_rooms_keep_all(rooms: &[(f32, Builder)]) {
     }
 }
 
-#[test]
-fn bright_rooms_lose_no_light() {
-    bright_rooms_keep_all(&[(0.95, Builder::Persistent)]);
-}
-
-#[test]
-#[ignore = "long: minutes on a software device"]
-fn the_brightest_rooms_lose_no_light() {
-    bright_rooms_keep_all(&[(0.95, Builder::Ballot), (0.99, Builder::Persistent)]);
-}
-
 /// What a cap cuts off is counted in watts, and bounds what it takes from the result.
-fn what_caps_cut_off_is_counted(cases: &[(Illumination, f32, u32)]) {
+#[test]
+fn what_a_cap_cuts_off_is_counted() {
+    let cases = [(Illumination::Split, 0.5, 1), (Illumination::Split, 0.9, 6), (Illumination::Photons, 0.5, 6)];
     let Some(gpu) = device() else { return };
-    for &(illumination, albedo, bounces) in cases {
+    for &(illumination, albedo, bounces) in &cases[..of_run(2, 3)] {
         let what = format!("{illumination:?}, albedo {albedo}, {bounces} bounces");
         let settings = SceneSettings { illumination, bounces, radius: Some(0.4), alpha: 1.0, ..settings() };
         let lit = received(&gpu, &furnace(albedo), &settings, &POINT);
@@ -77,17 +70,6 @@ fn what_caps_cut_off_is_counted(cases: &[(Illumination, f32, u32)]) {
         let lost = 1.0 - mean_red(&lit) / exact;
         assert!(losses.relative >= lost, "{what}: {lost} is lost, at most {} is stated", losses.relative);
     }
-}
-
-#[test]
-fn what_a_cap_cuts_off_is_counted() {
-    what_caps_cut_off_is_counted(&[(Illumination::Split, 0.5, 1), (Illumination::Split, 0.9, 6)]);
-}
-
-#[test]
-#[ignore = "long: minutes on a software device"]
-fn what_a_cap_cuts_off_of_all_light_is_counted() {
-    what_caps_cut_off_is_counted(&[(Illumination::Photons, 0.5, 6)]);
 }
 
 /// An error that a cap makes impossible is refused, when the run first looks: after 30 rounds. Which cap it is, is said: bounces, or
@@ -151,10 +133,15 @@ fn light_trapped_for_ever_is_counted() {
 }
 
 /// The ledger's photons stored are those that lie in the map.
-fn photons_stored_lie_in_the_map(illumination: Illumination) {
+#[test]
+fn photons_stored_are_the_length_of_the_map() {
     let Some(gpu) = device() else { return };
     let scene = scene("cornell-spheres");
-    for builder in [Builder::Ballot, Builder::Persistent] {
+    let ways = BOTH
+        .into_iter()
+        .take(of_run(1, 2))
+        .flat_map(|illumination| [Builder::Ballot, Builder::Persistent].map(|builder| (illumination, builder)));
+    for (illumination, builder) in ways {
         let settings = SceneSettings { builder: Some(builder), illumination, photons: 3000, rounds: 1, chunk: Some(700), ..settings() };
         let lit = run(&gpu, &scene, &settings, 8, &AtomicBool::new(false)).unwrap();
         let geometry = Geometry::new(&scene).unwrap();
@@ -178,24 +165,13 @@ fn photons_stored_lie_in_the_map(illumination: Illumination) {
     }
 }
 
-#[test]
-fn photons_stored_are_the_length_of_the_map() {
-    photons_stored_lie_in_the_map(Illumination::Split);
-}
-
-#[test]
-#[ignore = "long: minutes on a software device"]
-fn photons_stored_of_all_light_are_the_length_of_the_map() {
-    photons_stored_lie_in_the_map(Illumination::Photons);
-}
-
 /// Radii by their closed form are those of the recurrence, at once for any round.
 #[test]
 fn radii_take_no_sum_over_earlier_rounds() {
     for alpha in [0.1, 0.5, 2.0 / 3.0, 0.99, 1.0] {
         let (mut squared, mut sum) = (1.0, 0.0);
-        for round in 0..5000u32 {
-            let found = squared_radius(alpha, round);
+        for round in 0..10_000u32 {
+            let found = of_round(1.0, alpha, round).powi(2);
             assert!((found / squared - 1.0).abs() < 1e-9, "alpha {alpha}, round {round}: {found}, {squared}");
             sum += squared;
             let mean = mean_squared_radius(alpha, round + 1);

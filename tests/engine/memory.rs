@@ -51,7 +51,8 @@ fn the_papers_line_takes_what_its_plan_says() {
     }
 }
 
-fn scenes_take_what_they_say(all: bool) {
+#[test]
+fn scenes_take_what_their_plan_says() {
     let Some(gpu) = device() else { return };
     let small = SceneSettings { photons: 777, caustic_photons: 555, bounces: 5, rounds: 2, chunk: Some(500), ..by_rounds() };
     let gathers = SceneSettings { final_gather: true, ..small.clone() };
@@ -59,7 +60,7 @@ fn scenes_take_what_they_say(all: bool) {
     let picture = Sensor::Picture { width: 7, height: 5 };
     // Each kind of buffer in one of them: what the maps, lobes and lights of a scene need, and what each way to light it does.
     let mut cases = vec![("cornell-spheres", small.clone(), picture, 0), ("sky-over-plane", small, Sensor::Receivers { count: 9 }, 2)];
-    if all {
+    if is_long_run() {
         cases.extend([("cornell-spheres", gathers, picture, 0), ("open-box-phong", all_from_photons, picture, 0)]);
     }
     for (name, settings, sensor, phases) in cases {
@@ -71,15 +72,4 @@ fn scenes_take_what_they_say(all: bool) {
         let (bytes, _) = taken(&gpu, || lit::run(&gpu, &View { geometry: &geometry, camera, phases: &receivers }, plan));
         assert_holds(name, check("a scene", bytes, stated, &[]));
     }
-}
-
-#[test]
-fn scenes_take_what_their_plan_says() {
-    scenes_take_what_they_say(false);
-}
-
-#[test]
-#[ignore = "long: minutes on a software device"]
-fn scenes_take_what_their_plan_says_however_they_are_lit() {
-    scenes_take_what_they_say(true);
 }

@@ -189,12 +189,15 @@ fn has_shares(fates: &Fates, emission: EmissionLaw) -> Check {
 }
 
 /// Of a million photons it finds 0.4 % more at the first bounce with 5 standard errors, and 1.7 % at the fifth.
-fn photons_have_the_exact_shares(gpu: &Gpu, photons: u32) {
+#[test]
+fn a_million_photons_have_the_exact_shares() {
+    let Some(gpu) = device() else { return };
+    let photons = of_run(1_000_000, 10_000_000);
     let [uniform, cosine] = [EmissionLaw::Uniform, EmissionLaw::Cosine];
     for (rng, emission, other) in [(Rng::Philox, cosine, uniform), (Rng::Mt, uniform, cosine)] {
         // One point a wall: only the fates are asked for.
         let settings = RoomSettings { rng, emission, photons, builder: Builder::Ballot, mesh: 1, ..RoomSettings::default() };
-        let fates = run(gpu, &settings).fates[0].clone();
+        let fates = run(&gpu, &settings).fates[0].clone();
         assert_eq!(fates.emitted, u64::from(photons));
         assert_holds(format!("{rng:?} {emission:?}"), has_shares(&fates, emission));
         assert_complains("the other law of emission", has_shares(&fates, other));
@@ -202,17 +205,4 @@ fn photons_have_the_exact_shares(gpu: &Gpu, photons: u32) {
         gained.bounces[0].stored = gained.bounces[0].stored * 101 / 100;
         assert_complains("1 % more photons", has_shares(&gained, emission));
     }
-}
-
-#[test]
-fn a_million_photons_have_the_exact_shares() {
-    let Some(gpu) = device() else { return };
-    photons_have_the_exact_shares(&gpu, 1_000_000);
-}
-
-#[test]
-#[ignore = "ten million photons: half a minute on a software device"]
-fn ten_million_photons_have_the_exact_shares() {
-    let Some(gpu) = device() else { return };
-    photons_have_the_exact_shares(&gpu, 10_000_000);
 }

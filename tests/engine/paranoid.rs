@@ -32,35 +32,26 @@ pub fn box_is_finite(gpu: &Gpu, settings: &RoomSettings) -> Check<Complaint> {
     outcome_of(gpu, &open_box(settings), &RoomSettings { paranoid: true, ..settings.clone() }).map(|_| ())
 }
 
-/// A scene by a way of lighting. Looking changes nothing, which is shown of those that are compared.
-fn has_no_odd_value(gpu: &Gpu, name: &str, illumination: Illumination, is_compared: bool) {
-    let viewed = Viewed::new(scene(name));
-    let settings = SceneSettings { illumination, final_gather: illumination == Illumination::Split, photons: 1000, ..paranoid() };
-    let watched = lit(gpu, &viewed, &settings);
-    assert_holds(format!("{name}, {illumination:?}"), nothing_odd(watched.nonfinite_values.as_ref().unwrap()));
-    assert_eq!(watched.nonfinite_values, Some(NonfiniteValues::default()));
-    if is_compared {
-        let unwatched = lit(gpu, &viewed, &SceneSettings { paranoid: false, ..settings });
-        assert_eq!(unwatched.nonfinite_values, None);
-        assert_eq!(unwatched.film, watched.film, "{name}, {illumination:?}");
-    }
-}
-
-/// Mirrors and glass, and a sky. (Of the paper's box every run of `tests/common` is looked at.)
+/// By either way of lighting; in the short run mirrors and glass, and a sky. (Of the paper's box every run of `tests/common` is looked at.)
+/// Looking changes nothing, which is shown of some.
 #[test]
 fn no_built_in_scene_has_a_value_that_is_no_number() {
     let Some(gpu) = device() else { return };
-    has_no_odd_value(&gpu, "cornell-spheres", Illumination::Split, false);
-    has_no_odd_value(&gpu, "sky-over-plane", Illumination::Photons, true);
-}
-
-#[test]
-#[ignore = "long: minutes of compiling"]
-fn none_of_all_built_in_scenes_has_a_value_that_is_no_number() {
-    let Some(gpu) = device() else { return };
-    for name in built_in::names() {
-        for (illumination, compared) in pairs(BOTH, [["sky-over-plane", "mirror-corridor"], ["cornell-spheres", "disc-over-plane"]]) {
-            has_no_odd_value(&gpu, name, illumination, compared.contains(&name));
+    let few = [("cornell-spheres", Illumination::Split), ("sky-over-plane", Illumination::Photons)];
+    let all = built_in::names().into_iter().flat_map(|name| BOTH.map(|illumination| (name, illumination)));
+    let split = ["sky-over-plane", "mirror-corridor"].map(|name| (name, Illumination::Split));
+    let from_photons = ["sky-over-plane", "cornell-spheres", "disc-over-plane"].map(|name| (name, Illumination::Photons));
+    for case in of_run(few.to_vec(), all.collect()) {
+        let (name, illumination) = case;
+        let viewed = Viewed::new(scene(name));
+        let settings = SceneSettings { illumination, final_gather: illumination == Illumination::Split, photons: 1000, ..paranoid() };
+        let watched = lit(&gpu, &viewed, &settings);
+        assert_holds(format!("{case:?}"), nothing_odd(watched.nonfinite_values.as_ref().unwrap()));
+        assert_eq!(watched.nonfinite_values, Some(NonfiniteValues::default()));
+        if split.contains(&case) || from_photons.contains(&case) {
+            let unwatched = lit(&gpu, &viewed, &SceneSettings { paranoid: false, ..settings });
+            assert_eq!(unwatched.nonfinite_values, None);
+            assert_eq!(unwatched.film, watched.film, "{case:?}");
         }
     }
 }

@@ -34,12 +34,12 @@ fn few() -> SceneSettings {
     SceneSettings { photons: 1 << 13, caustic_photons: 1 << 13, stop, ..SceneSettings::default() }
 }
 
-/// Within a factor: rare light is met by chance, and even samples vary less the more there are. `all`: before the pilot has chosen, too,
-/// and of more rounds.
-fn rounds_vary_as_the_pilot_expects(gpu: &Gpu, spheres: &Viewed, all: bool) {
+/// Within a factor: rare light is met by chance, and even samples vary less the more there are. In the long run before the pilot has chosen,
+/// too, and of more rounds.
+fn rounds_vary_as_the_pilot_expects(gpu: &Gpu, spheres: &Viewed) {
     let found = chosen(gpu, spheres, &few(), Free { photons: false, caustic_photons: false, ..Free::ALL }).unwrap();
-    let rounds = if all { 32 } else { 16 };
-    for division in [found.chosen].into_iter().chain(all.then_some(found.before)) {
+    let rounds = of_run(16, 32);
+    for division in [found.chosen].into_iter().chain(is_long_run().then_some(found.before)) {
         // The squared noise of a round, relative to the mean.
         let lit = lit(gpu, spheres, &SceneSettings { rounds, alpha: 1.0, seed: 5, stop: Stop::default(), ..division.set(&few()) });
         let measured = lit.film.relative_error().powi(2) * f64::from(lit.film.rounds);
@@ -89,8 +89,8 @@ fn what_a_pilot_chooses_is_less_work_and_takes_about_the_rounds_that_it_expects(
     assert!((0.3..3.0).contains(&(rounds / expected)), "{rounds} rounds, {expected} expected");
 }
 
-/// Nodes that rays visit, whatever is dispatched at once; `all`: more shadow rays visit more of them, and each path about as many.
-fn what_paths_meet_is_counted(gpu: &Gpu, spheres: &Viewed, all: bool) {
+/// Nodes that rays visit, whatever is dispatched at once; more shadow rays visit more of them, and each path about as many.
+fn what_paths_meet_is_counted(gpu: &Gpu, spheres: &Viewed) {
     let counted = |samples: u32, shadow_rays: u32, is_split: bool| {
         let settings = SceneSettings { samples, shadow_rays, rounds: 1, block: Some(1), stop: Stop::default(), ..few() };
         let mut plan = spheres.tried(gpu, &settings, square_picture(SIZE));
@@ -104,7 +104,7 @@ fn what_paths_meet_is_counted(gpu: &Gpu, spheres: &Viewed, all: bool) {
     let (one, triangles) = counted(1, 1, false);
     assert!(one > 2.0 && triangles > 0, "{one} nodes a path, {triangles} triangles");
     assert_eq!(counted(1, 1, true), (one, triangles));
-    if !all {
+    if !is_long_run() {
         return;
     }
     let (more_paths, more_rays) = (counted(4, 1, false).0, counted(1, 4, false).0);
@@ -148,27 +148,14 @@ fn tiles_with_more_samples_change_no_mean(gpu: &Gpu, spheres: &Viewed, final_gat
 fn a_pilot_expects_what_rounds_are_like_and_chooses_the_same_twice() {
     let Some(gpu) = device() else { return };
     let spheres = spheres();
-    rounds_vary_as_the_pilot_expects(&gpu, &spheres, false);
+    rounds_vary_as_the_pilot_expects(&gpu, &spheres);
     what_is_set_stays_and_the_rest_is_chosen_alike_each_time(&gpu, &spheres);
-    what_paths_meet_is_counted(&gpu, &spheres, false);
+    what_paths_meet_is_counted(&gpu, &spheres);
     tiles_with_more_samples_change_no_mean(&gpu, &spheres, false);
-}
-
-#[test]
-#[ignore = "long: runs until an error, and more rounds and samples"]
-fn a_pilot_expects_what_all_rounds_are_like_and_chooses_less_work() {
-    let Some(gpu) = device() else { return };
-    let spheres = spheres();
-    rounds_vary_as_the_pilot_expects(&gpu, &spheres, true);
-    what_a_pilot_chooses_is_less_work_and_takes_about_the_rounds_that_it_expects(&gpu, &spheres);
-    what_paths_meet_is_counted(&gpu, &spheres, true);
-}
-
-#[test]
-#[ignore = "long: kernels of their own"]
-fn tiles_with_more_gather_rays_change_no_mean() {
-    let Some(gpu) = device() else { return };
-    tiles_with_more_samples_change_no_mean(&gpu, &spheres(), true);
+    if is_long_run() {
+        what_a_pilot_chooses_is_less_work_and_takes_about_the_rounds_that_it_expects(&gpu, &spheres);
+        tiles_with_more_samples_change_no_mean(&gpu, &spheres, true);
+    }
 }
 
 /// The program takes what a pilot finds where an error ends the run and nothing is set.
@@ -190,74 +177,59 @@ fn the_program_has_a_pilot_where_an_error_ends_the_run() {
     assert!(!stderr.contains("pilot: "), "{stderr}");
 }
 
-/// What a pilot has chosen is kept in a file, and used again to the same bits; `all`: by a pilot alone and by shards too.
-fn settings_are_kept(size: u32, [error, smaller]: [&str; 2], finds_tiles: bool, all: bool) {
-    let Some(_) = device() else { return };
-    let place = Place::new();
-    let scene = format!("render cornell-spheres --size {size}x{size}");
-    let line = format!("{scene} --error {error} --photons 1024 --caustic-photons 1024");
-    let (_, stderr) = place.succeed(&format!("{line} -o a.exr --save-settings s.json --checkpoint a.pms"));
-    let mut chosen = place.json("s.json");
-    assert!(
-        stderr.contains("pilot: ") && chosen["rounds"].as_u64().unwrap() >= 16 && chosen["tiles"].is_array() == finds_tiles,
-        "{chosen}"
-    );
-    let (_, stderr) = place.succeed(&format!("{line} -o b.exr --settings s.json"));
-    assert!(!stderr.contains("pilot") && !stderr.contains("warning"), "{stderr}");
-    let bytes = |name: &str| std::fs::read(place.at(name)).unwrap();
-    assert!(bytes("a.exr") == bytes("b.exr"));
-    if all {
-        // A pilot alone.
-        let (_, stderr) = place.succeed(&format!("{line} --save-settings t.json"));
-        assert!(stderr.contains("wrote t.json") && bytes("s.json") == bytes("t.json"), "{stderr}");
-    }
-    // A checkpoint carries all of it.
-    let (_, stderr) = place.succeed(&format!("{scene} --error {smaller} -o c.exr --json c.json --resume a.pms"));
-    let kept = &place.json("c.json")["settings"];
-    let is_kept = chosen["settings"].as_object().unwrap().iter().all(|(name, value)| kept[name] == *value);
-    assert!(is_kept && kept["tiles"] == chosen["tiles"] && !stderr.contains("pilot: "), "{stderr}");
-    // Shards use it, with tiles, and so does another scene.
-    if !finds_tiles {
-        chosen["tiles"] = vec!["0012"; size as usize / 4].into();
-        place.write("s.json", serde_json::to_string_pretty(&chosen).unwrap());
-    }
-    if all {
-        let short = format!("{scene} --settings s.json --rounds 8 -q");
-        for shard in [1, 2] {
-            place.succeed(&format!("{short} --shard {shard}/2 --checkpoint {shard}.pms"));
-        }
-        place.succeed("merge 1.pms 2.pms -o merged.exr");
-        place.succeed(&format!("{short} -o whole.exr"));
-        assert!(place.pixels("merged.exr") == place.pixels("whole.exr"));
-    }
-    let (_, stderr) = place.succeed(&format!("render point-over-plane --size {size}x{size} --settings s.json --rounds 1 -o d.exr"));
-    assert!(stderr.contains("warning: --settings: chosen for cornell-spheres, which was another scene"), "{stderr}");
-    place.write("wrong.json", "{}");
-    place.write("many.json", place.text("s.json").replace("\"shadow_rays\": ", "\"shadow_rays\": 9"));
-    place.assert_refused([
-        ("render cornell --settings absent.json -o e.exr", ["--settings absent.json", "cannot be read"].as_slice()),
-        ("render cornell --settings wrong.json -o e.exr", &["--settings wrong.json", "is no file of --save-settings"]),
-        ("render cornell --settings many.json -o e.exr", &["--settings many.json", "--shadow-rays"]),
-        (&format!("{scene} --settings s.json --paranoid -o e.exr -q"), &["--paranoid", "--samples"]),
-    ]);
-}
-
+/// What a pilot has chosen is kept in a file, and used again to the same bits; in the long run by a pilot alone and by shards too, and
+/// of a run so long that the pilot looks at all pixels, and finds tiles.
 #[test]
 fn settings_are_kept_in_a_file() {
-    settings_are_kept(16, ["50%", "45%"], false, false);
-}
-
-#[test]
-#[ignore = "long: each run of the program compiles its kernels"]
-fn settings_in_a_file_are_used_by_shards() {
-    settings_are_kept(16, ["50%", "45%"], false, true);
-}
-
-/// Of a run so long that the pilot looks at all pixels, and finds tiles.
-#[test]
-#[ignore = "half a minute on a software device"]
-fn tiles_are_kept_in_a_file() {
     let Some(gpu) = device() else { return };
-    let (size, errors) = if gpu.facts().kind == "cpu" { (24, ["15%", "14%"]) } else { (64, ["6%", "5%"]) };
-    settings_are_kept(size, errors, true, true);
+    let of_tiles = if gpu.facts().kind == "cpu" { (24, ["15%", "14%"], true) } else { (64, ["6%", "5%"], true) };
+    for (size, [error, smaller], finds_tiles) in [(16, ["50%", "45%"], false), of_tiles].into_iter().take(of_run(1, 2)) {
+        let place = Place::new();
+        let scene = format!("render cornell-spheres --size {size}x{size}");
+        let line = format!("{scene} --error {error} --photons 1024 --caustic-photons 1024");
+        let (_, stderr) = place.succeed(&format!("{line} -o a.exr --save-settings s.json --checkpoint a.pms"));
+        let mut chosen = place.json("s.json");
+        assert!(
+            stderr.contains("pilot: ") && chosen["rounds"].as_u64().unwrap() >= 16 && chosen["tiles"].is_array() == finds_tiles,
+            "{chosen}"
+        );
+        let (_, stderr) = place.succeed(&format!("{line} -o b.exr --settings s.json"));
+        assert!(!stderr.contains("pilot") && !stderr.contains("warning"), "{stderr}");
+        let bytes = |name: &str| std::fs::read(place.at(name)).unwrap();
+        assert!(bytes("a.exr") == bytes("b.exr"));
+        if is_long_run() {
+            // A pilot alone.
+            let (_, stderr) = place.succeed(&format!("{line} --save-settings t.json"));
+            assert!(stderr.contains("wrote t.json") && bytes("s.json") == bytes("t.json"), "{stderr}");
+        }
+        // A checkpoint carries all of it.
+        let (_, stderr) = place.succeed(&format!("{scene} --error {smaller} -o c.exr --json c.json --resume a.pms"));
+        let kept = &place.json("c.json")["settings"];
+        let is_kept = chosen["settings"].as_object().unwrap().iter().all(|(name, value)| kept[name] == *value);
+        assert!(is_kept && kept["tiles"] == chosen["tiles"] && !stderr.contains("pilot: "), "{stderr}");
+        // Shards use it, with tiles, and so does another scene.
+        if !finds_tiles {
+            chosen["tiles"] = vec!["0012"; size as usize / 4].into();
+            place.write("s.json", serde_json::to_string_pretty(&chosen).unwrap());
+        }
+        if is_long_run() {
+            let short = format!("{scene} --settings s.json --rounds 8 -q");
+            for shard in [1, 2] {
+                place.succeed(&format!("{short} --shard {shard}/2 --checkpoint {shard}.pms"));
+            }
+            place.succeed("merge 1.pms 2.pms -o merged.exr");
+            place.succeed(&format!("{short} -o whole.exr"));
+            assert!(place.pixels("merged.exr") == place.pixels("whole.exr"));
+        }
+        let (_, stderr) = place.succeed(&format!("render point-over-plane --size {size}x{size} --settings s.json --rounds 1 -o d.exr"));
+        assert!(stderr.contains("warning: --settings: chosen for cornell-spheres, which was another scene"), "{stderr}");
+        place.write("wrong.json", "{}");
+        place.write("many.json", place.text("s.json").replace("\"shadow_rays\": ", "\"shadow_rays\": 9"));
+        place.assert_refused([
+            ("render cornell --settings absent.json -o e.exr", ["--settings absent.json", "cannot be read"].as_slice()),
+            ("render cornell --settings wrong.json -o e.exr", &["--settings wrong.json", "is no file of --save-settings"]),
+            ("render cornell --settings many.json -o e.exr", &["--settings many.json", "--shadow-rays"]),
+            (&format!("{scene} --settings s.json --paranoid -o e.exr -q"), &["--paranoid", "--samples"]),
+        ]);
+    }
 }

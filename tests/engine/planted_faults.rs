@@ -702,28 +702,32 @@ fn faults_of(subject: Subject) -> impl Iterator<Item = &'static Fault> {
 }
 
 /// The questions that faults are noticed by are answered right by a device without one.
-fn questions_hold(subject: Subject, run: Run) {
+fn questions_hold(subject: Subject) {
     let Some(gpu) = device() else { return };
     let questions = faults_of(subject).flat_map(|fault| fault.noticed_by).map(|(question, _)| (format!("{question:?}"), question));
-    for question in questions.filter(|(_, question)| question.run() == run).collect::<BTreeMap<_, _>>().into_values() {
+    for question in questions
+        .filter(|(_, question)| question.run() == Short || is_long_run() && question.run() == Long)
+        .collect::<BTreeMap<_, _>>()
+        .into_values()
+    {
         assert_holds(format!("{} of a device without a fault", question.name()), question.ask(&gpu));
     }
 }
 
 /// How many faults are planted depends on the run: each is a kernel that the device compiles anew. In the short run every kernel of the
 /// room gets one, and each other subject its first; only questions that are not kept for the long run are asked.
-fn faults_are_noticed(subject: Subject, run: Run) {
+fn faults_are_noticed(subject: Subject) {
     let Some(mut gpu) = device() else { return };
     let mut spoiled_before: BTreeSet<&str> = BTreeSet::new();
     for fault in faults_of(subject) {
         // All of them count, whichever is seen first.
         let new = fault.kernels.iter().filter(|kernel| spoiled_before.insert(kernel)).count();
         let is_first = spoiled_before.len() == new;
-        if run == Short && (new == 0 || subject != Room && !is_first) {
+        if !is_long_run() && (new == 0 || subject != Room && !is_first) {
             continue;
         }
         gpu.replace(spoiled(fault));
-        let asked: Vec<_> = fault.noticed_by.iter().filter(|(question, _)| run == Long || question.run() != Long).collect();
+        let asked: Vec<_> = fault.noticed_by.iter().filter(|(question, _)| is_long_run() || question.run() != Long).collect();
         assert!(!asked.is_empty(), "{}: is noticed in the long run alone", fault.what);
         for (question, kind) in asked {
             assert_complains_of(*kind, &format!("{}, asked for {},", fault.what, question.name()), question.ask(&gpu));
@@ -735,82 +739,47 @@ fn faults_are_noticed(subject: Subject, run: Run) {
 
 #[test]
 fn questions_about_the_room_are_answered_right() {
-    questions_hold(Room, Short);
+    questions_hold(Room);
 }
 
 #[test]
 fn faults_of_the_room_are_noticed() {
-    faults_are_noticed(Room, Short);
+    faults_are_noticed(Room);
 }
 
 #[test]
 fn questions_about_scenes_are_answered_right() {
-    questions_hold(Scenes, Short);
+    questions_hold(Scenes);
 }
 
 #[test]
 fn faults_of_scenes_are_noticed() {
-    faults_are_noticed(Scenes, Short);
+    faults_are_noticed(Scenes);
 }
 
 #[test]
 fn questions_about_lamps_are_answered_right() {
-    questions_hold(Lamps, Short);
+    questions_hold(Lamps);
 }
 
 #[test]
 fn faults_of_lamps_are_noticed() {
-    faults_are_noticed(Lamps, Short);
+    faults_are_noticed(Lamps);
 }
 
 #[test]
 fn faults_of_aiming_are_noticed() {
-    faults_are_noticed(Aiming, Short);
+    faults_are_noticed(Aiming);
 }
 
 #[test]
 fn questions_about_layered_materials_are_answered_right() {
-    questions_hold(Layers, Short);
+    questions_hold(Layers);
 }
 
 #[test]
 fn faults_of_layered_materials_are_noticed() {
-    faults_are_noticed(Layers, Short);
-}
-
-#[test]
-#[ignore = "long: minutes of compiling"]
-fn all_faults_of_the_room_are_noticed() {
-    questions_hold(Room, Long);
-    faults_are_noticed(Room, Long);
-}
-
-#[test]
-#[ignore = "long: minutes of compiling"]
-fn all_faults_of_scenes_are_noticed() {
-    questions_hold(Scenes, Long);
-    faults_are_noticed(Scenes, Long);
-}
-
-#[test]
-#[ignore = "long: minutes of compiling"]
-fn all_faults_of_lamps_are_noticed() {
-    questions_hold(Lamps, Long);
-    faults_are_noticed(Lamps, Long);
-}
-
-#[test]
-#[ignore = "long: minutes of compiling"]
-fn all_faults_of_aiming_are_noticed() {
-    questions_hold(Aiming, Long);
-    faults_are_noticed(Aiming, Long);
-}
-
-#[test]
-#[ignore = "long: minutes of compiling"]
-fn all_faults_of_layered_materials_are_noticed() {
-    questions_hold(Layers, Long);
-    faults_are_noticed(Layers, Long);
+    faults_are_noticed(Layers);
 }
 
 /// How many faults are planted is said, and with no other number.

@@ -2,6 +2,7 @@
 //! the plain way to do it on the host.
 
 use crate::common::prelude::*;
+use crate::fuzz::change::Random;
 use bytemuck::Zeroable;
 use photonmill::constants::{NO_WALL, SCAN_ITEMS};
 use photonmill::engine::prefix_sum::scan;
@@ -15,10 +16,10 @@ use photonmill::records::{DispatchArgs, DispatchSizePush, Tally};
 /// Words that nothing may touch. As an entry of the photon map they are a photon on some wall.
 const GUARD: u32 = 0x5EAD_BEEF;
 
-/// Numbers of a linear congruential generator, 0 to `below` - 1.
+/// Numbers by chance, 0 to `below` - 1.
 fn numbers(count: usize, below: u32) -> Vec<u32> {
-    let step = |state: &u64| Some(state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407));
-    std::iter::successors(Some(12_345u64), step).skip(1).take(count).map(|state| (state >> 33) as u32 % below).collect()
+    let mut random = Random(12_345);
+    (0..count).map(|_| random.below(below as usize) as u32).collect()
 }
 
 /// Fails unless the device's exclusive prefix sums are the running sums, and it leaves alone what stands behind them in the same buffer.
@@ -369,7 +370,10 @@ fn indirect_dispatches_are_folded_below_the_limit() {
 }
 
 /// A full row of groups and more: photons of the folded rows are traced like the others.
-fn rounds_around_a_full_row(beyond: &[u32], builders: &[Builder]) {
+#[test]
+fn rounds_around_a_full_row_of_groups_lose_no_photon() {
+    let beyond = of_run::<&[_]>(&[33], &[0, 33]);
+    let builders = of_run::<&[_]>(&[Builder::Ballot, Builder::Persistent], &Builder::ON_GPU);
     let Some(gpu) = device() else { return };
     let row: u32 = 65_535 * 32;
     for photons in beyond.iter().map(|beyond| row + *beyond) {
@@ -386,15 +390,4 @@ fn rounds_around_a_full_row(beyond: &[u32], builders: &[Builder]) {
             assert_holds(format!("{builder:?}"), equal_sums("a folded round", &folded.film.sums, &split.film.sums));
         }
     }
-}
-
-#[test]
-fn rounds_around_a_full_row_of_groups_lose_no_photon() {
-    rounds_around_a_full_row(&[33], &[Builder::Ballot, Builder::Persistent]);
-}
-
-#[test]
-#[ignore = "long: minutes on a software device"]
-fn rounds_around_a_full_row_of_groups_lose_no_photon_of_any_builder() {
-    rounds_around_a_full_row(&[0, 33], &Builder::ON_GPU);
 }

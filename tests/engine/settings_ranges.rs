@@ -2,49 +2,37 @@
 //! their neighbours and anything between, alone and together, judged by rules that are written down here again.
 
 use crate::common::prelude::*;
+use crate::fuzz::change::Random;
 use photonmill::error::Result;
 use photonmill::text::echo;
 
 const CASES: usize = 40_000;
 
-/// Random numbers that are the same on every machine.
-struct Random(u64);
+fn word(random: &mut Random) -> u64 {
+    random.below(1);
+    random.0 ^ random.0 >> 33
+}
 
-impl Random {
-    fn word(&mut self) -> u64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        self.0 ^ self.0 >> 33
-    }
+/// An end of what is allowed, a neighbour of one, or any number.
+fn count(random: &mut Random, least: u32, most: u32) -> u32 {
+    let any = word(random) as u32 >> random.below(32);
+    random.pick(&[least, least + 1, least.wrapping_sub(1), most, most.wrapping_sub(1), most.wrapping_add(1), 0, u32::MAX, any])
+}
 
-    fn below(&mut self, limit: usize) -> usize {
-        (self.word() >> 33) as usize % limit
+fn number(random: &mut Random, least: f64, most: f64) -> f64 {
+    let any = f64::from_bits(word(random) << 32 | word(random) >> 32);
+    let between = least + (most - least) * random.below(1 << 20) as f64 / f64::from(1 << 20);
+    let odd = [0.0, -0.0, -least, -most, f64::MIN_POSITIVE, f64::MAX, f64::INFINITY, f64::NEG_INFINITY, f64::NAN, any];
+    match random.below(3) {
+        0 => random.pick(&[least, least.next_up(), least.next_down(), most, most.next_down(), most.next_up()]),
+        1 => between,
+        _ => random.pick(&odd),
     }
+}
 
-    fn pick<T: Copy>(&mut self, of: &[T]) -> T {
-        of[self.below(of.len())]
-    }
-
-    /// An end of what is allowed, a neighbour of one, or any number.
-    fn count(&mut self, least: u32, most: u32) -> u32 {
-        let any = self.word() as u32 >> self.below(32);
-        self.pick(&[least, least + 1, least.wrapping_sub(1), most, most.wrapping_sub(1), most.wrapping_add(1), 0, u32::MAX, any])
-    }
-
-    fn number(&mut self, least: f64, most: f64) -> f64 {
-        let any = f64::from_bits(self.word() << 32 | self.word() >> 32);
-        let between = least + (most - least) * self.below(1 << 20) as f64 / f64::from(1 << 20);
-        let odd = [0.0, -0.0, -least, -most, f64::MIN_POSITIVE, f64::MAX, f64::INFINITY, f64::NEG_INFINITY, f64::NAN, any];
-        match self.below(3) {
-            0 => self.pick(&[least, least.next_up(), least.next_down(), most, most.next_down(), most.next_up()]),
-            1 => between,
-            _ => self.pick(&odd),
-        }
-    }
-
-    fn number_f32(&mut self, least: f32, most: f32) -> f32 {
-        let edges = [least, least.next_up(), least.next_down(), most, most.next_down(), most.next_up()];
-        if self.below(2) == 0 { self.pick(&edges) } else { self.number(f64::from(least), f64::from(most)) as f32 }
-    }
+fn number_f32(random: &mut Random, least: f32, most: f32) -> f32 {
+    let edges = [least, least.next_up(), least.next_down(), most, most.next_down(), most.next_up()];
+    if random.below(2) == 0 { random.pick(&edges) } else { number(random, f64::from(least), f64::from(most)) as f32 }
 }
 
 /// What one rule says: whether it holds, and how the line starts that refuses what breaks it.
@@ -90,31 +78,31 @@ fn any_settings(random: &mut Random) -> RoomSettings {
     settings.rng = random.pick(&[Rng::Rand48, Rng::Mt, Rng::Sobol, Rng::Philox, Rng::Philox]);
     for _ in 0..=random.below(3) {
         match random.below(18) {
-            16 => settings.nearest = Some(random.count(2, 1024)),
+            16 => settings.nearest = Some(count(random, 2, 1024)),
             17 => {
                 settings.gather = Gather::KdTree;
-                settings.nearest = Some(random.count(2, 1024));
+                settings.nearest = Some(count(random, 2, 1024));
                 match random.below(3) {
-                    0 => settings.chunk = Some(random.count(2, settings.photons)),
+                    0 => settings.chunk = Some(count(random, 2, settings.photons)),
                     1 => settings.rounds = random.pick(&[1 << 21, (1 << 21) + 1, 1 << 30]),
                     _ => {}
                 }
             }
-            0 => settings.photons = random.count(2, 1 << 31),
-            1 => settings.rounds = random.count(1, u32::MAX),
-            2 => settings.bounces = random.count(1, 10_000),
-            3 => settings.mesh = random.count(1, 1024),
-            4 => settings.radius = random.number(0.5 / 65_536.0, 0.5),
-            5 => settings.full_light = random.number(1e-12, 1e12),
-            6 => settings.light_power[random.below(2)] = random.number(1e-12, 1e12),
-            7 => settings.light_radius = random.number(0.0, 0.25),
-            8 => settings.reflectance = random.number_f32(0.0, 1.0),
-            9 => settings.shininess[random.below(5)] = Some(random.number_f32(0.0, f32::MAX)),
-            10 => settings.eye[random.below(3)] = random.number_f32(-1e15, 1e15),
-            11 => settings.threads = random.count(1, 1024) as usize,
-            12 => settings.group_size = if random.below(2) == 0 { 1 << random.below(12) } else { random.count(32, 1024) },
-            13 => settings.counters = Some(if random.below(2) == 0 { 1 << random.below(8) } else { random.count(1, 64) }),
-            14 => settings.chunk = Some(random.count(2, 1 << 31)),
+            0 => settings.photons = count(random, 2, 1 << 31),
+            1 => settings.rounds = count(random, 1, u32::MAX),
+            2 => settings.bounces = count(random, 1, 10_000),
+            3 => settings.mesh = count(random, 1, 1024),
+            4 => settings.radius = number(random, 0.5 / 65_536.0, 0.5),
+            5 => settings.full_light = number(random, 1e-12, 1e12),
+            6 => settings.light_power[random.below(2)] = number(random, 1e-12, 1e12),
+            7 => settings.light_radius = number(random, 0.0, 0.25),
+            8 => settings.reflectance = number_f32(random, 0.0, 1.0),
+            9 => settings.shininess[random.below(5)] = Some(number_f32(random, 0.0, f32::MAX)),
+            10 => settings.eye[random.below(3)] = number_f32(random, -1e15, 1e15),
+            11 => settings.threads = count(random, 1, 1024) as usize,
+            12 => settings.group_size = if random.below(2) == 0 { 1 << random.below(12) } else { count(random, 32, 1024) },
+            13 => settings.counters = Some(if random.below(2) == 0 { 1 << random.below(8) } else { count(random, 1, 64) }),
+            14 => settings.chunk = Some(count(random, 2, 1 << 31)),
             _ => settings.seed = random.pick(&[0, u64::from(u32::MAX), 1 << 32, u64::MAX]),
         }
     }
@@ -180,17 +168,17 @@ fn any_transport_settings(random: &mut Random) -> SceneSettings {
     let mut settings = by_rounds();
     for _ in 0..=random.below(3) {
         match random.below(13) {
-            0 => settings.photons = random.count(1, 1 << 31),
-            1 => settings.caustic_photons = random.count(1, 1 << 31),
-            2 => settings.rounds = random.count(1, 1 << 20),
-            3 => settings.bounces = random.count(1, 10_000),
-            4 => settings.shadow_rays = random.count(1, MAX_SHADOW_RAYS),
-            5 => settings.radius = Some(random.number(f64::MIN_POSITIVE, f64::MAX)),
-            6 => settings.caustic_radius = Some(random.number(f64::MIN_POSITIVE, f64::MAX)),
-            7 => settings.alpha = random.number(f64::MIN_POSITIVE, 1.0),
-            8 => settings.group_size = if random.below(2) == 0 { 1 << random.below(12) } else { random.count(32, 1024) },
-            9 => settings.chunk = Some(random.count(1, 1 << 31)),
-            10 => settings.samples = if random.below(2) == 0 { 1 << random.below(12) } else { random.count(1, 1024) },
+            0 => settings.photons = count(random, 1, 1 << 31),
+            1 => settings.caustic_photons = count(random, 1, 1 << 31),
+            2 => settings.rounds = count(random, 1, 1 << 20),
+            3 => settings.bounces = count(random, 1, 10_000),
+            4 => settings.shadow_rays = count(random, 1, MAX_SHADOW_RAYS),
+            5 => settings.radius = Some(number(random, f64::MIN_POSITIVE, f64::MAX)),
+            6 => settings.caustic_radius = Some(number(random, f64::MIN_POSITIVE, f64::MAX)),
+            7 => settings.alpha = number(random, f64::MIN_POSITIVE, 1.0),
+            8 => settings.group_size = if random.below(2) == 0 { 1 << random.below(12) } else { count(random, 32, 1024) },
+            9 => settings.chunk = Some(count(random, 1, 1 << 31)),
+            10 => settings.samples = if random.below(2) == 0 { 1 << random.below(12) } else { count(random, 1, 1024) },
             11 => settings.builder = Some(random.pick(&Builder::ALL)),
             _ => {
                 settings.with = (0..random.below(4)).map(|_| random.pick(&Effect::ALL)).collect();

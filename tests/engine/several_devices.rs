@@ -1,12 +1,13 @@
 //! Runs on several devices: whichever does which block, the result is that of one device to the bit. Here all of them are one device,
 //! opened several times.
 
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use crate::common::lit::Viewed;
 use crate::common::prelude::*;
+use crate::fuzz::seeds::Saved;
 use photonmill::engine::End;
 use photonmill::engine::run::retry::{Remedy, run_on};
 use photonmill::engine::run::saved::SavedRun;
@@ -43,16 +44,6 @@ struct Came {
     lit: RunResult,
     given_up: u32,
     saved: Vec<SavedRun>,
-}
-
-#[derive(Default)]
-struct All(Vec<SavedRun>);
-
-impl SaveRun for All {
-    fn save(&mut self, run: &Arc<SavedRun>, _: bool) -> Result<(), Error> {
-        self.0.push(SavedRun::clone(run));
-        Ok(())
-    }
 }
 
 fn room() -> Viewed {
@@ -111,7 +102,7 @@ fn shared(room: &Viewed, count: usize, settings: &SceneSettings, trouble: Troubl
         assert_eq!(remedy, Remedy::GivenUp);
         given_up.fetch_add(1, Ordering::Relaxed);
     };
-    let (cancelled, mut all) = (AtomicBool::new(false), All::default());
+    let (cancelled, mut all) = (AtomicBool::new(false), Saved::default());
     let mut progress = |progress: &engine::Progress| {
         if trouble.cancelled_at.is_some_and(|rounds| progress.done >= rounds) {
             cancelled.store(true, Ordering::Relaxed);
@@ -164,7 +155,9 @@ fn several_devices_come_to_the_bits_of_one() {
 }
 
 /// Which one fails after how many rounds, and how many there are.
-fn failing_devices_are_given_up(cases: &[((usize, u64), usize)]) {
+#[test]
+fn a_device_that_fails_is_given_up() {
+    let cases = of_run::<&[_]>(&[((0, 8), 2)], &[((0, 8), 2), ((2, 2), 3)]);
     let Some(_) = device() else { return };
     let room = room();
     let expected = alone(&room, &settings());
@@ -175,17 +168,6 @@ fn failing_devices_are_given_up(cases: &[((usize, u64), usize)]) {
     }
     let Err(error) = shared(&room, 1, &settings(), Trouble { fails: Some((0, 2)), ..Trouble::default() }) else { panic!("none is left") };
     assert!(matches!(error, Error::Device { .. }), "{error}");
-}
-
-#[test]
-fn a_device_that_fails_is_given_up() {
-    failing_devices_are_given_up(&[((0, 8), 2)]);
-}
-
-#[test]
-#[ignore = "long: minutes on a software device"]
-fn a_device_of_several_that_fails_is_given_up() {
-    failing_devices_are_given_up(&[((0, 8), 2), ((2, 2), 3)]);
 }
 
 /// What was done when a run was ended goes on, on one device or several, to the same end.

@@ -149,7 +149,9 @@ impl Planned {
 }
 
 /// The claims of so many runs of each scene, side by side. Their truth is the mean of the others.
-fn claims_hold(scenes: &[&str], seeds: u64) {
+#[test]
+fn errors_lie_within_the_claim_as_often_as_claimed() {
+    let (scenes, seeds) = of_run::<(&[_], _)>((&FEW, 8), (&SCENES, 100));
     if device().is_none() {
         return;
     }
@@ -287,17 +289,6 @@ fn errors_of_what_a_pilot_chooses_lie_within_the_claim_as_often_as_claimed() {
     println!("coverage and width: {:.3?}", claims_of_all(&scenes, size, 500, chosen));
 }
 
-#[test]
-fn errors_lie_within_the_claim_as_often_as_claimed() {
-    claims_hold(&FEW, 8);
-}
-
-#[test]
-#[ignore = "a thousand runs: minutes on a software device"]
-fn errors_of_a_hundred_runs_lie_within_the_claim_as_often_as_claimed() {
-    claims_hold(&SCENES, 100);
-}
-
 /// Of a large picture few pixels are kept, and those with most of the noise are seldom among them.
 #[test]
 #[ignore = "large pictures: for a real GPU"]
@@ -326,36 +317,28 @@ fn mirror_ball() -> Scene {
 
 /// Of runs that know the tail of their noise, of which there are so many at least, as many are within their claim as it says; where most
 /// do not know it, fewer of all runs are.
-fn claims_of_known_tails_hold(rounds: u32, seeds: u64, least_known: usize) {
-    let Some(gpu) = device() else { return };
-    let stop = Stop { confidence: CONFIDENCE, ..Stop::default() };
-    let planned = Planned::new(&gpu, mirror_ball(), &SceneSettings { rounds, stop, ..settings(1.0, 0) }, 2 * SIZE);
-    let one = |seed| {
-        let film = planned.run(&gpu, seed, stop).film;
-        (film.error(CONFIDENCE).tail_is_known(CONFIDENCE), claim_of_noise(&film))
-    };
-    let (is_known, runs): (Vec<bool>, Vec<Claim>) = (1..=seeds).map(one).unzip();
-    let within: Vec<bool> = pairs(true_errors(&runs), &runs).map(|(off, (_, bound, _))| off <= *bound).collect();
-    let check = |within: &[bool]| coverage_check("runs", within.iter().filter(|is| **is).count() as f64 / within.len() as f64);
-    let known: Vec<bool> = pairs(is_known, &within).filter(|(is_known, _)| *is_known).map(|(_, within)| *within).collect();
-    println!("{rounds} rounds: {known:?} of those whose tail is known, {within:?} of all are within their claim");
-    assert!(known.len() >= least_known, "{rounds} rounds: {}", known.len());
-    assert_holds(format!("{rounds} rounds"), check(&known));
-    if 2 * known.len() < within.len() {
-        assert_complains("runs that trust what they have seen", check(&within));
-    }
-}
-
 #[test]
 fn claims_hold_once_the_tail_is_known() {
-    claims_of_known_tails_hold(32, 16, 1);
-}
-
-#[test]
-#[ignore = "two minutes on a software device"]
-fn claims_hold_once_most_tails_are_known() {
-    claims_of_known_tails_hold(16, 20, 1);
-    claims_of_known_tails_hold(256, 20, 15);
+    let Some(gpu) = device() else { return };
+    let stop = Stop { confidence: CONFIDENCE, ..Stop::default() };
+    let cases = [(32, 16, 1), (16, 20, 1), (256, 20, 15)];
+    for &(rounds, seeds, least_known) in &cases[..of_run(1, 3)] {
+        let planned = Planned::new(&gpu, mirror_ball(), &SceneSettings { rounds, stop, ..settings(1.0, 0) }, 2 * SIZE);
+        let one = |seed| {
+            let film = planned.run(&gpu, seed, stop).film;
+            (film.error(CONFIDENCE).tail_is_known(CONFIDENCE), claim_of_noise(&film))
+        };
+        let (is_known, runs): (Vec<bool>, Vec<Claim>) = (1..=seeds).map(one).unzip();
+        let within: Vec<bool> = pairs(true_errors(&runs), &runs).map(|(off, (_, bound, _))| off <= *bound).collect();
+        let check = |within: &[bool]| coverage_check("runs", within.iter().filter(|is| **is).count() as f64 / within.len() as f64);
+        let known: Vec<bool> = pairs(is_known, &within).filter(|(is_known, _)| *is_known).map(|(_, within)| *within).collect();
+        println!("{rounds} rounds: {known:?} of those whose tail is known, {within:?} of all are within their claim");
+        assert!(known.len() >= least_known, "{rounds} rounds: {}", known.len());
+        assert_holds(format!("{rounds} rounds"), check(&known));
+        if 2 * known.len() < within.len() {
+            assert_complains("runs that trust what they have seen", check(&within));
+        }
+    }
 }
 
 /// Paths that meet the lamp may be missing from every one of the first 30 rounds, whose noise is then small.
@@ -550,15 +533,10 @@ fn the_end_is_predicted_at_a_tenth_of_the_run() {
     assert_eq!(outcome.end, End::Error);
     let off = off_at_the_end("the box", &told, outcome.fates[0].emitted as f64);
     assert!(off <= 0.2, "the box: {off}");
-}
-
-/// In 9 of 10 scenes within a fifth; with bias, which falls with a radius that shrinks, within a factor of 1.5.
-#[test]
-#[ignore = "half a thousand rounds of ten scenes, twice: two minutes on a software device"]
-fn the_end_of_every_scene_is_predicted_at_a_tenth_of_the_run() {
-    let Some(gpu) = device() else { return };
-    for (photons, alpha, times, most) in [(300, 1.0, 2.4, 0.2), (5000, SceneSettings::default().alpha, 2.0, 0.5)] {
-        let off = predictions(&gpu, &SCENES, photons, alpha, times);
-        assert!(off[off.len() * 9 / 10 - 1] <= most, "{off:?}");
+    if is_long_run() {
+        for (photons, alpha, times, most) in [(300, 1.0, 2.4, 0.2), (5000, SceneSettings::default().alpha, 2.0, 0.5)] {
+            let off = predictions(&gpu, &SCENES, photons, alpha, times);
+            assert!(off[off.len() * 9 / 10 - 1] <= most, "{off:?}");
+        }
     }
 }

@@ -230,9 +230,10 @@ pub fn film_agrees(gpu: &Gpu, settings: &RoomSettings, expected: &RoomFilm) -> C
     same_sums("the film", &outcome_of(gpu, &open_box(settings), settings)?.film.sums, &expected.sums)
 }
 
-/// The paper's box: the device's photons and films are the CPU builder's, bit for bit; `all`: those of every builder under each of these
-/// settings, and not only under the first.
-fn the_cpu_builder_agrees(all: bool) {
+/// The paper's box: the device's photons and films are the CPU builder's, bit for bit; in the long run those of every builder under each of
+/// these settings, and not only under the first.
+#[test]
+fn the_cpu_builder_agrees_to_the_bit() {
     let Some(gpu) = device() else { return };
     for (emission, shininess, rng) in [
         (EmissionLaw::Uniform, [None; 5], Rng::Rand48),
@@ -243,49 +244,30 @@ fn the_cpu_builder_agrees(all: bool) {
         assert_holds(format!("{emission:?}"), photons_agree(&gpu, &settings, &photons_on_cpu(&settings)));
         let on_cpu = run_on_cpu(&settings).film;
         let is_first = emission == EmissionLaw::Uniform && rng == Rng::Rand48;
-        for builder in Builder::ON_GPU.into_iter().filter(|builder| all || is_first || *builder == settings.builder) {
+        for builder in Builder::ON_GPU.into_iter().filter(|builder| is_long_run() || is_first || *builder == settings.builder) {
             let settings = RoomSettings { builder, ..settings.clone() };
             assert_holds(format!("{emission:?}, {builder:?}"), film_agrees(&gpu, &settings, &on_cpu));
         }
     }
 }
 
-#[test]
-fn the_cpu_builder_agrees_to_the_bit() {
-    the_cpu_builder_agrees(false);
-}
-
-#[test]
-#[ignore = "long: kernels of every builder"]
-fn every_builder_agrees_to_the_bit() {
-    the_cpu_builder_agrees(true);
-}
-
-fn found_again(gpu: &Gpu, names: &[&str]) {
-    let differing: Vec<String> = names.iter().filter_map(|name| bits::check(gpu, name).err()).map(|complaint| complaint.text).collect();
-    assert!(differing.is_empty(), "{} of {} differ:\n{}", differing.len(), names.len(), differing.join("\n"));
-}
-
-/// Mirrors, glass and caustics; the paper's box.
+/// In the short run of mirrors, glass and caustics, and of the paper's box.
 #[test]
 fn every_device_finds_these_bits() {
     let Some(gpu) = device() else { return };
-    found_again(&gpu, &["cornell-spheres", "the paper's box"]);
-}
-
-#[test]
-#[ignore = "long: minutes of compiling"]
-fn every_device_finds_all_bits() {
-    let Some(gpu) = device() else { return };
-    found_again(&gpu, &BITS.map(|(name, _)| name));
-    fast_and_strict_differ_by_far_less_than_the_noise(&gpu);
+    let names = of_run(vec!["cornell-spheres", "the paper's box"], BITS.map(|(name, _)| name).to_vec());
+    let differing: Vec<String> = names.iter().filter_map(|name| bits::check(&gpu, name).err()).map(|complaint| complaint.text).collect();
+    assert!(differing.is_empty(), "{} of {} differ:\n{}", differing.len(), names.len(), differing.join("\n"));
 }
 
 /// Rounding changes which way single paths go, and nothing on the whole.
-fn fast_and_strict_differ_by_far_less_than_the_noise(gpu: &Gpu) {
+#[test]
+#[ignore = "long: kernels of both arithmetics"]
+fn fast_and_strict_differ_by_far_less_than_the_noise() {
+    let Some(gpu) = device() else { return };
     let scene = built_in::by_name("cornell-spheres").unwrap();
     let settings = SceneSettings { rounds: 4, ..small() };
-    let lit = [Math::Fast, Math::Strict].map(|math| picture(gpu, &scene, &SceneSettings { math, ..settings.clone() }));
+    let lit = [Math::Fast, Math::Strict].map(|math| picture(&gpu, &scene, &SceneSettings { math, ..settings.clone() }));
     let rms = |f: &dyn Fn(usize) -> f64| (0..lit[0].film.pixels()).map(|pixel| f(pixel).powi(2)).sum::<f64>().sqrt();
     let difference = rms(&|pixel| (lit[0].film.mean(pixel) - lit[1].film.mean(pixel)).length());
     let noise = rms(&|pixel| lit[1].film.standard_error(pixel).length());

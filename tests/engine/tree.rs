@@ -61,9 +61,10 @@ fn the_tree_gives_the_films_of_brute_force_for_every_number_of_photons() {
     }
 }
 
-fn builders_and_splits(all: bool) {
+#[test]
+fn builders_and_splits_give_the_bits_of_the_grid() {
     let Some(gpu) = device() else { return };
-    for (half, (what, settings)) in few_effects().into_iter().enumerate().skip(if all { 0 } else { 1 }) {
+    for (half, (what, settings)) in few_effects().into_iter().enumerate().skip(of_run(1, 0)) {
         let expected = film(&gpu, &settings);
         assert!(expected.sums.iter().filter(|sum| **sum > 0).count() > expected.sums.len() / 2);
         for (place, builder) in Builder::ON_GPU.into_iter().enumerate().skip(half).step_by(2) {
@@ -76,22 +77,11 @@ fn builders_and_splits(all: bool) {
         assert_same(what, "CPU", &run_on_cpu(&by_tree(&settings)).film, &run_on_cpu(&settings).film);
     }
     // Nothing is stored in a black box, and the whole line still runs.
-    for builder in [Builder::Persistent, Builder::Naive].into_iter().take(if all { 2 } else { 1 }) {
+    for builder in [Builder::Persistent, Builder::Naive].into_iter().take(of_run(1, 2)) {
         let black = by_tree(&RoomSettings { reflectance: 0.0, builder, mesh: 8, ..RoomSettings::default() });
         assert!(film(&gpu, &black).sums.iter().all(|sum| *sum == 0));
         assert!(film(&gpu, &RoomSettings { nearest: Some(5), ..black }).sums.iter().all(|sum| *sum == 0));
     }
-}
-
-#[test]
-fn builders_and_splits_give_the_bits_of_the_grid() {
-    builders_and_splits(false);
-}
-
-#[test]
-#[ignore = "long: minutes on a software device"]
-fn all_builders_and_splits_give_the_bits_of_the_grid() {
-    builders_and_splits(true);
 }
 
 /// More photons in reach than lavapipe loops.
@@ -224,11 +214,12 @@ fn a_search_goes_on_for_as_long_as_it_takes() {
     }
 }
 
-fn all_take_the_same_nearest_photons(all: bool) {
+#[test]
+fn builders_and_the_cpu_take_the_same_nearest_photons() {
     let Some(gpu) = device() else { return };
     let lesser = device_with(Options { without_int64_atomics: true, ..Options::default() }).unwrap();
     let glossy = [Some(2.0), None, Some(0.5), Some(0.01), Some(5.0)];
-    for (nearest, rounds) in [(6, 2), (40, 1)].into_iter().take(if all { 2 } else { 1 }) {
+    for (nearest, rounds) in [(6, 2), (40, 1)].into_iter().take(of_run(1, 2)) {
         let uneven = RoomSettings { mesh: 33, shininess: glossy, light_power: [3.0, 0.2], ..RoomSettings::default() };
         let settings = RoomSettings { nearest: Some(nearest), rounds, math: Math::Strict, threads: 2, ..by_tree(&uneven) };
         let expected = run_on_cpu(&settings).film;
@@ -237,7 +228,7 @@ fn all_take_the_same_nearest_photons(all: bool) {
             assert_same(&format!("{nearest} nearest"), other.builder.name(), &film(&gpu, &other), &expected);
         }
         assert_same(&format!("{nearest} nearest"), "32 bits", &film(&lesser, &settings), &expected);
-        if !all {
+        if !is_long_run() {
             continue;
         }
         let one_channel = RoomSettings { shininess: [None; 5], light_power: [1.0; 2], ..settings };
@@ -245,17 +236,6 @@ fn all_take_the_same_nearest_photons(all: bool) {
         assert_eq!(found.channel_count, 1);
         assert_same("one channel", "", &found, &expected);
     }
-}
-
-#[test]
-fn builders_and_the_cpu_take_the_same_nearest_photons() {
-    all_take_the_same_nearest_photons(false);
-}
-
-#[test]
-#[ignore = "long: minutes on a software device"]
-fn all_builders_and_the_cpu_take_the_same_nearest_photons() {
-    all_take_the_same_nearest_photons(true);
 }
 
 /// Evenly spread photons of unknown number (Poisson): the estimate is right on average, near edges and where the

@@ -73,18 +73,11 @@ fn keep_about_the_radius_of_their_area(gpu: &Gpu, names: &[&str]) {
     assert!(off.is_empty(), "{off:#?}");
 }
 
-#[test]
-#[ignore = "long: kernels of three scenes"]
-fn built_in_scenes_keep_about_the_radius_of_their_area() {
-    let Some(gpu) = device() else { return };
-    keep_about_the_radius_of_their_area(&gpu, &["cornell-spheres", "caustic-sphere", "furnace"]);
-}
-
 /// The radius follows from scene, points and settings alone; one that is given is taken, and nothing is tried.
 #[test]
 fn a_trial_knows_no_seed_builder_or_split() {
     let Some(gpu) = device() else { return };
-    keep_about_the_radius_of_their_area(&gpu, &["cornell-spheres"]);
+    keep_about_the_radius_of_their_area(&gpu, &["cornell-spheres", "caustic-sphere", "furnace"][..of_run(1, 3)]);
     let spheres = Viewed::new(scene("cornell-spheres"));
     let radii = |settings: &SceneSettings| {
         let plan = spheres.tried(&gpu, settings, PICTURE);

@@ -1,9 +1,9 @@
 //! Lightmaps in the user's own file: what was there stays to the byte, what is added leads every texel to its light, and a second
 //! bake finds the coordinates of the first.
 
-use super::gltf::{assert_said, push};
+use super::gltf::assert_said;
 use super::lightmap_texels::{numbered, open};
-use crate::common::gltf_file::{data_uri, encoded, floats};
+use crate::common::gltf_file::{data_uri, encoded, floats, push};
 use crate::common::prelude::*;
 use crate::common::program::entries;
 use crate::common::rich_file::{compressed, draco_square};

@@ -88,17 +88,8 @@ const OLD: (bool, &str) = (true, "1.4.3");
 
 #[test]
 fn direct_light_alone_is_denoised_and_the_file_says_so() {
-    denoise_by("cornell", &[NEW]);
-}
-
-#[test]
-#[ignore = "long: a library of either version; mirrors and glass"]
-fn direct_light_alone_is_denoised_by_all_versions() {
-    denoise_by("cornell-spheres", &[NEW, OLD]);
-}
-
-/// A scene by libraries of these versions, the new one first.
-fn denoise_by(scene: &str, versions: &[(bool, &str)]) {
+    // Of the library, the new one first.
+    let (scene, versions) = of_run::<(_, &[_])>(("cornell", &[NEW]), ("cornell-spheres", &[NEW, OLD]));
     let Some(_) = device() else { return };
     if cfg!(not(target_os = "linux")) || Denoiser::open().is_ok() {
         eprintln!("SKIPPED: Open Image Denoise itself is in the place of the test's library");

@@ -1,7 +1,7 @@
 //! What only extensions of glTF bring, and poses of animations.
 
-use super::gltf::{add_accessor, assert_changes_refused, assert_refused, assert_said, load, load_at, load_whole, push};
-use crate::common::gltf_file::{data_uri, floats, square, square_buffer};
+use super::gltf::{assert_changes_refused, assert_refused, assert_said, load, load_at, load_whole};
+use crate::common::gltf_file::{add_accessor, data_uri, floats, push, square, square_buffer};
 use crate::common::prelude::*;
 use crate::common::rich_file::{
     animated, compressed, draco_square, instanced, ktx2, ktx2_in_zstandard, with_image_light, with_ktx2, with_webp,

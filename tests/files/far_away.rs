@@ -1,8 +1,8 @@
 //! Scenes that stand far from the origin, as exports of buildings and maps do: to 0.1 mm they are what they are near it, and what is not
 //! is said.
 
-use super::gltf::{add_accessor, assert_said, load, load_at, load_whole, push, skinned_square, uvs, with_material};
-use crate::common::gltf_file::{floats, set_buffer, square, square_buffer};
+use super::gltf::{assert_said, load, load_at, load_whole, skinned_square, uvs, with_material};
+use crate::common::gltf_file::{add_accessor, floats, push, set_buffer, square, square_buffer};
 use crate::common::prelude::*;
 use crate::common::rich_file::{animated, instanced};
 use serde_json::{Value, json};

@@ -1,45 +1,25 @@
 //! Files as nobody would write them. Whatever the loader takes must become records and a plan: no panic, no
 //! endless loop, no memory without bound, no number that is none.
 
-use std::fmt::Debug;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::Path;
 use std::process::Command;
-use std::sync::atomic::AtomicBool;
 use std::sync::mpsc;
 use std::time::Duration;
 
-use glam::{DVec4, Vec3};
-use image::{ImageFormat, RgbImage};
-use photonmill::engine::Control;
-use photonmill::engine::error::differences::Differences;
-use photonmill::engine::film::{BlockSums, LatestBlocks};
-use photonmill::engine::room;
-use photonmill::engine::run::saved::{SavedFilm, SavedRun};
-use photonmill::engine::run::watch::{Keep, SaveRun};
-use photonmill::engine::scene::SceneFilm;
-use photonmill::engine::scene::map_file::{MapFile, MapWriter};
-use photonmill::ledger::Fates;
-use photonmill::output::merge_report;
-use photonmill::photon::MapPhoton;
-use photonmill::plan::differences::difference_count;
-use photonmill::plan::scene::ScenePlan;
-use photonmill::plan::sensor::Sensor;
-use photonmill::plan::{Limits, RoomPlan, photons_of};
-use photonmill::rng::Rng;
-use photonmill::scene::geometry::Geometry;
-use photonmill::scene::material::Layers;
-use photonmill::scene::open_box::open_box;
-use photonmill::scene::sky::Sky;
-use photonmill::scene::{Material, Reading, Scene, built_in};
-use photonmill::settings::scene::SceneSettings;
-use photonmill::settings::{Builder, RoomSettings};
-use serde_json::{Value, json};
-use sha2::{Digest, Sha256};
-
-use crate::common::gltf_file::{self, data_uri, encoded, floats, set_buffer};
+use crate::common::gltf_file::{self, data_uri, encoded, floats, push, set_buffer};
+use crate::common::prelude::*;
 use crate::common::rich_file;
-use crate::fuzz::change::{Random, change, pack, parts};
+use crate::fuzz::change::{Random, change, parts};
+use crate::fuzz::sealed::{Format, Map, Run};
+use crate::fuzz::{self, refused, seeds};
+use image::{ImageFormat, RgbImage};
+use photonmill::engine::run::blocks::Share;
+use photonmill::engine::run::saved::SavedRun;
+use photonmill::plan::photons_of;
+use photonmill::scene::Reading;
+use photonmill::scene::gltf::source::binary_file;
+use photonmill::scene::sky::Sky;
+use serde_json::{Value, json};
 
 const BLENDER: &[u8] = include_bytes!("../scenes/blender.glb");
 /// The same mutations each time; `tools/fuzz/run` goes on with others for as long as it is let.
@@ -58,71 +38,7 @@ enum Fate {
 fn plan(folder: &Path, name: &str, content: &[u8]) -> Fate {
     let path = folder.join(name);
     std::fs::write(&path, content).unwrap();
-    let outcome = Scene::open(path.to_str().unwrap(), false).and_then(|scene| {
-        check_scene(&scene);
-        let geometry = Geometry::new(&scene)?;
-        let sensor = Sensor::Picture { width: 16, height: 16 };
-        let plan = ScenePlan::new(&scene, &geometry, &SceneSettings::default(), sensor, &Limits::of_host())?;
-        assert!(plan.film.scale.is_finite() && plan.film.scale > 0.0, "film scale {}", plan.film.scale);
-        assert!(plan.bytes <= Limits::of_host().memory_bytes, "{} bytes", plan.bytes);
-        check_records(&geometry);
-        Ok(geometry.triangles.len())
-    });
-    match outcome {
-        Ok(triangles) => Fate::Planned(triangles),
-        Err(error) => {
-            let line = error.to_string();
-            assert_eq!((error.exit_code(), line.lines().count()), (2, 1), "{line}");
-            Fate::Refused(line)
-        }
-    }
-}
-
-fn check_scene(scene: &Scene) {
-    for mesh in &scene.meshes {
-        let name = &mesh.name;
-        let has_one_each = |count: usize, of: usize| count == 0 || count == of;
-        let (vertices, material) = (mesh.positions.len(), &scene.materials[mesh.material]);
-        for count in [mesh.normals.len(), mesh.uvs[0].len(), mesh.uvs[1].len(), mesh.colours.len(), mesh.alphas.len()] {
-            assert!(has_one_each(count, vertices), "{name}: {count} of {vertices}");
-        }
-        assert!(mesh.alphas.iter().all(|alpha| (0.0..=1.0).contains(alpha)), "{name}: alphas");
-        let (needed, needed_by_coat) = (material.tangent_coordinates().is_some(), material.layers.coat_normal_map.is_some());
-        for (is_needed, tangents) in [(needed, &mesh.tangents), (needed_by_coat, &mesh.coat_tangents)] {
-            assert_eq!(tangents.len(), if is_needed { mesh.triangles.len() } else { 0 }, "{name}");
-            let is_unit = |tangent: &DVec4| tangent.truncate().is_normalized() && tangent.w.abs() == 1.0;
-            assert!(tangents.as_flattened().iter().all(is_unit), "{name}: tangents");
-        }
-    }
-    for material in &scene.materials {
-        let Material { name, layers, base_colour, emission, .. } = material;
-        let Layers { metallic, roughness, specular, transmission, diffuse_transmission, iridescence, anisotropy, coat, .. } = *layers;
-        let shares = [metallic, roughness, specular, transmission, diffuse_transmission, iridescence, anisotropy, coat];
-        let more = [layers.coat_roughness, layers.sheen_roughness].into_iter().chain(base_colour.to_array());
-        let more =
-            more.chain(layers.sheen_colour.to_array()).chain(layers.medium.map_or([1.0; 3], |medium| medium.transmittance.to_array()));
-        assert!(shares.into_iter().chain(more).all(|share| (0.0..=1.0).contains(&share)), "{name}: {layers:?}");
-        let rest = [layers.ior, layers.ior_spread()].into_iter().chain(layers.specular_colour.to_array()).chain(emission.to_array());
-        assert!(rest.into_iter().all(|factor| factor.is_finite() && factor >= 0.0), "{name}: {layers:?}");
-        assert!(material.textures().all(|used| used.texture < scene.textures.len() && used.uv_set < 2), "{name}");
-    }
-    assert!(scene.textures.iter().all(|texture| texture.texels.count() == texture.width as usize * texture.height as usize));
-}
-
-fn check_records(geometry: &Geometry) {
-    let near = |what: &str, v: Vec3| assert!(v.is_finite() && v.abs().max_element() <= 1.0, "{what} {v}");
-    let finite = |what: &str, v: Vec3| assert!(v.is_finite() && v.min_element() >= 0.0, "{what} {v}");
-    geometry.triangles.iter().for_each(|triangle| [triangle.a, triangle.b, triangle.c].iter().for_each(|corner| near("corner", *corner)));
-    for emitter in &geometry.emitters {
-        finite("strength", emitter.strength);
-        finite("flux", emitter.flux);
-        assert!(emitter.position.is_finite() && emitter.direction.is_finite(), "{emitter:?}");
-        assert!(emitter.probability > 0.0, "{emitter:?}");
-    }
-    assert!(geometry.emitters.is_sorted_by(|a, b| a.cumulative < b.cumulative), "cumulative shares must rise");
-    assert!(geometry.emitters.last().is_none_or(|last| last.cumulative == 1.0), "the last share must be 1");
-    assert!(geometry.uvs.iter().all(|uv| uv.base_a.is_finite() && uv.base_b.is_finite() && uv.base_c.is_finite()), "coordinates");
-    assert!(geometry.flux_unit.is_finite() && geometry.flux_unit > 0.0 && geometry.power.is_finite() && geometry.area > 0.0);
+    fuzz::gltf::plan(&path).map_or_else(|error| Fate::Refused(refused(&error)), Fate::Planned)
 }
 
 /// What has not ended by then hangs, however slow the machine.
@@ -192,10 +108,9 @@ fn square_with(coordinates: [f32; 8]) -> Value {
     bytes.extend(floats(&[0.6, 0.8, 0.0, 1.0].repeat(4)));
     let mut value = gltf_file::square();
     set_buffer(&mut value, &bytes);
-    let add = |list: &mut Value, item: Value| list.as_array_mut().unwrap().push(item);
     value["nodes"][3]["rotation"] = json!([0, 0.6, 0, 0.8]);
     value["meshes"][0]["primitives"][0]["mode"] = json!(4);
-    add(&mut value["meshes"][0]["primitives"], json!({"attributes": {"POSITION": 0, "TEXCOORD_1": 2}, "material": 1, "mode": 5}));
+    push(&mut value["meshes"][0]["primitives"], json!({"attributes": {"POSITION": 0, "TEXCOORD_1": 2}, "material": 1, "mode": 5}));
     let turned = json!({"index": 0, "extensions": {"KHR_texture_transform": {"offset": [0, 1], "rotation": 0.5, "scale": [2, 1]}}});
     let glow = &mut value["materials"][0];
     glow["emissiveTexture"] = json!({"index": 0});
@@ -209,7 +124,7 @@ fn square_with(coordinates: [f32; 8]) -> Value {
     glow["extensions"]["KHR_materials_diffuse_transmission"] =
         json!({"diffuseTransmissionFactor": 1, "diffuseTransmissionColorTexture": {"index": 0}});
     glow["extensions"]["KHR_materials_sheen"] = json!({"sheenColorFactor": [1, 0, 0.5], "sheenRoughnessTexture": turned});
-    add(
+    push(
         &mut value["materials"],
         json!({"name": "glass", "doubleSided": true, "alphaMode": "MASK", "alphaCutoff": 0.25, "extensions": {
             "KHR_materials_ior": {"ior": 1.5}, "KHR_materials_dispersion": {"dispersion": 1000}, "KHR_materials_transmission": {"transmissionFactor": 1},
@@ -217,24 +132,24 @@ fn square_with(coordinates: [f32; 8]) -> Value {
             "KHR_materials_specular": {"specularFactor": 0.5, "specularColorTexture": {"index": 0}}},
          "pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "texCoord": 1}, "roughnessFactor": 0.3}}),
     );
-    add(
+    push(
         &mut value["materials"],
         json!({"name": "old", "extensions": {"KHR_materials_pbrSpecularGlossiness": {
             "diffuseFactor": [1, 1, 1, 1], "specularGlossinessTexture": {"index": 0}, "glossinessFactor": 0.5}}}),
     );
-    add(&mut value["materials"], json!({"name": "sign", "extensions": {"KHR_materials_unlit": {}}}));
+    push(&mut value["materials"], json!({"name": "sign", "extensions": {"KHR_materials_unlit": {}}}));
     for material in [2, 3] {
-        add(&mut value["meshes"][0]["primitives"], json!({"attributes": {"POSITION": 0}, "material": material, "mode": 5}));
+        push(&mut value["meshes"][0]["primitives"], json!({"attributes": {"POSITION": 0}, "material": material, "mode": 5}));
     }
     // Tangents are colours as well.
     let attributes = &mut value["meshes"][0]["primitives"][0]["attributes"];
     (attributes["TANGENT"], attributes["COLOR_0"]) = (json!(4), json!(4));
-    add(&mut value["accessors"], json!({"bufferView": 5, "componentType": 5126, "count": 4, "type": "VEC4"}));
+    push(&mut value["accessors"], json!({"bufferView": 5, "componentType": 5126, "count": 4, "type": "VEC4"}));
     value["textures"] = json!([{"source": 0, "sampler": 0}]);
     value["samplers"] = json!([{"wrapS": 33071, "wrapT": 33648}]);
     value["images"] = json!([{"bufferView": 4, "mimeType": "image/png"}]);
-    add(&mut value["bufferViews"], json!({"buffer": 0, "byteOffset": start, "byteLength": png.len()}));
-    add(&mut value["bufferViews"], json!({"buffer": 0, "byteOffset": tangents_start, "byteLength": 64}));
+    push(&mut value["bufferViews"], json!({"buffer": 0, "byteOffset": start, "byteLength": png.len()}));
+    push(&mut value["bufferViews"], json!({"buffer": 0, "byteOffset": tangents_start, "byteLength": 64}));
     value
 }
 
@@ -310,7 +225,7 @@ fn mutated_values_of_a_blender_file_are_planned_or_refused() {
     survive("values of a glb", 200, move |random| {
         let mut value = value.clone();
         (0..=random.below(2)).for_each(|_| change(&mut value, random));
-        pack(&value, &binary)
+        binary_file(&value, &binary, &[])
     });
 }
 
@@ -330,7 +245,7 @@ fn mutated_numbers_of_a_blender_file_are_planned_or_refused() {
             };
             binary[word..word + 4].copy_from_slice(&new.to_le_bytes());
         }
-        pack(&value, &binary)
+        binary_file(&value, &binary, &[])
     });
 }
 
@@ -621,81 +536,15 @@ fn compressed_views_of_any_bytes_are_read_or_refused() {
     assert!((5..400).contains(&read), "{read}");
 }
 
-/// Keeps what a run saves last.
-struct Latest(Option<SavedRun>);
-
-impl SaveRun for Latest {
-    fn save(&mut self, run: &std::sync::Arc<SavedRun>, _: bool) -> photonmill::error::Result<()> {
-        self.0 = Some(SavedRun::clone(run));
-        Ok(())
-    }
-}
-
-/// A checkpoint of the paper's box, by the CPU.
-fn checkpoint() -> SavedRun {
-    let settings = RoomSettings { photons: 101, rounds: 3, mesh: 2, builder: Builder::Cpu, rng: Rng::Philox, ..RoomSettings::default() };
-    let (never, mut latest) = (AtomicBool::new(false), Latest(None));
-    let keep = Keep { scene: "open-box", every: Duration::ZERO, save: Some(&mut latest), ..Keep::default() };
-    let mut control = Control { cancelled: &never, progress: &mut |_| {}, keep };
-    room::run(None, &open_box(&settings), &settings, &mut control).unwrap();
-    latest.0.expect("a block was done")
-}
-
-/// A checkpoint of a picture of four pixels, as far as its parts must fit one another.
-fn checkpoint_of_picture() -> SavedRun {
-    let (scene, settings) = (built_in::by_name("cornell").unwrap(), SceneSettings::default());
-    let geometry = Geometry::new(&scene).unwrap();
-    let sensor = Sensor::Picture { width: 2, height: 2 };
-    let plan = ScenePlan::new(&scene, &geometry, &settings, sensor, &Limits::of_host()).unwrap();
-    let blocks = || BlockSums { rounds: 2 * plan.film.rounds_per_block, blocks: 2, sums: vec![7; 12], squares: vec![25; 12] };
-    let film = SceneFilm {
-        of_blocks: blocks(),
-        of_surfaces: Some(blocks()),
-        latest: LatestBlocks::default(),
-        differences: Differences(vec![0; difference_count(4)]),
-        one_hits: vec![0; 4 * photonmill::constants::HIT_KINDS as usize],
-        part_totals: vec![3; 4],
-        parts: None,
-        anomalies: [0; photonmill::plan::buffers::ANOMALY_WORDS],
-        class_counts: vec![0; 2 * photonmill::constants::RADIUS_CLASSES as usize],
-        stored: [1; 3],
-        plan: plan.film,
-    };
-    let mut of_box = checkpoint();
-    of_box.done = serde_json::from_value(json!([{"start": 0, "end": 2}])).unwrap();
-    SavedRun { sensor: Some(sensor), fates: vec![Fates::of_scene(4); 2], film: film.into(), ..of_box }
-}
-
-/// A file of photons of two rounds.
-fn photon_map(path: &Path) {
-    let scene = built_in::by_name("cornell").unwrap();
-    let geometry = Geometry::new(&scene).unwrap();
-    let settings = SceneSettings { photons: 4, caustic_photons: 4, bounces: 3, ..SceneSettings::default() };
-    let plan = ScenePlan::new(&scene, &geometry, &settings, Sensor::Picture { width: 2, height: 2 }, &Limits::of_host()).unwrap();
-    let mut file = std::fs::File::create(path).unwrap();
-    let mut writer = MapWriter::new(&mut file, "cornell", &geometry, &plan, "none").unwrap();
-    for _ in 0..2 {
-        for _ in plan.maps() {
-            writer.begin_map();
-            writer.add(&[MapPhoton { flux: Vec3::ONE, ..MapPhoton::default() }; 5]).unwrap();
-            let mut fates = Fates { emitted: 4, ..Fates::of_scene(3) };
-            fates.bounces[0].absorbed = 4;
-            fates.totals.get_or_insert_default().stored = 5;
-            writer.end_map(fates);
-        }
-        writer.end_round();
-    }
-    writer.finish().unwrap();
-}
-
-/// Changes members of a header. `take` packs it into a file, whose hash is right, and uses that, or has the line by which it is refused.
-fn change_headers(header: &[u8], take: impl Fn(&[u8]) -> Result<(), String>) {
+/// Changes members of a file's header, whose checksums are right. `take` uses the file, or has the line by which it is refused.
+fn change_headers<F: Format>(file: &[u8], take: impl Fn(&[u8]) -> Result<(), String>) {
+    let (header, arrays) = F::parts(file).unwrap();
     let mut random = Random(SEED);
     let mut taken = 0;
     for _ in 0..600 {
         let mut value: Value = serde_json::from_slice(header).unwrap();
         (0..=random.below(2)).for_each(|_| change(&mut value, &mut random));
-        match take(&serde_json::to_vec(&value).unwrap()) {
+        match take(&F::pack(&serde_json::to_vec(&value).unwrap(), arrays)) {
             Ok(()) => taken += 1,
             Err(line) => assert!(!line.is_empty() && line.lines().count() == 1, "{line}"),
         }
@@ -703,59 +552,28 @@ fn change_headers(header: &[u8], take: impl Fn(&[u8]) -> Result<(), String>) {
     assert!((41..560).contains(&taken), "{taken} of 600 are taken");
 }
 
-/// Checkpoints whose header says anything, with a checksum that is right: refused in one line, or of use.
+/// Checkpoints whose header says anything: refused in one line, or of use.
 #[test]
 fn checkpoints_of_any_header_are_refused_or_of_use() {
-    for saved in [checkpoint(), checkpoint_of_picture()] {
+    for saved in [seeds::part_of_box(Share::default(), None).unwrap(), seeds::part_of_picture(Share::default(), false)] {
         let whole = saved.to_bytes();
         assert!(SavedRun::from_bytes(&whole).unwrap() == saved);
-        let length = u64::from_le_bytes(whole[16..24].try_into().unwrap()) as usize;
-        let (header, arrays) = whole[24..whole.len() - 32].split_at(length);
-        change_headers(header, |header| {
-            let mut bytes = [&whole[..16], &(header.len() as u64).to_le_bytes(), header, arrays].concat();
-            let checksum = Sha256::digest(&bytes);
-            bytes.extend_from_slice(&checksum);
-            use_run(&SavedRun::from_bytes(&bytes)?, &saved);
+        change_headers::<Run>(&whole, |file| {
+            let run = SavedRun::from_bytes(file)?;
+            let _ = run.identity.differs_from(&saved.identity);
+            fuzz::checkpoint::use_run(&run);
             Ok(())
         });
-    }
-}
-
-/// Reads, merges and reports a run as `merge` does.
-fn use_run(run: &SavedRun, other: &SavedRun) {
-    assert_eq!(run.to_bytes(), SavedRun::from_bytes(&run.to_bytes()).unwrap().to_bytes());
-    let _ = (run.missing(), run.emitted(), run.identity.differs_from(&other.identity));
-    let film = match &run.film {
-        SavedFilm::Scene(film) => Some(&**film),
-        SavedFilm::Room(_) => None,
-    };
-    assert!(!merge_report::text(run, 1, film).is_empty());
-    if let Some(film) = film {
-        let _ = (merge_report::json(run, film, &[]), film.mean(0), film.standard_error(0));
     }
 }
 
 /// Files of photons likewise.
 #[test]
 fn photon_maps_of_any_header_are_refused_or_of_use() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("a.pm");
-    photon_map(&path);
-    let whole = std::fs::read(&path).unwrap();
-    let tail = whole.len() - 56;
-    let start = tail - u64::from_le_bytes(whole[tail..tail + 8].try_into().unwrap()) as usize;
-    change_headers(&whole[start..tail], |header| {
-        let bytes = [&whole[..start], header, &(header.len() as u64).to_le_bytes(), &Sha256::digest(header), &whole[..16]].concat();
-        std::fs::write(&path, bytes).unwrap();
-        let opened = MapFile::open("--map", &path).inspect_err(|error| assert_eq!(error.exit_code(), 2, "{error}"));
-        let map = opened.map_err(|error| error.to_string())?;
-        let _ = (photonmill::output::photon_map::text(&map.header), photonmill::output::photon_map::json(&map.header));
-        for round in 0..map.rounds() {
-            for of_map in &map.header.maps {
-                // Checksums may be wrong now.
-                let _ = map.photons(round, &of_map.name, 2, 100, &mut |_| Ok(()));
-            }
-        }
-        Ok(())
+    let place = Place::new();
+    let path = place.at("a.pm");
+    change_headers::<Map>(&seeds::photon_map(&path), |file| {
+        std::fs::write(&path, file).unwrap();
+        fuzz::map::use_map(&path).map_err(|error| refused(&error))
     });
 }

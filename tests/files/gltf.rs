@@ -2,7 +2,7 @@
 //! of files come to is in tests/files/fuzz.rs.
 
 use super::other_readers::noise;
-use crate::common::gltf_file::{data_uri, encoded, floats, set_buffer, square, square_buffer};
+use crate::common::gltf_file::{add_accessor, data_uri, encoded, floats, push, set_buffer, square, square_buffer};
 use crate::common::prelude::*;
 use image::{ImageFormat, RgbImage, Rgba, RgbaImage};
 use photonmill::output::colour::exr;
@@ -414,22 +414,7 @@ fn pictures_are_whole_and_of_the_kinds_that_gltf_has() {
     assert_refusal(read(&exr(1, 1, &[Vec3::ONE])), &["texture image 'paint'", "neither PNG, JPEG, WebP nor KTX 2"]);
 }
 
-/// Adds to a list, and returns the number of what was added.
-pub fn push(list: &mut Value, item: Value) -> usize {
-    let list = list.as_array_mut().unwrap();
-    list.push(item);
-    list.len() - 1
-}
-
-/// Adds an accessor of numbers in a buffer of its own, and returns its number.
-pub fn add_accessor(value: &mut Value, bytes: &[u8], component: u32, count: usize, kind: &str) -> usize {
-    let uri = data_uri("application/octet-stream", bytes);
-    let buffer = push(&mut value["buffers"], json!({"byteLength": bytes.len(), "uri": uri}));
-    let view = push(&mut value["bufferViews"], json!({"buffer": buffer, "byteOffset": 0, "byteLength": bytes.len()}));
-    push(&mut value["accessors"], json!({"bufferView": view, "componentType": component, "count": count, "type": kind}))
-}
-
-/// The same of an attribute of the square's vertices.
+/// Sets an attribute of the square's vertices, and returns its accessor's number.
 fn set_attribute(value: &mut Value, name: &str, bytes: &[u8], component: u32, count: usize, kind: &str) -> usize {
     let accessor = add_accessor(value, bytes, component, count, kind);
     value["meshes"][0]["primitives"][0]["attributes"][name] = json!(accessor);
@@ -1096,7 +1081,16 @@ fn specular_and_glossiness_stand_alone() {
 
 /// The fraction of the ior 0 is 1 whatever stands beside it: a specular factor s reflects s of the light along the normal, and the
 /// rest goes on.
-fn check_ior_zero(mean: impl Fn(&Scene, &Camera, u32) -> f64) {
+#[test]
+fn surfaces_of_ior_zero_reflect_their_specular_factor() {
+    let of_judge = |scene: &Scene, camera: &Camera| {
+        let image = Judge::new(scene, u32::MAX).image(camera, 32, 32, 4, 1);
+        image.pixels.iter().map(|pixel| pixel.mean.total().x).sum::<f64>() / image.pixels.len() as f64
+    };
+    // Which makes kernels of its own.
+    let gpu = if is_long_run() { device() } else { None };
+    let settings = SceneSettings { photons: 1000, rounds: 4, ..by_rounds() };
+    let of_device = |gpu: &Gpu, scene: &Scene, camera: &Camera| mean_red(&seen(gpu, scene, &settings, camera, [32, 32]));
     for specular in [1.0f32, 0.25] {
         let mut scene = load_material(json!({"name": "old", "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0},
             "extensions": {"KHR_materials_ior": {"ior": 0}, "KHR_materials_transmission": {"transmissionFactor": 1},
@@ -1110,28 +1104,13 @@ fn check_ior_zero(mean: impl Fn(&Scene, &Camera, u32) -> f64) {
         let wall = scene.materials.len() - 1;
         scene.meshes.push(Mesh::parallelogram("wall", DVec3::new(-8.0, -8.0, 2.0), 20.0 * DVec3::X, 20.0 * DVec3::Y, wall));
         let camera = Camera::looking_at("ray", DVec3::new(2.1, 3.2, 8.0), DVec3::new(2.1, 3.2, 3.0), DVec3::Y, 0.003);
-        let found = mean(&scene, &camera, 32);
         let expected = f64::from(specular + 2.0 * (1.0 - specular));
         // Deltas are chosen by chance where there are two.
         let error = 0.5 * f64::from(specular * (1.0 - specular)).sqrt() / 32.0 + 1e-5;
-        assert_holds(specular, z_check("radiance", found, expected, error));
+        for found in [Some(of_judge(&scene, &camera)), gpu.as_deref().map(|gpu| of_device(gpu, &scene, &camera))].into_iter().flatten() {
+            assert_holds(specular, z_check("radiance", found, expected, error));
+        }
     }
-}
-
-#[test]
-fn surfaces_of_ior_zero_reflect_their_specular_factor() {
-    check_ior_zero(|scene, camera, side| {
-        let image = Judge::new(scene, u32::MAX).image(camera, side, side, 4, 1);
-        image.pixels.iter().map(|pixel| pixel.mean.total().x).sum::<f64>() / image.pixels.len() as f64
-    });
-}
-
-#[test]
-#[ignore = "long: makes kernels of its own"]
-fn surfaces_of_ior_zero_reflect_their_specular_factor_on_a_device() {
-    let Some(gpu) = device() else { return };
-    let settings = SceneSettings { photons: 1000, rounds: 4, ..by_rounds() };
-    check_ior_zero(|scene, camera, side| mean_red(&seen(&gpu, scene, &settings, camera, [side, side])));
 }
 
 /// A picture is one texture for each way in which it is read.

@@ -964,17 +964,8 @@ fn looked_up(layout: &Layout, maps: &[Map], mesh: usize, at: DVec3) -> f64 {
 /// block whose faces look inwards is bright on top.
 #[test]
 fn lightmaps_are_not_dark_at_the_foot_of_things() {
-    look_at_the_foot(&[(-0.25, true)]);
-}
-
-#[test]
-#[ignore = "long: kernels of two kinds of blocks"]
-fn lightmaps_are_not_dark_at_the_foot_of_all_things() {
-    look_at_the_foot(&[(0.0, false), (-0.25, true)]);
-}
-
-/// Of blocks by where they begin, and whether their faces look inwards.
-fn look_at_the_foot(blocks: &[(f64, bool)]) {
+    // Where they begin, and whether their faces look inwards.
+    let blocks = of_run::<&[_]>(&[(-0.25, true)], &[(0.0, false), (-0.25, true)]);
     let Some(gpu) = device() else { return };
     let down = lamp(LightKind::Directional { direction: DVec3::NEG_Y, irradiance: Vec3::ONE });
     for &(lowest, is_turned) in blocks {

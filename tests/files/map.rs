@@ -197,16 +197,6 @@ fn headers_that_contradict_themselves_are_refused() {
 
 #[test]
 fn files_of_other_light_are_refused() {
-    ask_for_other_light(false);
-}
-
-#[test]
-#[ignore = "long: kernels without caustics"]
-fn files_of_more_light_are_taken() {
-    ask_for_other_light(true);
-}
-
-fn ask_for_other_light(all: bool) {
     let Some(gpu) = device() else { return };
     let room = Viewed::new(scene("cornell-spheres"));
     let few = SceneSettings { photons: 300, caustic_photons: 300, rounds: 2, ..small() };
@@ -216,7 +206,7 @@ fn ask_for_other_light(all: bool) {
     assert!(line.contains("of another scene (cornell-spheres"), "{line}");
     // Less is wanted than there is.
     let less = SceneSettings { without: vec![Effect::ReflectiveCaustics, Effect::RefractiveCaustics], ..few.clone() };
-    if all {
+    if is_long_run() {
         let found = room.lit_from(&gpu, &less, file.path()).unwrap();
         assert!(found.film == room.traced(&gpu, &less).film && found.plan.caustic.is_none());
     }
@@ -303,16 +293,7 @@ fn the_program_makes_reads_and_exports_files() {
 
 #[test]
 fn the_program_lights_points_and_texels_from_a_file() {
-    light_points_and_texels("cornell");
-}
-
-#[test]
-#[ignore = "long: kernels of mirrors and glass for points"]
-fn the_program_lights_points_and_texels_from_a_file_of_two_maps() {
-    light_points_and_texels("cornell-spheres");
-}
-
-fn light_points_and_texels(scene: &str) {
+    let scene = of_run("cornell", "cornell-spheres");
     let Some(_) = device() else { return };
     let place = Place::new();
     place.succeed(&format!("map {scene} -o map.pm --photons 500 --rounds 5 -q"));

@@ -1,7 +1,7 @@
 //! What glTF forbids and other readers take: the table on the guide's page of scenes says which of it this one takes.
 
-use super::gltf::{assert_refusal, assert_refused, assert_said, load, open, push, with_image};
-use crate::common::gltf_file::{data_uri, encoded, set_buffer, square, square_buffer};
+use super::gltf::{assert_refusal, assert_refused, assert_said, load, open, with_image};
+use crate::common::gltf_file::{data_uri, encoded, push, set_buffer, square, square_buffer};
 use crate::common::prelude::*;
 use image::{ImageFormat, RgbImage};
 use photonmill::scene::gltf::source;

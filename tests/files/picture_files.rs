@@ -37,17 +37,8 @@ impl Place {
 
 #[test]
 fn layers_are_the_parts_the_error_and_what_is_seen() {
-    compare_layers(&["caustic"]);
-}
-
-#[test]
-#[ignore = "long: kernels of each part alone"]
-fn layers_are_all_parts_the_error_and_what_is_seen() {
-    compare_layers(&["specular", "caustic"]);
-}
-
-/// With runs of these parts alone.
-fn compare_layers(parts: &[&str]) {
+    // Those of which runs are made alone, too.
+    let parts = of_run::<&[_]>(&["caustic"], &["specular", "caustic"]);
     let Some(_) = device() else { return };
     let place = Place::new();
     place.succeed(&format!("render cornell-spheres --rounds 8 --block 1 -o a.exr --error-image e.exr {SMALL}"));
@@ -286,17 +277,7 @@ fn square_file() -> String {
 /// With what a pilot chose, tiles that are put to it, a run that went on, and a scene of a file.
 #[test]
 fn pictures_are_made_again_to_the_bit() {
-    make_pictures_again(false);
-}
-
-/// With tiles that a pilot chose, another filter, photons in a run of limited time, and a photon map from a file.
-#[test]
-#[ignore = "long: a run that is long enough for a pilot's tiles"]
-fn pictures_of_long_runs_are_made_again_to_the_bit() {
-    make_pictures_again(true);
-}
-
-fn make_pictures_again(all: bool) {
+    let all = is_long_run();
     let Some(gpu) = device() else { return };
     let place = Place::new();
     if all {

@@ -28,16 +28,15 @@ fn kinds_bring_the_same_light(gpu: &Gpu, kinds: &[&str], photons: u32, [precise_
 #[test]
 fn aimed_photons_bring_the_same_light_with_less_noise() {
     let Some(gpu) = device() else { return };
-    kinds_bring_the_same_light(&gpu, &["overlapping cones", "overlapping discs"], 40_000, [0.07, 0.14]);
+    let all = SCENES.map(|(kind, _)| kind);
+    let few = ["overlapping cones", "overlapping discs"];
+    let (kinds, photons, shares) = of_run::<(&[_], _, _)>((&few, 40_000, [0.07, 0.14]), (&all, 200_000, [0.025, 0.05]));
+    kinds_bring_the_same_light(&gpu, kinds, photons, shares);
     a_millionth_of_a_lamps_light_lights_as_the_sun_does(&gpu);
     no_builder_and_no_split_changes_a_bit(&gpu, Math::Fast, &["overlapping cones", "two-sided triangles"]);
-}
-
-#[test]
-#[ignore = "long: minutes on a software device"]
-fn aimed_photons_bring_the_same_light_to_some_per_cent() {
-    let Some(gpu) = device() else { return };
-    kinds_bring_the_same_light(&gpu, &SCENES.map(|(kind, _)| kind), 200_000, [0.025, 0.05]);
+    if is_long_run() {
+        no_builder_and_no_split_changes_a_bit(&gpu, Math::Strict, &["overlapping cones"]);
+    }
 }
 
 fn a_millionth_of_a_lamps_light_lights_as_the_sun_does(gpu: &Gpu) {
@@ -119,13 +118,6 @@ fn no_builder_and_no_split_changes_a_bit(gpu: &Gpu, math: Math, kinds: &[&str]) 
             assert_complains("photons in all directions", equal_sums("off", &off.film.sums, &reference.film.sums));
         }
     }
-}
-
-#[test]
-#[ignore = "long: kernels with strict arithmetic"]
-fn no_builder_and_no_split_changes_a_bit_of_strict_arithmetic() {
-    let Some(gpu) = device() else { return };
-    no_builder_and_no_split_changes_a_bit(&gpu, Math::Strict, &["overlapping cones"]);
 }
 
 /// Built-in scenes with caustics: what a picture's caustic part sums up to, by pairs of runs. With the same seed both see

@@ -36,27 +36,19 @@ fn scattered_light_of_a_dim_room_has_photons_of_its_own() {
 fn a_lamp_that_lights_what_lights_the_points_has_photons_too() {
     let Some(gpu) = device() else { return };
     assert_holds("a screened lamp", hidden_lamp(&gpu, 1e4, true));
-}
-
-#[test]
-#[ignore = "long: two million photons more"]
-fn photons_by_power_leave_a_dim_room_dark() {
-    let Some(gpu) = device() else { return };
-    assert_complains("a dim room", scattered_light(&gpu, 1e3, false));
-    assert_complains("a screened lamp", hidden_lamp(&gpu, 1e4, false));
+    if is_long_run() {
+        assert_complains("a screened lamp by power", hidden_lamp(&gpu, 1e4, false));
+        assert_complains("a dim room by power", scattered_light(&gpu, 1e3, false));
+    }
 }
 
 #[test]
 fn a_small_bright_spot_of_a_textured_lamp_is_found() {
     let Some(gpu) = device() else { return };
     assert_holds("a bright spot", bright_spot(&gpu, Wrap::Clamp, Illumination::Photons));
-}
-
-#[test]
-#[ignore = "long: kernels of shadow rays to a textured lamp"]
-fn a_small_bright_spot_of_a_mirrored_texture_is_found() {
-    let Some(gpu) = device() else { return };
-    assert_holds("a bright spot", bright_spot(&gpu, Wrap::MirroredRepeat, Illumination::Split));
+    if is_long_run() {
+        assert_holds("a bright spot", bright_spot(&gpu, Wrap::MirroredRepeat, Illumination::Split));
+    }
 }
 
 /// Photons that choose lights otherwise bring the same light: within a radius that is given, nothing else differs.
@@ -243,7 +235,9 @@ fn lights_are_chosen_as_often_as_is_said() {
 }
 
 /// From anywhere every light may be chosen, in one of two ways, whose probabilities add up to 1 each.
-fn no_light_is_impossible(lights: Vec<Light>) {
+#[test]
+fn no_light_is_impossible_and_probabilities_add_up_to_one() {
+    let lights = of_run(Vec::new(), every_kind_of_light(1.0, 1e-3, EmissionLaw::Cosine));
     let Some(gpu) = device() else { return };
     let mut scene = rooms(&[1.0, 1e-6, 1e6]);
     scene.meshes.extend(moved(cut_lamp(30), |at| at + DVec3::new(0.0, 1.5, 6.0)).meshes.pop());
@@ -280,17 +274,6 @@ fn no_light_is_impossible(lights: Vec<Light>) {
     // Photons, too, may leave any.
     let sum: f64 = lights.emitters.iter().map(|emitter| f64::from(emitter.probability)).sum();
     assert!((sum - 1.0).abs() < 1e-6 && lights.emitters.iter().all(|emitter| emitter.probability > 0.0), "{sum}");
-}
-
-#[test]
-fn no_light_is_impossible_and_probabilities_add_up_to_one() {
-    no_light_is_impossible(Vec::new());
-}
-
-#[test]
-#[ignore = "long: kernels of every kind of light"]
-fn no_light_of_any_kind_is_impossible() {
-    no_light_is_impossible(every_kind_of_light(1.0, 1e-3, EmissionLaw::Cosine));
 }
 
 /// A square of 0.8 m that shines and transmits, 1 m above a floor; its front looks up.

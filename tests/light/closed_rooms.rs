@@ -99,7 +99,9 @@ fn an_integrating_sphere_multiplies_light() {
 
 /// Two infinite plates that face each other, the lower one shining with M = pi W/m2: M / (1 - rho rho') arrives above,
 /// rho' times that below. A shaft of perfect mirrors makes a square of each infinite.
-fn plates_send_light_to_and_fro(illuminations: &[Illumination]) {
+#[test]
+fn parallel_plates_send_light_to_and_fro() {
+    let illuminations = of_run::<&[_]>(&[Illumination::Photons], &BOTH);
     let Some(gpu) = device() else { return };
     let (below, above) = (0.75, 0.5);
     let mut meshes = shaft(-0.2, 0.2, 2);
@@ -117,17 +119,6 @@ fn plates_send_light_to_and_fro(illuminations: &[Illumination]) {
         family.expect_mean(format!("plates, {illumination:?}: below"), &over_points(&lower, 0), above * exact);
     }
     family.assert_tells(0.04, |_| true);
-}
-
-#[test]
-fn parallel_plates_send_light_to_and_fro() {
-    plates_send_light_to_and_fro(&[Illumination::Photons]);
-}
-
-#[test]
-#[ignore = "long: kernels for photons alone and for shadow rays with two maps"]
-fn parallel_plates_send_light_to_and_fro_in_either_way() {
-    plates_send_light_to_and_fro(&BOTH);
 }
 
 /// In a closed sphere albedo^k of the photons are stored at bounce k, and none escapes. Where fewer than half of the 131 072 photons are left, more than

@@ -337,7 +337,13 @@ fn furnace_settings(radius: f64) -> SceneSettings {
 
 /// Weight functions integrate to 1, and none looks beyond its radius: a furnace is as bright by each, from all of the scene, twice
 /// over, down to a two-hundredth of the distance between photons, at edges and in corners too. Notices 6 % where the radius is large.
-fn kernels_integrate_to_one(rows: &[(Kernel, &[f64])]) {
+#[test]
+fn every_kernel_of_every_radius_integrates_to_one() {
+    let rows: [(Kernel, &[f64]); 3] = [
+        (Kernel::Box, &[2.0, 0.3, 0.002, 1.0, 0.01][..of_run(3, 5)]),
+        (Kernel::Cone, &[2.0, 0.1]),
+        (Kernel::Epanechnikov, &[2.0, 0.1][..of_run(1, 2)]),
+    ];
     let Some(gpu) = device() else { return };
     let middle = |k: usize| (DVec3::new((k % 8) as f64 / 8.0 + 0.06, 0.0, (k / 8) as f64 / 8.0 + 0.06), DVec3::Y);
     let edges = |k: usize| (DVec3::new(if k.is_multiple_of(2) { 1e-4 } else { 1.0 - 1e-4 }, 0.0, k as f64 / 64.0 + 1e-3), DVec3::Y);
@@ -362,18 +368,6 @@ fn kernels_integrate_to_one(rows: &[(Kernel, &[f64])]) {
     }
     family.assert_tells(0.06, |what| what.contains("wide"));
     family.assert_tells(0.5, |what| !what.contains("0.002"));
-}
-
-#[test]
-fn every_kernel_of_every_radius_integrates_to_one() {
-    kernels_integrate_to_one(&[(Kernel::Box, &[2.0, 0.3, 0.002]), (Kernel::Cone, &[2.0, 0.1]), (Kernel::Epanechnikov, &[2.0])]);
-}
-
-#[test]
-#[ignore = "long: ten seconds on a software device"]
-fn every_kernel_of_more_radii_integrates_to_one() {
-    let few: &[f64] = &[2.0, 0.1];
-    kernels_integrate_to_one(&[(Kernel::Box, &[2.0, 1.0, 0.3, 0.01, 0.002]), (Kernel::Cone, few), (Kernel::Epanechnikov, few)]);
 }
 
 /// Outside of what positions allow a radius is refused.
@@ -413,27 +407,6 @@ fn edges_and_corners_are_dark_by_what_lies_beyond_them() {
         assert_complains("a share 0.1 % larger", relative_check("share", 1.001 * ratio, share, 3e-4));
     }
     println!("covered shares off by {worst:.1e} at most");
-}
-
-/// r_n / r_1 of the schedule with alpha = 2/3, from Gamma(n + alpha) / (Gamma(1 + alpha) n!).
-#[test]
-fn radii_of_ten_thousand_rounds_follow_the_gamma_function() {
-    let furnace = scene("furnace");
-    let settings = SceneSettings { rounds: 10_000, alpha: 2.0 / 3.0, ..furnace_settings(0.25) };
-    let plan = scene_plan_within(&Limits::of_host(), &furnace, &settings, Sensor::Receivers { count: 1 }).unwrap();
-    let map = plan.global.as_ref().unwrap();
-    // ln Gamma(n + a) - ln n! - ln Gamma(1 + a) as a product of the first terms and Stirling's series of the rest.
-    let alpha = 2.0 / 3.0;
-    let stirling =
-        |x: f64| (x - 0.5) * x.ln() - x + 0.5 * (2.0 * PI).ln() + 1.0 / (12.0 * x) - 1.0 / (360.0 * x.powi(3)) + 1.0 / (1260.0 * x.powi(5));
-    let ln_gamma = |x: f64| stirling(x + 20.0) - (0..20).map(|k| (x + f64::from(k)).ln()).sum::<f64>();
-    for (n, printed) in [(10, 0.713), (100, 0.488), (1000, 0.333), (10_000, 0.227)] {
-        let exact = (0.5 * (ln_gamma(f64::from(n) + alpha) - ln_gamma(f64::from(n) + 1.0) - ln_gamma(1.0 + alpha))).exp();
-        let found = plan.radius(map, n - 1) / map.radius;
-        assert!((exact - printed).abs() < 6e-4, "{n}: {exact}");
-        assert_holds(n, relative_check("radius", found, exact, 1e-6));
-        assert_complains("a round too early", relative_check("radius", plan.radius(map, n - 2) / map.radius, exact, 1e-6));
-    }
 }
 
 /// What a device could hold at most: buffers are ranges of 32 bits.
@@ -550,34 +523,26 @@ fn photons_of_a_second_row_of_groups_reach_the_map() {
 }
 
 /// Pictures of one pixel, of odd sides and of one long row, by usual and large work groups.
-fn pictures_are_whole(part: Part, samples: u32) {
-    let Some(gpu) = device() else { return };
-    let cornell = scene("cornell");
-    let camera = cornell.cameras[0].clone();
-    for size in [[1, 1], [63, 65], [4097, 1], [1, 129]] {
-        let of = |group_size| {
-            let settings = SceneSettings { group_size, photons: 2000, rounds: 1, shadow_rays: 1, part, samples, ..by_rounds() };
-            seen(&gpu, &cornell, &settings, &camera, size).film
-        };
-        let expected = of(128);
-        assert_eq!(expected.pixels() as u32, size[0] * size[1]);
-        let lit = expected.sums.chunks(3).filter(|pixel| pixel.iter().any(|sum| *sum > 0)).count();
-        // The camera sees past the room on a wide picture, and nothing but the room on a square one.
-        assert!(lit > 0 && (size[0] > 1000 || lit > expected.pixels() / 2), "{size:?}: {lit} pixels are lit");
-        assert!(of(1024) == expected, "{size:?}, work groups of 1024");
-    }
-}
-
 /// Direct light needs no photons, and several samples for light in a picture's only pixel.
 #[test]
 fn pictures_of_any_shape_are_whole() {
-    pictures_are_whole(Part::Direct, 16);
-}
-
-#[test]
-#[ignore = "long: kernels of photons for two sizes of work groups"]
-fn pictures_of_any_shape_and_of_all_light_are_whole() {
-    pictures_are_whole(Part::All, 1);
+    let Some(gpu) = device() else { return };
+    let cornell = scene("cornell");
+    let camera = cornell.cameras[0].clone();
+    for (part, samples) in [(Part::Direct, 16), (Part::All, 1)].into_iter().take(of_run(1, 2)) {
+        for size in [[1, 1], [63, 65], [4097, 1], [1, 129]] {
+            let of = |group_size| {
+                let settings = SceneSettings { group_size, photons: 2000, rounds: 1, shadow_rays: 1, part, samples, ..by_rounds() };
+                seen(&gpu, &cornell, &settings, &camera, size).film
+            };
+            let expected = of(128);
+            assert_eq!(expected.pixels() as u32, size[0] * size[1]);
+            let lit = expected.sums.chunks(3).filter(|pixel| pixel.iter().any(|sum| *sum > 0)).count();
+            // The camera sees past the room on a wide picture, and nothing but the room on a square one.
+            assert!(lit > 0 && (size[0] > 1000 || lit > expected.pixels() / 2), "{size:?}: {lit} pixels are lit");
+            assert!(of(1024) == expected, "{size:?}, work groups of 1024");
+        }
+    }
 }
 
 /// Sums of a run with every gather stay numbers and closed at once: the smallest and the largest of everything that
@@ -663,55 +628,47 @@ fn narrow_spots_shine_as_wide_ones() {
 }
 
 /// Points on a floor that touches walls which shine, at distances around what single precision tells apart.
-fn walls_light_what_touches_them(textured: bool) {
-    let Some(gpu) = device() else { return };
-    let distances = [0.0, 1e-8, 1e-7, 1e-6, 3e-6, 1e-5, 1e-4];
-    let mut family = Family::default();
-    let mut check = |what: &str, scene: &Scene, points: &[(DVec3, DVec3)], expected: &dyn Fn(DVec3) -> f64| {
-        // With textures, one set of kernels for both scenes.
-        let with = if textured { vec![Effect::Textures] } else { vec![] };
-        let settings = kept(SceneSettings { rounds: 16, shadow_rays: 64, part: Part::Direct, with, ..by_rounds() });
-        let lit = received(&gpu, scene, &settings, points);
-        for (k, (point, _)) in points.iter().enumerate() {
-            let ((found, error), exact) = (red(&lit, k), expected(*point));
-            println!("{what}, {point}: {found:.4} +- {error:.4}, {exact:.4} is right");
-            family.expect_estimate(format!("{what}, {point}"), found, error.max(2e-3 * exact), settings.rounds, exact);
-        }
-    };
-    let on = |place: fn(f64) -> DVec3, normal: DVec3| distances.map(|distance| (place(distance), normal));
-    // Every point of a furnace sees walls that shine wherever it looks.
-    let furnace = scene("furnace");
-    check("beside a wall", &furnace, &on(|d| DVec3::new(d, 0.0, 0.37), DVec3::Y), &|_| PI);
-    check("in a corner", &furnace, &on(|d| DVec3::new(d, 0.0, d), DVec3::Y), &|_| PI);
-    check("in an edge", &furnace, &on(|d| DVec3::new(1.0 - d, 0.6, 1.0), DVec3::NEG_Z), &|_| PI);
-
-    // One wall, aslant to all axes.
-    let turn = DQuat::from_euler(EulerRot::XYZ, 0.3, 0.7, -0.4);
-    let lamp = Material { emission: Vec3::ONE, emission_texture: textured.then(|| TextureUse::of(0, 0)), ..matt(0.0) };
-    let wall = Mesh::parallelogram("wall", DVec3::ZERO, turn * DVec3::Y, turn * DVec3::Z, 1);
-    let floor = Mesh::parallelogram("floor", turn * DVec3::NEG_X, turn * DVec3::Z, turn * (DVec3::X * 2.0), 0);
-    let textures = if textured { vec![texture(1, vec![Vec3::ONE], [Wrap::Clamp; 2])] } else { vec![] };
-    let room = Scene { textures, ..scene_of(vec![wall, floor], vec![matt(0.0), lamp], vec![]) };
-    let points = distances.map(|distance| (turn * DVec3::new(distance, 0.0, 0.4), turn * DVec3::Y));
-    let exact = |point: DVec3| {
-        let distance = (turn.inverse() * point).x.abs();
-        // From a foot of the wall, one of its sides on either hand (Howell, configuration B-3).
-        let half = |width: f64| width.atan2(distance) - distance / distance.hypot(1.0) * width.atan2(distance.hypot(1.0));
-        0.5 * (half(0.4) + half(0.6))
-    };
-    check("a wall aslant", &room, &points, &exact);
-    family.assert_tells(0.2, |_| true);
-}
-
 #[test]
 fn walls_light_the_points_that_touch_them() {
-    walls_light_what_touches_them(false);
-}
+    let Some(gpu) = device() else { return };
+    let distances = [0.0, 1e-8, 1e-7, 1e-6, 3e-6, 1e-5, 1e-4];
+    for textured in [false, true].into_iter().take(of_run(1, 2)) {
+        let mut family = Family::default();
+        let mut check = |what: &str, scene: &Scene, points: &[(DVec3, DVec3)], expected: &dyn Fn(DVec3) -> f64| {
+            // With textures, one set of kernels for both scenes.
+            let with = if textured { vec![Effect::Textures] } else { vec![] };
+            let settings = kept(SceneSettings { rounds: 16, shadow_rays: 64, part: Part::Direct, with, ..by_rounds() });
+            let lit = received(&gpu, scene, &settings, points);
+            for (k, (point, _)) in points.iter().enumerate() {
+                let ((found, error), exact) = (red(&lit, k), expected(*point));
+                println!("{what}, {point}: {found:.4} +- {error:.4}, {exact:.4} is right");
+                family.expect_estimate(format!("{what}, {point}"), found, error.max(2e-3 * exact), settings.rounds, exact);
+            }
+        };
+        let on = |place: fn(f64) -> DVec3, normal: DVec3| distances.map(|distance| (place(distance), normal));
+        // Every point of a furnace sees walls that shine wherever it looks.
+        let furnace = scene("furnace");
+        check("beside a wall", &furnace, &on(|d| DVec3::new(d, 0.0, 0.37), DVec3::Y), &|_| PI);
+        check("in a corner", &furnace, &on(|d| DVec3::new(d, 0.0, d), DVec3::Y), &|_| PI);
+        check("in an edge", &furnace, &on(|d| DVec3::new(1.0 - d, 0.6, 1.0), DVec3::NEG_Z), &|_| PI);
 
-#[test]
-#[ignore = "long: kernels of textures"]
-fn textured_walls_light_the_points_that_touch_them() {
-    walls_light_what_touches_them(true);
+        // One wall, aslant to all axes.
+        let turn = DQuat::from_euler(EulerRot::XYZ, 0.3, 0.7, -0.4);
+        let lamp = Material { emission: Vec3::ONE, emission_texture: textured.then(|| TextureUse::of(0, 0)), ..matt(0.0) };
+        let wall = Mesh::parallelogram("wall", DVec3::ZERO, turn * DVec3::Y, turn * DVec3::Z, 1);
+        let floor = Mesh::parallelogram("floor", turn * DVec3::NEG_X, turn * DVec3::Z, turn * (DVec3::X * 2.0), 0);
+        let textures = if textured { vec![texture(1, vec![Vec3::ONE], [Wrap::Clamp; 2])] } else { vec![] };
+        let room = Scene { textures, ..scene_of(vec![wall, floor], vec![matt(0.0), lamp], vec![]) };
+        let points = distances.map(|distance| (turn * DVec3::new(distance, 0.0, 0.4), turn * DVec3::Y));
+        let exact = |point: DVec3| {
+            let distance = (turn.inverse() * point).x.abs();
+            // From a foot of the wall, one of its sides on either hand (Howell, configuration B-3).
+            let half = |width: f64| width.atan2(distance) - distance / distance.hypot(1.0) * width.atan2(distance.hypot(1.0));
+            0.5 * (half(0.4) + half(0.6))
+        };
+        check("a wall aslant", &room, &points, &exact);
+        family.assert_tells(0.2, |_| true);
+    }
 }
 
 /// Channels that are dim beside another are as bright as their share of it: light of a tinted lamp, and light that a

@@ -225,7 +225,9 @@ fn rays_at_edges_and_corners_meet_a_wall() {
 
 /// Photons that start on walls, some within a rounding of an edge, and photons that were sent into edges and
 /// corners: none finds a way out, however often it is scattered.
-fn none_leaves_by_edges_and_corners(photons: u32) {
+#[test]
+fn photons_on_edges_and_in_corners_stay_in_the_room() {
+    let photons = of_run(200_000, 4_000_000);
     let Some(gpu) = device() else { return };
     let point = [(DVec3::new(0.5, 0.0, 0.5), DVec3::Y)];
     let furnace = received(&gpu, &scene("furnace"), &kept(flights(photons, 1)), &point);
@@ -234,17 +236,6 @@ fn none_leaves_by_edges_and_corners(photons: u32) {
     let aimed = received(&gpu, &room, &kept(flights(photons / 4, 8)), &point);
     assert_holds("a furnace", none_escapes("from anywhere on the walls", &furnace));
     assert_holds("a closed room", none_escapes("from edges and corners", &aimed));
-}
-
-#[test]
-fn photons_on_edges_and_in_corners_stay_in_the_room() {
-    none_leaves_by_edges_and_corners(200_000);
-}
-
-#[test]
-#[ignore = "long: millions of photons"]
-fn millions_of_photons_on_edges_and_in_corners_stay_in_the_room() {
-    none_leaves_by_edges_and_corners(4_000_000);
 }
 
 #[test]
@@ -328,7 +319,9 @@ fn same_sums(what: &str, found: &RunResult, expected: &RunResult) -> Check {
 
 /// From a millionth to a million times its size no decision and no bit of the light of the Cornell box with every kind of light changes.
 /// Lengths go with the size, intensities with its square.
-fn powers_of_two_change_no_bit(step: usize) {
+#[test]
+fn every_power_of_two_is_the_same_light_to_the_bit() {
+    let step = of_run(5, 1);
     let Some(gpu) = device() else { return };
     let of = |k: i32, settings: &SceneSettings| {
         let factor = 2f64.powi(k);
@@ -348,7 +341,9 @@ fn powers_of_two_change_no_bit(step: usize) {
 }
 
 /// The paper's box at every such size: the photons of both builders go with it.
-fn the_open_box_stores_the_same_photons(step: usize) {
+#[test]
+fn the_open_box_of_any_power_of_two_stores_the_same_photons() {
+    let step = of_run(5, 1);
     let gpu = device();
     for builder in [Builder::Cpu, Builder::Naive, Builder::Ballot] {
         let settings = RoomSettings { builder, photons: 1001, shininess: [Some(2.0); 5], ..RoomSettings::default() };
@@ -372,23 +367,6 @@ fn the_open_box_stores_the_same_photons(step: usize) {
         assert!(gpu.is_none() || expected.len() > 1001);
         (-20..=20).step_by(step).for_each(|k| assert_eq!(of(k), expected, "{builder:?}, 2^{k}"));
     }
-}
-
-#[test]
-fn every_power_of_two_is_the_same_light_to_the_bit() {
-    powers_of_two_change_no_bit(5);
-}
-
-#[test]
-fn the_open_box_of_any_power_of_two_stores_the_same_photons() {
-    the_open_box_stores_the_same_photons(5);
-}
-
-#[test]
-#[ignore = "long: each power by itself, where the short run has every fifth"]
-fn each_power_of_two_changes_no_bit() {
-    powers_of_two_change_no_bit(1);
-    the_open_box_stores_the_same_photons(1);
 }
 
 /// A scene whose coordinates are whole multiples of 2^-20 m, moved by ten thousand times its size: every number of

@@ -63,16 +63,12 @@ fn light_through_openings_is_found() {
     an_open_scene_has_no_openings_and_the_same_bits(&gpu);
     a_patch_of_sun_keeps_its_rays(&gpu, 0.0);
     a_sun_that_shines_in_has_as_many_rays_as_without_openings(&gpu, 0.0);
-}
-
-#[test]
-#[ignore = "long: most of a minute on a software device"]
-fn a_small_window_scatters_light_into_a_room_and_lights_it_under_a_sunny_sky() {
-    let Some(gpu) = device() else { return };
-    lights_through_a_window(&gpu, "even", 0.5, sky(4, 2, |_, _| Vec3::ONE), &[Part::Direct, Part::Indirect]);
-    lights_through_a_window(&gpu, "sunny", 0.5, sunny(32, 300.0), &[Part::Direct, Part::Indirect]);
-    a_patch_of_sun_keeps_its_rays(&gpu, 0.5);
-    a_sun_that_shines_in_has_as_many_rays_as_without_openings(&gpu, 0.5);
+    if is_long_run() {
+        lights_through_a_window(&gpu, "even", 0.5, sky(4, 2, |_, _| Vec3::ONE), &[Part::Direct, Part::Indirect]);
+        lights_through_a_window(&gpu, "sunny", 0.5, sunny(32, 300.0), &[Part::Direct, Part::Indirect]);
+        a_patch_of_sun_keeps_its_rays(&gpu, 0.5);
+        a_sun_that_shines_in_has_as_many_rays_as_without_openings(&gpu, 0.5);
+    }
 }
 
 fn lights_through_a_window(gpu: &Gpu, sky: &str, albedo: f32, picture: Sky, parts: &[Part]) {

@@ -103,7 +103,9 @@ fn an_index_of_one_reflects_nothing_at_any_angle() {
 /// Through a slab of thickness d a ray goes on parallel to itself, d (tan i - tan t) short of where it was heading, so
 /// that a narrow lamp is seen there, by (1 - F)^2, and again 2 d tan t further after two reflections inside, by
 /// (1 - F)^2 F^2; everywhere else is dark. All of a wide lamp is (1 - F) / (1 + F).
-fn slabs_shift_slanting_rays(side: u32, told: f64, told_inside: f64) {
+#[test]
+fn a_slab_shifts_a_slanting_ray() {
+    let (side, told, told_inside) = of_run((256, 0.03, 0.1), (1024, 0.01, 0.02));
     let Some(gpu) = device() else { return };
     let mut family = Family::default();
     let (thickness, below) = (0.2, 0.4);
@@ -142,17 +144,6 @@ fn slabs_shift_slanting_rays(side: u32, told: f64, told_inside: f64) {
     family.assert_tells(told_inside, |what| what.ends_with("reflected inside"));
 }
 
-#[test]
-fn a_slab_shifts_a_slanting_ray() {
-    slabs_shift_slanting_rays(256, 0.03, 0.1);
-}
-
-#[test]
-#[ignore = "long: half a minute on a software device"]
-fn a_slab_shifts_a_slanting_ray_to_one_per_cent() {
-    slabs_shift_slanting_rays(1024, 0.01, 0.02);
-}
-
 /// Share of evenly scattered light that a surface lets through from outside: the integral of (1 - F) 2 sin cos.
 fn let_in(ior: f64) -> f64 {
     let steps = 100_000;
@@ -164,9 +155,11 @@ fn let_in(ior: f64) -> f64 {
 
 /// A shaft of perfect mirrors is infinitely wide. Half of it is glass: of even light 0.908222 enters it, and
 /// 0.908222 / n^2 = 0.403654 leaves it (flux is not compressed, unlike radiance); the rest returns to the black lamp. The lamp
-/// above is red, the one below green. Notices 4.5 %: all angles as if straight on would be 6 %. `all`: by shadow rays and a caustic map
+/// above is red, the one below green. Notices 4.5 %: all angles as if straight on would be 6 %. In the long run by shadow rays and a caustic map
 /// too, and by every builder.
-fn diffuse_light_crosses_glass(all: bool) {
+#[test]
+fn diffuse_light_crosses_glass_by_its_mean_transmittance() {
+    let all = is_long_run();
     let Some(gpu) = device() else { return };
     let entering = let_in(IOR);
     assert!((entering - 0.908_222_0).abs() < 1e-6, "{entering}");
@@ -198,21 +191,12 @@ fn diffuse_light_crosses_glass(all: bool) {
     family.assert_tells(0.045, |what| !what.starts_with("back into the air"));
 }
 
-#[test]
-fn diffuse_light_crosses_glass_by_its_mean_transmittance() {
-    diffuse_light_crosses_glass(false);
-}
-
-#[test]
-#[ignore = "long: kernels of a caustic map and of another builder"]
-fn diffuse_light_crosses_glass_by_every_way_of_lighting() {
-    diffuse_light_crosses_glass(true);
-}
-
 /// A spot light between two mirrors of reflectance 0.8, 1 m before the end of their corridor: the end is lit by all
 /// images, sum of 0.8^|n| I cos / d^2 over those whose ray leaves the lamp within its cone. Photons tell the mean over
 /// a disc, here by a raster whose error is below 1e-4; shadow rays add the lamp's own part at the middle.
-fn images_light_a_corridor(illuminations: &[Illumination]) {
+#[test]
+fn images_light_the_end_of_a_corridor() {
+    let illuminations = of_run::<&[_]>(&[Illumination::Photons], &BOTH);
     let Some(gpu) = device() else { return };
     let (z, off, angle) = (1.0, 0.1, 1.0f64);
     let (side, length) = (1.0, 3.0);
@@ -259,11 +243,6 @@ fn images_light_a_corridor(illuminations: &[Illumination]) {
     family.assert_tells(0.02, |_| true);
 }
 
-#[test]
-fn images_light_the_end_of_a_corridor() {
-    images_light_a_corridor(&[Illumination::Photons]);
-}
-
 const FOCUS: f64 = 0.5;
 const APERTURE: f64 = 0.5;
 const SEGMENTS: u32 = 192;
@@ -301,7 +280,10 @@ fn caustics(illumination: Illumination, radius: f64) -> SceneSettings {
 /// any distance: what leaves at the angle a to the axis arrives at r = 2 f tan(a / 2), hence
 /// I / f^2 / (1 + r^2 / 4 f^2)^2, and as the mean over a disc of radius h, which photons tell,
 /// I / f^2 / (1 + h^2 / 4 f^2).
-fn light_leaves_a_focus_in_parallel(illuminations: &[Illumination]) {
+/// The reverse, sunlight that meets in the focus, is tested by both illuminations.
+#[test]
+fn light_from_a_focus_leaves_in_parallel() {
+    let illuminations = of_run::<&[_]>(&[Illumination::Photons], &BOTH);
     let Some(gpu) = device() else { return };
     let mut family = Family::default();
     let h: f64 = 0.4;
@@ -316,19 +298,6 @@ fn light_leaves_a_focus_in_parallel(illuminations: &[Illumination]) {
         }
     }
     family.assert_tells(0.02, |_| true);
-}
-
-/// The reverse, sunlight that meets in the focus, is tested by both illuminations.
-#[test]
-fn light_from_a_focus_leaves_in_parallel() {
-    light_leaves_a_focus_in_parallel(&[Illumination::Photons]);
-}
-
-#[test]
-#[ignore = "long: kernels of shadow rays and a caustic map too"]
-fn corridors_and_foci_have_the_same_light_in_either_way() {
-    images_light_a_corridor(&BOTH);
-    light_leaves_a_focus_in_parallel(&BOTH);
 }
 
 /// All sunlight that enters a paraboloid along its axis passes its focus: through a disc of 1 cm there goes what the

@@ -70,26 +70,18 @@ fn assert_lit_like(gpu: &Gpu, what: &str, settings: &SceneSettings, (scene, poin
 /// ceiling shines, by the same kernels.
 #[test]
 fn a_rug_on_the_floor_is_lit_like_the_floor() {
-    rugs_are_lit_like_the_floor(with_overlap_outside(room()));
-}
-
-#[test]
-#[ignore = "long: kernels of rooms with overlapping surfaces and without"]
-fn a_rug_on_the_floor_is_lit_like_the_floor_by_kernels_of_its_own() {
-    rugs_are_lit_like_the_floor(room());
-}
-
-fn rugs_are_lit_like_the_floor(room: Scene) {
     let Some(gpu) = device() else { return };
     a_lamp_in_the_plane_of_the_ceiling_shines(&gpu);
-    let expected = irradiance(&gpu, &room, &settings(), &points(0.0));
-    let heights = [(0.0, 1), (0.0, 7), (1e-7, 1), (1e-6, 1), (1e-5, 7), (3e-5, 1), (1e-4, 1), (1e-3, 1)];
-    for (k, (height, cells)) in heights.into_iter().enumerate() {
-        let is_turned = k % 2 == 1;
-        let mut scene = room.clone();
-        scene.meshes.push(rug(DVec3::ZERO, 2.0, height, cells));
-        let what = format!("{height} m above, {cells} x {cells} cells, turned {is_turned}");
-        assert_lit_like(&gpu, &what, &settings(), &turned(is_turned, scene, &points(height)), &expected);
+    for room in [with_overlap_outside(room()), room()].into_iter().take(of_run(1, 2)) {
+        let expected = irradiance(&gpu, &room, &settings(), &points(0.0));
+        let heights = [(0.0, 1), (0.0, 7), (1e-7, 1), (1e-6, 1), (1e-5, 7), (3e-5, 1), (1e-4, 1), (1e-3, 1)];
+        for (k, (height, cells)) in heights.into_iter().enumerate() {
+            let is_turned = k % 2 == 1;
+            let mut scene = room.clone();
+            scene.meshes.push(rug(DVec3::ZERO, 2.0, height, cells));
+            let what = format!("{height} m above, {cells} x {cells} cells, turned {is_turned}");
+            assert_lit_like(&gpu, &what, &settings(), &turned(is_turned, scene, &points(height)), &expected);
+        }
     }
 }
 
@@ -332,14 +324,8 @@ pub fn floor_beside(gpu: &Gpu, what: &str, other: Material) -> Check<Complaint> 
 #[test]
 fn a_floor_beside_what_keeps_no_photons_is_lit_to_its_edge() {
     let Some(gpu) = device() else { return };
-    assert_holds("beside a mirror", floor_beside(&gpu, "mirror", mirror(1.0)));
-}
-
-#[test]
-#[ignore = "long: kernels of three materials"]
-fn a_floor_beside_all_that_keeps_no_photons_is_lit_to_its_edge() {
-    let Some(gpu) = device() else { return };
-    for (what, other) in [("metal", Made::Metal.material(1.0)), ("mirror", mirror(1.0)), ("glass", clear_solid(1.5))] {
+    let others = [("mirror", mirror(1.0)), ("metal", Made::Metal.material(1.0)), ("glass", clear_solid(1.5))];
+    for (what, other) in others.into_iter().take(of_run(1, 3)) {
         assert_holds(what, floor_beside(&gpu, what, other));
     }
 }
@@ -360,9 +346,11 @@ fn a_floor_below_glass_that_stands_on_it_is_lit() {
     assert_holds("below glass", z_check("below glass", touching, sunk, error.hypot(other)));
 }
 
-/// Water that exactly fills its vessel, under a sky of 1: white walls give back what they get, so that all is 1. `all`: in a thick one too,
+/// Water that exactly fills its vessel, under a sky of 1: white walls give back what they get, so that all is 1. In the long run in a thick one too,
 /// and as what is sunk into its vessel.
-fn a_liquid_fills_its_vessel(all: bool) {
+#[test]
+fn a_liquid_that_fills_its_vessel_neither_gains_nor_loses_light() {
+    let all = is_long_run();
     let Some(gpu) = device() else { return };
     let vessel = |two_sided: bool, thick: bool, sunk: f64| {
         let [low, high] = [DVec3::new(-0.5, 0.0, -0.5), DVec3::new(0.5, 1.0, 0.5)];
@@ -397,17 +385,6 @@ fn a_liquid_fills_its_vessel(all: bool) {
             assert!((touching - sunk).abs() < 0.03, "{what}: {touching} touching, {sunk} sunk");
         }
     }
-}
-
-#[test]
-fn a_liquid_that_fills_its_vessel_neither_gains_nor_loses_light() {
-    a_liquid_fills_its_vessel(false);
-}
-
-#[test]
-#[ignore = "long: two sets of kernels"]
-fn a_liquid_that_fills_any_vessel_is_lit_as_one_that_is_sunk_into_it() {
-    a_liquid_fills_its_vessel(true);
 }
 
 /// A decal with gaps of alpha in a wall's plane is seen where it is, and the wall where it is not; light arrives at both.
@@ -659,7 +636,10 @@ fn seen_of_table(gpu: &Gpu, scene: &Scene, rows: usize, from: f64) -> Vec<(f64, 
 }
 
 /// Each of these kinds of surface against each other in one plane: none gains or loses light, from whichever side.
-fn keep_the_light_of_a_furnace(kinds: &[Made]) {
+/// Glass has kernels of its own: short tests of it are those of a liquid in its vessel and of solids that touch.
+#[test]
+fn surfaces_in_one_plane_keep_the_light_of_a_furnace() {
+    let kinds = of_run::<&[_]>(&[Made::Matt, Made::Mirror], &MADE);
     let Some(gpu) = device() else { return };
     let scene = table(kinds, 0.0, [1.0; 2]);
     let mut complaints = Vec::new();
@@ -677,18 +657,6 @@ fn keep_the_light_of_a_furnace(kinds: &[Made]) {
         }
     }
     assert!(complaints.is_empty(), "{}", complaints.join("\n"));
-}
-
-/// Glass has kernels of its own: short tests of it are those of a liquid in its vessel and of solids that touch.
-#[test]
-fn surfaces_in_one_plane_keep_the_light_of_a_furnace() {
-    keep_the_light_of_a_furnace(&[Made::Matt, Made::Mirror]);
-}
-
-#[test]
-#[ignore = "long: two pictures of 162 pairs"]
-fn every_two_surfaces_in_one_plane_keep_the_light_of_a_furnace() {
-    keep_the_light_of_a_furnace(&MADE);
 }
 
 /// And each shows what it does where they are a millimetre apart: under a sky, and before a lamp aside.

@@ -57,7 +57,9 @@ fn form_factors_are_known_and_lose_nothing() {
 /// Twice as many cells along a wall move no wall's mean of no order by 0.2 %, nor the irradiance at any of the discs
 /// that the film is asked for; the stored photons an order are those of another solution, extrapolated from 16, 32 and
 /// 64 cells along a wall (uniform 1.502371 in all, cosine 1.542715).
-fn solutions_have_converged(laws: usize) {
+#[test]
+fn the_solution_has_converged() {
+    let laws = of_run(1, 2);
     let published: [[f64; 6]; 2] = [
         [0.586_425_3, 0.354_047_5, 0.217_227_2, 0.133_102_6, 0.081_816_5, 0.050_300_1],
         [0.607_142_8, 0.363_597_9, 0.221_502_8, 0.135_508_8, 0.083_171_9, 0.051_108_9],
@@ -95,17 +97,6 @@ fn solutions_have_converged(laws: usize) {
     }
 }
 
-#[test]
-fn the_solution_has_converged() {
-    solutions_have_converged(1);
-}
-
-#[test]
-#[ignore = "long: with the other tests of both laws"]
-fn the_solutions_of_both_laws_have_converged() {
-    solutions_have_converged(2);
-}
-
 /// Texels along a wall and a radius at which discs around their middles neither overlap nor leave the wall, so that
 /// the estimate of a texel is the mean over its disc, and that of others has nothing of it.
 const MESH: usize = 8;
@@ -131,10 +122,10 @@ fn photons_of(gpu: Option<&Device>, settings: &RoomSettings) -> Vec<Photon> {
     }
 }
 
-/// Each law with each builder that can run here, or the first of them.
-fn ways(gpu: Option<&Device>, all: bool) -> impl Iterator<Item = (Law, EmissionLaw, Builder)> {
+/// Each law with each builder that can run here; in the short run the first of them.
+fn ways(gpu: Option<&Device>) -> impl Iterator<Item = (Law, EmissionLaw, Builder)> {
     let every = LAWS.into_iter().flat_map(|(law, emission)| JUDGED.map(|builder| (law, emission, builder)));
-    every.filter(move |(.., builder)| gpu.is_some() || *builder == Builder::Cpu).take(if all { usize::MAX } else { 1 })
+    every.filter(move |(.., builder)| gpu.is_some() || *builder == Builder::Cpu).take(of_run(1, usize::MAX))
 }
 
 /// Squares of cells along a wall in which photons are counted.
@@ -206,11 +197,13 @@ fn pattern_z(counts: &Counts, order: usize, chance: impl Fn(usize) -> ByLamp) ->
 /// a wall stores of the first; the later ones have too few for that and notice what is printed. A pattern is noticed that is brighter by twice as much at
 /// one end of each wall than in the middle, up to the third order.
 ///
-/// `all`: by both laws and every builder; otherwise the first of [`ways`] stands for all, which store the same photons
+/// In the short run the first of [`ways`] stands for all, which store the same photons
 /// (`tests/engine/strict.rs`).
-fn photons_land_as_radiosity_says(seeds: u64, told: f64, all: bool) {
+#[test]
+fn photons_of_every_order_land_as_radiosity_says() {
+    let (seeds, told) = of_run((4, 0.02), (16, 0.01));
     let gpu = device();
-    for (law, emission, builder) in ways(gpu.as_ref(), all) {
+    for (law, emission, builder) in ways(gpu.as_ref()) {
         let solution = solution(law);
         let chances: Vec<Vec<ByLamp>> = (0..BOUNCES)
             .map(|order| (0..WALLS * SQUARES * SQUARES).map(|square| stored_in_square(solution, order, square)).collect())
@@ -248,18 +241,14 @@ fn photons_land_as_radiosity_says(seeds: u64, told: f64, all: bool) {
     }
 }
 
-#[test]
-fn photons_of_every_order_land_as_radiosity_says() {
-    photons_land_as_radiosity_says(4, 0.02, false);
-}
-
 /// Irradiance of the film, W/m2, from stored photons over the albedo, in 64 discs of 3 cm a wall: direct light by
 /// intensity * cosine / distance^2, the rest by the walls' radiosity and the exact form factors of a point, each as the
-/// mean over the disc, which is what photons within a radius tell. The mean of a wall notices `told`. Without `all` by the first of
-/// [`ways`], which a device takes.
-fn the_film_is_radiositys(photons: u32, told: f64, all: bool) {
+/// mean over the disc, which is what photons within a radius tell. The mean of a wall notices `told`.
+#[test]
+fn the_film_has_the_irradiance_of_radiosity() {
+    let (photons, told) = of_run((1 << 15, 0.03), (1 << 18, 0.01));
     let gpu = device();
-    for (law, emission, builder) in ways(gpu.as_ref(), all) {
+    for (law, emission, builder) in ways(gpu.as_ref()) {
         let rounds = 16;
         let settings = RoomSettings { photons, rounds, seed: 7, ..settings(builder, emission) };
         let outcome = match gpu.as_ref().filter(|_| builder != Builder::Cpu) {
@@ -276,18 +265,6 @@ fn the_film_is_radiositys(photons: u32, told: f64, all: bool) {
         }
         family.assert_tells(told, |_| true);
     }
-}
-
-#[test]
-fn the_film_has_the_irradiance_of_radiosity() {
-    the_film_is_radiositys(1 << 15, 0.03, false);
-}
-
-#[test]
-#[ignore = "long: millions of photons of each builder and law"]
-fn radiosity_to_one_per_cent_by_every_builder_and_law() {
-    photons_land_as_radiosity_says(16, 0.01, true);
-    the_film_is_radiositys(1 << 18, 0.01, true);
 }
 
 /// The same box as triangles: at the middles of the discs direct light by shadow rays, or by photons as the mean over the disc;

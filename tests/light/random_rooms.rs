@@ -2,7 +2,7 @@
 //! everything left at its default but the number of photons.
 //!
 //! Of every point z = (found - true) / stated, where the stated error is the noise that a run states by default. All z
-//! together must be those of Student's t. A room is a seed: `PHOTONMILL_ROOM=17 cargo test --lib seven_random_rooms --
+//! together must be those of Student's t. A room is a seed: `PHOTONMILL_ROOM=17 cargo test --lib two_hundred_random_rooms --
 //! --ignored --nocapture` shows room 17 and judges its points alone.
 
 use std::fmt::Write;
@@ -409,39 +409,6 @@ fn histogram(z: &[f64]) -> String {
     text
 }
 
-/// The room of PHOTONMILL_ROOM, or all of these.
-fn seeds(all: std::ops::Range<u64>) -> (Vec<u64>, bool) {
-    match std::env::var("PHOTONMILL_ROOM") {
-        Ok(seed) => (vec![seed.parse().expect("PHOTONMILL_ROOM is the number of a room")], true),
-        Err(_) => (all.collect(), false),
-    }
-}
-
-#[test]
-#[ignore = "long: most of a minute of radiosity on the host"]
-fn seven_random_rooms_are_right_within_their_errors() {
-    let Some(gpu) = device() else { return };
-    // Of one room each.
-    let (seeds, is_shown) = seeds(0..100);
-    let single = seeds.into_iter().filter(|seed| is_shown || rooms(*seed).len() == 1).take(7);
-    let found: Vec<Found> = single.flat_map(|seed| lit_rooms(&gpu, seed, false)).collect();
-    if is_shown {
-        for room in rooms(found[0].seed) {
-            room.shown.iter().for_each(|rectangle| println!("{rectangle:?}"));
-            room.points.iter().for_each(|point| println!("{point:?}"));
-        }
-        found.iter().for_each(|found| print!("{}", found.line()));
-        assert!(found.iter().all(|found| found.z().abs() < MOST), "a point of this room is off by more than {MOST}");
-        return;
-    }
-    let clear = of(Place::Clear, &found);
-    println!("{:?}", Statistics::new(&clear.iter().map(Found::z).collect::<Vec<_>>()));
-    assert!(clear.len() > 40, "{} points", clear.len());
-    assert_holds("7 rooms", judge(&clear));
-    assert_complains("more light", judge(&spoiled(&clear, 1.1, 1.0)));
-    assert_complains("less noise", judge(&spoiled(&clear, 1.0, 0.5)));
-}
-
 /// A point of a box of 1 mm, which two or three photons have found that have almost no blue: its right blue, 40 times what they have,
 /// lies within what is stated, and 70 times further off than their spread. Its other points are judged too.
 #[test]
@@ -459,6 +426,17 @@ fn few_hits_say_little_of_colours_that_they_lack() {
 #[ignore = "200 rooms: a quarter of an hour on a software device"]
 fn two_hundred_random_rooms_are_right_within_their_errors() {
     let Some(gpu) = device() else { return };
+    if let Ok(seed) = std::env::var("PHOTONMILL_ROOM") {
+        let seed = seed.parse().expect("PHOTONMILL_ROOM is the number of a room");
+        for room in rooms(seed) {
+            room.shown.iter().for_each(|rectangle| println!("{rectangle:?}"));
+            room.points.iter().for_each(|point| println!("{point:?}"));
+        }
+        let found = lit_rooms(&gpu, seed, false);
+        found.iter().for_each(|found| print!("{}", found.line()));
+        assert!(found.iter().all(|found| found.z().abs() < MOST), "a point of this room is off by more than {MOST}");
+        return;
+    }
     let found: Vec<Found> = (0..200).flat_map(|seed| lit_rooms(&gpu, seed, true)).collect();
     let unknown = found.iter().filter(|found| found.noise.is_infinite()).count();
     println!("{} points, {unknown} of them without light and without a stated error", found.len());
@@ -483,7 +461,9 @@ fn two_hundred_random_rooms_are_right_within_their_errors() {
 }
 
 /// Where every wall emits what it does not scatter, light is pi everywhere, behind boxes too.
-fn cavities_are_even(seeds: &[u64]) {
+#[test]
+fn radiosity_of_a_cavity_is_even() {
+    let seeds = of_run::<&[_]>(&[9], &[0, 9]);
     for seed in seeds {
         let mut room = rooms(*seed).remove(0);
         room.rectangles.iter_mut().for_each(|side| side.emission = DVec3::ONE - side.albedo);
@@ -492,17 +472,6 @@ fn cavities_are_even(seeds: &[u64]) {
         let off = |by: f64| expected.iter().any(|[light, error]| (*light - by * PI).abs().cmpgt(2.0 * *error).any());
         assert!(!off(1.0) && off(1.05), "seed {seed}: {expected:?}");
     }
-}
-
-#[test]
-fn radiosity_of_a_cavity_is_even() {
-    cavities_are_even(&[9]);
-}
-
-#[test]
-#[ignore = "long: with the other tests of the reference"]
-fn radiosity_of_cavities_is_even() {
-    cavities_are_even(&[0, 9]);
 }
 
 /// Of patches half as large light is the same within the error that is taken for it at three points of four, and

@@ -198,32 +198,20 @@ fn skies_leave_no_odd_number(settings: &SceneSettings, has_glass: bool) {
 fn black_skies_and_single_texels_leave_no_odd_number() {
     skies_leave_no_odd_number(&settings(Illumination::Photons), false);
     skies_leave_no_odd_number(&by_shadow_rays(), false);
-}
-
-#[test]
-#[ignore = "long: kernels of glass, twenty seconds on a software device"]
-fn black_skies_through_glass_leave_no_odd_number() {
-    skies_leave_no_odd_number(&by_rounds(), true);
-}
-
-#[test]
-#[ignore = "long: kernels of aimed rays"]
-fn skies_that_rays_are_aimed_at_are_black_or_keep_their_channels() {
-    let aimed = SceneSettings { aim: true, ..by_shadow_rays() };
-    skies_leave_no_odd_number(&aimed, false);
-    channels_keep_their_light(&aimed);
-}
-
-#[test]
-fn weak_channels_of_a_sky_keep_their_light() {
-    channels_keep_their_light(&by_shadow_rays());
+    if is_long_run() {
+        skies_leave_no_odd_number(&by_rounds(), true);
+        skies_leave_no_odd_number(&SceneSettings { aim: true, ..by_shadow_rays() }, false);
+    }
 }
 
 /// Each channel of an even sky lights a floor by what it is, whatever the ratio to the others.
-fn channels_keep_their_light(settings: &SceneSettings) {
+#[test]
+fn weak_channels_of_a_sky_keep_their_light() {
     let Some(gpu) = device() else { return };
-    for colour in [Vec3::new(1000.0, 1.0, 0.3), Vec3::new(10.0, 2.0, 0.3), Vec3::new(1.0, 0.25, 0.002), Vec3::new(1.0, 1e-4, 1e-4)] {
-        let settings = SceneSettings { rounds: 1, ..settings.clone() };
+    let colours = [[1000.0, 1.0, 0.3], [10.0, 2.0, 0.3], [1.0, 0.25, 0.002], [1.0, 1e-4, 1e-4]].map(Vec3::from);
+    let ways = [false, true].into_iter().take(of_run(1, 2));
+    for (aim, colour) in ways.flat_map(|aim| colours.map(|colour| (aim, colour))) {
+        let settings = SceneSettings { rounds: 1, aim, ..by_shadow_rays() };
         let lit = received(&gpu, &floor_under(sky(4, 2, |_, _| colour)), &settings, &[(DVec3::ZERO, DVec3::Y)]);
         let share = lit.film.mean(0) / (PI * colour.as_dvec3());
         println!("{colour}: {share}");

@@ -50,23 +50,19 @@ fn sampled() -> SceneSettings {
     SceneSettings { samples: 2, ..small() }
 }
 
-/// The spheres look the same to the bit in all of these ways. Returns how.
-fn spheres_are_the_same(gpu: &Gpu, ways: &[(&str, SceneSettings)]) -> RunResult {
-    let spheres = scene("cornell-spheres");
-    let reference = picture(gpu, &spheres, &sampled());
-    for (what, settings) in ways {
-        assert_holds(what, same_film(what, &picture(gpu, &spheres, settings), &reference));
-    }
-    reference
-}
-
 /// Nor does a scale by a power of two, for a camera that goes with it.
 #[test]
 fn no_split_and_no_builder_changes_a_bit() {
     let Some(gpu) = device() else { return };
     let chunks = SceneSettings { chunk: Some(701), ..sampled() };
-    let reference = spheres_are_the_same(&gpu, &[("again", sampled()), ("chunks of 701", chunks)]);
+    let ballot = SceneSettings { builder: Some(Builder::Ballot), ..sampled() };
+    let groups = SceneSettings { group_size: 32, ..sampled() };
+    let ways = [("again", sampled()), ("chunks of 701", chunks), ("ballot builder", ballot), ("work groups of 32", groups)];
     let spheres = scene("cornell-spheres");
+    let reference = picture(&gpu, &spheres, &sampled());
+    for (what, settings) in &ways[..of_run(2, 4)] {
+        assert_holds(what, same_film(what, &picture(&gpu, &spheres, settings), &reference));
+    }
     let mut scaled = moved(spheres.clone(), |at| at * 2f64.powi(-20));
     scaled.cameras[0].eye *= 2f64.powi(-20);
     assert_holds("scaled", same_film("scaled by 2^-20", &picture(&gpu, &scaled, &sampled()), &reference));
@@ -82,15 +78,6 @@ fn no_split_and_no_builder_changes_a_bit() {
     let otherwise = SceneSettings { builder: Some(Builder::Ballot), group_size: 32, ..of_map };
     let what = "two words, ballot builder, work groups of 32";
     assert_holds(what, same_film(what, &picture(&gpu, &room, &otherwise), &reference));
-}
-
-#[test]
-#[ignore = "long: makes kernels for mirrors and glass twice more"]
-fn no_builder_and_no_work_group_changes_a_bit_of_mirrors_and_glass() {
-    let Some(gpu) = device() else { return };
-    let ballot = SceneSettings { builder: Some(Builder::Ballot), ..sampled() };
-    let groups = SceneSettings { group_size: 32, ..sampled() };
-    spheres_are_the_same(&gpu, &[("ballot builder", ballot), ("work groups of 32", groups)]);
 }
 
 /// Points near which more photons lie than an invocation tests: others share them, as small chunks do.
@@ -169,15 +156,11 @@ fn parts_add_up(gpu: &Gpu, settings: &SceneSettings, alone: &[Part]) {
 fn the_four_parts_add_up_to_the_whole_to_the_bit() {
     let Some(gpu) = device() else { return };
     parts_add_up(&gpu, &SceneSettings { samples: 4, ..small() }, &[Part::Specular]);
-}
-
-#[test]
-#[ignore = "long: half a minute on a software device"]
-fn each_part_alone_and_parts_of_photons_and_of_a_final_gather_add_up() {
-    let Some(gpu) = device() else { return };
-    parts_add_up(&gpu, &SceneSettings { samples: 4, ..small() }, &Part::EACH);
-    parts_add_up(&gpu, &SceneSettings { samples: 4, final_gather: true, ..small() }, &[Part::Indirect]);
-    parts_add_up(&gpu, &SceneSettings { illumination: Illumination::Photons, ..small() }, &Part::EACH);
+    if is_long_run() {
+        parts_add_up(&gpu, &SceneSettings { samples: 4, ..small() }, &Part::EACH);
+        parts_add_up(&gpu, &SceneSettings { samples: 4, final_gather: true, ..small() }, &[Part::Indirect]);
+        parts_add_up(&gpu, &SceneSettings { illumination: Illumination::Photons, ..small() }, &Part::EACH);
+    }
 }
 
 /// Effects that a scene does not need change nothing where some of them are forced on, in each of these ways.
@@ -201,24 +184,20 @@ fn an_effect_that_the_scene_lacks_changes_no_bit() {
     // Effects of layered materials, which stand together, are the larger part of any kernel that has them.
     let plain = |effect: &Effect| !(Effect::Layers..=Effect::NormalMaps).contains(effect);
     unneeded_effects_change_no_bit(&gpu, "cornell", |all| vec![all.iter().copied().filter(plain).collect()]);
-}
-
-#[test]
-#[ignore = "long: minutes on a software device"]
-fn pairs_of_effects_that_the_scene_lacks_change_no_bit() {
-    let Some(gpu) = device() else { return };
-    // All at once, and each with and without each other.
-    let ways = |all: &[Effect]| -> Vec<Vec<Effect>> {
-        let forced = |row: Vec<usize>| pairs(all, row).filter(|(_, forced)| *forced == 1).map(|(effect, _)| *effect).collect();
-        [vec![1; all.len()]].into_iter().chain(pairwise(&vec![2; all.len()])).map(forced).collect()
-    };
-    for name in ["cornell", "cornell-spheres"] {
-        unneeded_effects_change_no_bit(&gpu, name, ways);
+    if is_long_run() {
+        // All at once, and each with and without each other.
+        let ways = |all: &[Effect]| -> Vec<Vec<Effect>> {
+            let forced = |row: Vec<usize>| pairs(all, row).filter(|(_, forced)| *forced == 1).map(|(effect, _)| *effect).collect();
+            [vec![1; all.len()]].into_iter().chain(pairwise(&vec![2; all.len()])).map(forced).collect()
+        };
+        for name in ["cornell", "cornell-spheres"] {
+            unneeded_effects_change_no_bit(&gpu, name, ways);
+        }
+        // A list instead of a tree finds the same.
+        let cornell = scene("cornell");
+        let [tree, list] = [vec![], vec![Effect::Bvh]].map(|without| picture(&gpu, &cornell, &SceneSettings { without, ..small() }));
+        assert_holds("list", same_film("list", &list, &tree));
     }
-    // A list instead of a tree finds the same.
-    let cornell = scene("cornell");
-    let [tree, list] = [vec![], vec![Effect::Bvh]].map(|without| picture(&gpu, &cornell, &SceneSettings { without, ..small() }));
-    assert_holds("list", same_film("list", &list, &tree));
 }
 
 /// Plates of 1 m in rows of five before a wall and under a sun: each shows an effect, and a pixel sees it alone.

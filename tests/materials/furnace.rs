@@ -169,16 +169,11 @@ fn no_gain_check(count: usize, most_samples: u32, below: impl Fn(LobeCase) -> Lo
 
 #[test]
 fn no_material_of_the_path_tracer_returns_more_than_it_receives() {
-    assert_holds("random materials", no_gain_check(160, 5000, |case| case));
+    let (count, most_samples) = of_run((160, 5000), (2000, 60_000));
+    assert_holds("random materials", no_gain_check(count, most_samples, |case| case));
     // A coat that takes by the base's normal what it reflects by its own.
     let by_the_base = no_gain_check(20, 1000, |case| LobeCase { coat_normal: case.ns, ..case });
     assert_complains("coats that dim by the base's normal", by_the_base);
-}
-
-#[test]
-#[ignore = "long: minutes"]
-fn none_of_two_thousand_materials_returns_more_than_it_receives() {
-    assert_holds("random materials", no_gain_check(2000, 60_000, |case| case));
 }
 
 /// The same of the kernels' samples, as a path chooses among all lobes.

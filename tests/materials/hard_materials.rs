@@ -40,14 +40,11 @@ fn panes_change(settings: &SceneSettings, no_light: &[f32], light: &[f32]) {
 fn glass_of_the_air_s_own_index_is_not_there() {
     let photons = SceneSettings { illumination: Illumination::Photons, photons: 30_000, radius: Some(0.08), alpha: 1.0, ..settings() };
     panes_change(&SceneSettings { with: [&photons.with[..], &[Effect::SpecularChains]].concat(), ..photons }, &[1.0], &[]);
-}
-
-#[test]
-#[ignore = "long: minutes on a software device"]
-fn glass_of_nearly_the_air_s_own_index_is_not_there_and_other_glass_is() {
-    // A wide radius: all direct light comes as a caustic now.
-    let caustics = SceneSettings { photons: 30_000, caustic_photons: 30_000, caustic_radius: Some(0.08), ..settings() };
-    panes_change(&caustics, &[1.0, 1.0 + 1e-6], &[2.5]);
+    if is_long_run() {
+        // A wide radius: all direct light comes as a caustic now.
+        let caustics = SceneSettings { photons: 30_000, caustic_photons: 30_000, caustic_radius: Some(0.08), ..settings() };
+        panes_change(&caustics, &[1.0, 1.0 + 1e-6], &[2.5]);
+    }
 }
 
 fn plate(surface: Surface, lights: Vec<LightKind>) -> Scene {
@@ -111,17 +108,16 @@ fn lobes_throw_their_share(illumination: Illumination, exponents: &[f32]) {
 fn lobes_of_any_width_throw_their_share() {
     // The screen has no direct light.
     lobes_throw_their_share(Illumination::Photons, &[5.0, 48_826.0]);
-}
-
-#[test]
-#[ignore = "long: minutes on a software device"]
-fn lobes_of_every_width_throw_their_share() {
-    lobes_throw_their_share(Illumination::Split, &[0.0, 5.0, 100.0, 1e4, 48_826.0]);
+    if is_long_run() {
+        lobes_throw_their_share(Illumination::Split, &[0.0, 5.0, 100.0, 1e4, 48_826.0]);
+    }
 }
 
 /// The sun in a plate: albedo E cos / pi by cos^n of the angle off the mirror direction, by these exponents and both
 /// models; behind the lobe there is nothing.
-fn a_sun_is_a_power_of_the_cosine(exponents: &[f32]) {
+#[test]
+fn a_sun_in_a_plate_is_a_power_of_the_cosine() {
+    let exponents = of_run::<&[_]>(&[5.0, 48_826.0], &[0.0, 0.01, 5.0, 1e4, 48_826.0]);
     let Some(gpu) = device() else { return };
     let incidence = PI / 4.0;
     let sun = || vec![LightKind::Directional { direction: -towards(incidence), irradiance: Vec3::splat(2.0) }];
@@ -164,17 +160,6 @@ fn a_sun_is_a_power_of_the_cosine(exponents: &[f32]) {
         }
     }
     println!("relative error up to {:.1e}, at exponents above 5 {:.1e}", worst[0], worst[1]);
-}
-
-#[test]
-fn a_sun_in_a_plate_is_a_power_of_the_cosine() {
-    a_sun_is_a_power_of_the_cosine(&[5.0, 48_826.0]);
-}
-
-#[test]
-#[ignore = "long: minutes on a software device"]
-fn a_sun_in_a_plate_is_every_power_of_the_cosine() {
-    a_sun_is_a_power_of_the_cosine(&[0.0, 0.01, 5.0, 1e4, 48_826.0]);
 }
 
 #[test]

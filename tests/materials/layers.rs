@@ -362,14 +362,10 @@ fn alphas_of_vertices_are_looked_up_without_colours() {
 fn sheets_let_their_share_pass() {
     let Some(gpu) = device() else { return };
     assert_holds("a lamp", sheets::lamp_between_sheets(&gpu));
-}
-
-#[test]
-#[ignore = "long: minutes on a software device"]
-fn all_sheets_let_their_share_pass() {
-    let Some(gpu) = device() else { return };
-    for illumination in BOTH {
-        assert_holds("the sun", sheets::sun_through_sheets(&gpu, illumination));
+    if is_long_run() {
+        for illumination in BOTH {
+            assert_holds("the sun", sheets::sun_through_sheets(&gpu, illumination));
+        }
     }
 }
 

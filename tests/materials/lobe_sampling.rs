@@ -398,24 +398,13 @@ fn subject_check(gpu: &Gpu, subject: usize, alphas: &[f32]) -> Check {
     cells_check(&format!("{what}, all together"), &all_counts, &all_probabilities)
 }
 
-fn lobes_follow_their_densities(alphas: &[f32]) {
-    let Some(gpu) = device() else { return };
-    for (number, subject) in SUBJECTS.iter().enumerate() {
-        assert_holds(subject.what, subject_check(&gpu, number, alphas));
-    }
-}
-
 #[test]
 fn lobes_by_themselves_follow_their_densities() {
-    lobes_follow_their_densities(&alphas(ALPHAS));
-}
-
-#[test]
-#[ignore = "long: many roughnesses, and strict arithmetic"]
-fn lobes_of_all_roughnesses_follow_their_densities() {
-    lobes_follow_their_densities(&alphas(40));
+    let alphas = alphas(of_run(ALPHAS, 40));
     let Some(gpu) = device() else { return };
-    assert_holds("strict", mixture_check(&gpu, Math::Strict));
+    for (number, subject) in SUBJECTS.iter().enumerate() {
+        assert_holds(subject.what, subject_check(&gpu, number, &alphas));
+    }
 }
 
 /// A unit vector off another by a tenth or so.
@@ -516,7 +505,9 @@ fn mixture_check(gpu: &Gpu, math: Math) -> Check {
 #[test]
 fn surfaces_of_many_lobes_are_sampled_as_they_weigh_light() {
     let Some(gpu) = device() else { return };
-    assert_holds("fast", mixture_check(&gpu, Math::Fast));
+    for math in [Math::Fast, Math::Strict].into_iter().take(of_run(1, 2)) {
+        assert_holds(format!("{math:?}"), mixture_check(&gpu, math));
+    }
 }
 
 /// A change of a file of the kernel, and which check must notice it: that of a subject, or of mixtures.
@@ -571,10 +562,14 @@ const FAULTS: [Fault; 12] = [
         to: "" },
 ];
 
-fn faults_are_noticed(faults: &[&Fault]) {
+/// In the short run one that each complaint is about, and one of mixtures.
+#[test]
+fn faults_of_the_sampling_are_noticed() {
+    let mut noticed = HashSet::new();
+    let faults = FAULTS.iter().filter(|fault| is_long_run() || noticed.insert((fault.noticed, fault.subject.is_some())));
     let Some(mut gpu) = device() else { return };
     let alphas = alphas(ALPHAS);
-    for Fault { what, file, from, to, subject, noticed } in faults.iter().copied().copied() {
+    for Fault { what, file, from, to, subject, noticed } in faults.copied() {
         gpu.replace(planted::kernels(&["check_lobes"], file, &[(from, to)]));
         let check = match subject {
             // Each value is wrong, and samples are by their number.
@@ -585,17 +580,4 @@ fn faults_are_noticed(faults: &[&Fault]) {
         let is_noticed = check.as_ref().is_err_and(|complaint| complaint.contains(noticed));
         assert!(is_noticed, "{what} is to be noticed because {noticed}: {check:?}");
     }
-}
-
-/// One that each complaint is about, and one of mixtures.
-#[test]
-fn faults_of_the_sampling_are_noticed() {
-    let mut noticed = HashSet::new();
-    faults_are_noticed(&FAULTS.iter().filter(|fault| noticed.insert((fault.noticed, fault.subject.is_some()))).collect::<Vec<_>>());
-}
-
-#[test]
-#[ignore = "long: minutes of compiling"]
-fn all_faults_of_the_sampling_are_noticed() {
-    faults_are_noticed(&FAULTS.iter().collect::<Vec<_>>());
 }

@@ -233,7 +233,9 @@ fn beam_at(traced: &Traced) -> (DVec3, DVec3) {
 }
 
 /// Of each case that has one of these arithmetics.
-fn lambertian_check(of: &[Math]) {
+#[test]
+fn lambertian_surfaces_scatter_by_the_cosine() {
+    let of = of_run::<&[_]>(&[Math::Fast], &BOTH);
     let Some(gpu) = device() else { return };
     let colour = Vec3::new(0.75, 0.3, 0.1);
     let cases = [(0.0, false), (60.0, false), (89.0, false), (45.0, true)];
@@ -266,11 +268,6 @@ fn lambertian_check(of: &[Math]) {
     assert_eq!(trace(&gpu, Math::Fast, &beam(Material::lambert("grey", colour), 45.0, true)).tally.stored, 0);
 }
 
-#[test]
-fn lambertian_surfaces_scatter_by_the_cosine() {
-    lambertian_check(&[Math::Fast]);
-}
-
 /// Albedo of the lobe (n + 2) / 2 pi cos^n at incidences 0, 30, 60, 80, 89.9 degrees, of the part above the horizon.
 pub(super) const ALBEDOS: [(f64, &[f64]); 7] = [
     (0.01, &[1.0, 0.9318, 0.7472, 0.5835, 0.4974]),
@@ -285,7 +282,9 @@ pub(super) const ALBEDOS: [(f64, &[f64]); 7] = [
 pub(super) const INCIDENCES: [f64; 5] = [0.0, 30.0, 60.0, 80.0, 89.9];
 
 /// Of each case that has one of these arithmetics.
-fn glossy_check(of: &[Math]) {
+#[test]
+fn glossy_surfaces_scatter_by_their_lobe() {
+    let of = of_run::<&[_]>(&[Math::Fast], &BOTH);
     let Some(gpu) = device() else { return };
     for (k, (n, albedos)) in ALBEDOS.into_iter().enumerate() {
         // Each exponent has every other incidence.
@@ -325,11 +324,6 @@ fn glossy_check(of: &[Math]) {
     }
 }
 
-#[test]
-fn glossy_surfaces_scatter_by_their_lobe() {
-    glossy_check(&[Math::Fast]);
-}
-
 /// Shares and directions of what a smooth surface reflects and transmits, with eta = n_i / n_t.
 fn smooth_check(what: &str, traced: &Traced, eta: f64, reflectance: f64) -> Check {
     let (wo, normal) = beam_at(traced);
@@ -355,7 +349,9 @@ fn smooth_check(what: &str, traced: &Traced, eta: f64, reflectance: f64) -> Chec
 }
 
 /// Of each case that has one of these arithmetics.
-fn glass_check(of: &[Math]) {
+#[test]
+fn glass_reflects_by_fresnel_and_refracts_by_snell() {
+    let of = of_run::<&[_]>(&[Math::Fast], &BOTH);
     let Some(gpu) = device() else { return };
     let outside = [0.0, 45.0, 56.31, 80.0, 89.0, 89.9].map(|incidence| (1.5f32, incidence, false));
     // Total reflection begins at 41.81 degrees, with an index of 2.4 at 24.62.
@@ -383,19 +379,6 @@ fn glass_check(of: &[Math]) {
     let dim = trace(&gpu, Math::Fast, &beam(mirror(0.8), 30.0, false));
     assert_holds("a dim mirror", share_check("survivors", u64::from(dim.tally.stored), u64::from(SAMPLES), f64::from(0.8f32)));
     assert_complains("a mirror 1 % brighter", share_check("fault", u64::from(dim.tally.stored), u64::from(SAMPLES), 0.808));
-}
-
-#[test]
-fn glass_reflects_by_fresnel_and_refracts_by_snell() {
-    glass_check(&[Math::Fast]);
-}
-
-#[test]
-#[ignore = "long: minutes on a software device"]
-fn surfaces_scatter_alike_by_strict_arithmetic() {
-    lambertian_check(&BOTH);
-    glossy_check(&BOTH);
-    glass_check(&BOTH);
 }
 
 /// The first photons of seed 1 whose 24 bits of a word are all zeros, and all ones.

@@ -33,21 +33,13 @@ fn in_lab<T>(gpu: &Gpu, part: impl FnOnce(&mut Lab) -> T) -> T {
     part(&mut Lab { gpu, rates: some_rates(), scene: None, size: Size::Small, deadline, cancelled, tell: &mut |_| {} })
 }
 
+/// Some experiments, and one more in which it is interrupted: what is complete is kept, and the rest is named.
 #[test]
 fn a_small_bench_reports_every_pass() {
-    check_small_bench(&["open-box", "table-1", "gather", "compaction"], None);
-}
-
-#[test]
-#[ignore = "long: a minute on a software device"]
-fn a_small_bench_of_all_experiments_reports_every_pass() {
-    check_small_bench(&experiments::ALL.map(|experiment| experiment.name), Some(scene("cornell")));
-}
-
-/// Some experiments, and one more in which it is interrupted: what is complete is kept, and the rest is named.
-fn check_small_bench(names: &[&str], scene: Option<Scene>) {
+    let all = experiments::ALL.map(|experiment| experiment.name);
+    let few = ["open-box", "table-1", "gather", "compaction"];
+    let (names, scene) = of_run::<(&[_], _)>((&few, None), (&all, Some(scene("cornell"))));
     let Some(gpu) = device() else { return };
-    let has_all = names.len() == experiments::ALL.len();
     let experiments: Vec<_> = names.iter().chain(&["open-box"]).map(|name| experiments::by_name(name).unwrap()).collect();
     let last = format!("[{0}/{0}] ", experiments.len());
     let (command, budget, cancelled) = ("photonmill bench".to_owned(), Duration::from_secs(36_000), AtomicBool::new(false));
@@ -70,7 +62,7 @@ fn check_small_bench(names: &[&str], scene: Option<Scene>) {
     let copies = report["rates"]["copies"].as_array().unwrap();
     assert!(copies.iter().all(|copy| copy["median"].as_f64().unwrap() > 0.0 && copy["moved_bytes"].as_u64().unwrap() > 1 << 16));
     let passes = report["passes"].as_array().unwrap();
-    assert!(passes.len() > if has_all { 60 } else { 30 }, "{} passes", passes.len());
+    assert!(passes.len() > of_run(30, 60), "{} passes", passes.len());
     // How large they are is the clock's affair, and a processor that others use shows less than it can for a while.
     assert!(passes.iter().all(|pass| pass["fraction"].as_f64().is_some_and(|fraction| fraction > 0.0)), "{passes:?}");
     for pass in &found.passes {
@@ -140,36 +132,24 @@ fn the_roofline_counts_every_dispatch() {
     }
 }
 
-type Row = (&'static str, &'static str, &'static str, &'static str);
-
 /// What is measured is checked: a kernel that leaves work out, or does another, gives no rate.
-fn wrong_measurements(rows: &[Row]) {
-    for (kernel, from, to, what) in rows {
+/// Those that are measured first.
+#[test]
+fn measurements_that_come_out_wrong_are_refused() {
+    let rows = [
+        ("measure_float", "step < push.step_count", "step < push.step_count / 2", "sums and products"),
+        ("measure_integer", "step < push.step_count", "step < min(push.step_count, 7)", "products of integers"),
+        ("measure_copy", "if (index < push.item_count)", "if (index < push.item_count / 2)", "copied blocks"),
+        ("measure_copy", "copies[index] = blocks[index];", "copies[index] = uvec4(index);", "copied blocks"),
+        ("measure_gather", "measured_place(index * push.step_count + step)", "(index * push.step_count + step)", "copied blocks"),
+        ("measure_atomic", "step < push.step_count", "step < push.step_count - 1", "atomic additions"),
+    ];
+    for (kernel, from, to, what) in &rows[..of_run(3, 6)] {
         let replaced = planted::kernels(&[kernel], &format!("check/{kernel}.comp"), &[(from, to)]);
         let Some(gpu) = device_with(Options { replaced, ..Options::default() }) else { return };
         let error = rates::measure(&gpu, Size::Small).expect_err(kernel).to_string();
         assert!(error.contains(what) && error.contains("wrongly"), "{kernel}: {error}");
     }
-}
-
-/// Those that are measured first.
-#[test]
-fn measurements_that_come_out_wrong_are_refused() {
-    wrong_measurements(&[
-        ("measure_float", "step < push.step_count", "step < push.step_count / 2", "sums and products"),
-        ("measure_integer", "step < push.step_count", "step < min(push.step_count, 7)", "products of integers"),
-        ("measure_copy", "if (index < push.item_count)", "if (index < push.item_count / 2)", "copied blocks"),
-    ]);
-}
-
-#[test]
-#[ignore = "long: measures all rates of a device again and again"]
-fn later_measurements_that_come_out_wrong_are_refused() {
-    wrong_measurements(&[
-        ("measure_copy", "copies[index] = blocks[index];", "copies[index] = uvec4(index);", "copied blocks"),
-        ("measure_gather", "measured_place(index * push.step_count + step)", "(index * push.step_count + step)", "copied blocks"),
-        ("measure_atomic", "step < push.step_count", "step < push.step_count - 1", "atomic additions"),
-    ]);
 }
 
 /// Short forms: memory and work of small runs in [`the_roofline_counts_every_dispatch`], growth in the tests of `scale` itself.

@@ -536,14 +536,11 @@ fn the_paper_is_regenerated() {
     let output = place.run_without_vulkan("paper --out paper --large 5001 --repeats 1 --longest 1ms");
     assert!(output.status.success(), "{}", text(&output.stderr));
     check_paper(&place, &[]);
-}
-
-#[test]
-#[ignore = "long: most of a minute on a software device"]
-fn the_paper_is_regenerated_on_a_device() {
-    let place = Place::new();
-    place.succeed(&validated("paper --out paper --large 5001 --repeats 1 --longest 9s"));
-    check_paper(&place, &["still holds", "105640"]);
+    if is_long_run() {
+        let place = Place::new();
+        place.succeed(&validated("paper --out paper --large 5001 --repeats 1 --longest 9s"));
+        check_paper(&place, &["still holds", "105640"]);
+    }
 }
 
 /// Before anything is computed, as while a scene is read or settings are looked for, Ctrl-C ends the program at once, and it says so.

@@ -199,16 +199,7 @@ fn place_with_inputs() -> Place {
 
 #[test]
 fn commands_of_readme_and_guide_run() {
-    run_commands(false);
-}
-
-#[test]
-#[ignore = "long: half a minute on a software device"]
-fn all_commands_of_readme_and_guide_run() {
-    run_commands(true);
-}
-
-fn run_commands(all: bool) {
+    let all = is_long_run();
     let Some(_) = device() else { return };
     let place = place_with_inputs();
     let texts: Vec<(String, Vec<String>)> = all_texts().into_iter().map(|(path, text)| (path, commands(&text))).collect();
@@ -367,12 +358,4 @@ fn built_in_scenes_are_in_the_guide() {
     for name in built_in::names() {
         assert!(text.contains(&format!("`{name}`")), "{name}");
     }
-}
-
-/// The table of the same page is checked by `tests/light/hard_cases.rs`.
-#[test]
-fn planted_faults_are_counted() {
-    let (page, red) = (read("src/guide/hard_cases.md"), read("tests/engine/planted_faults.rs"));
-    let count = red.split_once("const FAULTS: [Fault; ").unwrap().1.split_once(']').unwrap().0;
-    assert!(page.contains(&format!("plants {count} faults")), "{count} faults are planted");
 }

@@ -64,16 +64,7 @@ fn the_packed_crate_has_the_spirv_of_its_sources() {
         let compiled = planted::kernels(&[kernel], &format!("{folder}/{kernel}.comp"), &[]);
         assert!(built.contains(&compiled[0]), "{kernel} is of other sources");
     }
-    check_package(&built);
-}
-
-#[test]
-#[ignore = "long: compiles every kernel"]
-fn the_packed_crate_has_the_spirv_of_all_its_sources() {
-    check_package(&all_kernels());
-}
-
-fn check_package(compiled: &[(String, Vec<u32>)]) {
+    let compiled = &if is_long_run() { all_kernels() } else { built };
     let place = Place::new();
     let folder = packed(place.path());
     assert!(compiled.len() > 50, "{} kernels", compiled.len());

@@ -260,23 +260,14 @@ fn whole_pictures_are_studied_against_path_tracing() {
     }
 }
 
-/// Photons on a floor below a disc; a factor forgotten would be no noise.
-#[test]
-fn floors_are_studied_against_their_closed_form() {
-    study_floors(&["disc-over-plane"], &[FROM_PHOTONS]);
-}
-
-/// And in a closed room, and with shadow rays.
-#[test]
-#[ignore = "long: two scenes and two kinds of direct light, each with kernels of its own"]
-fn all_floors_are_studied_against_their_closed_form() {
-    study_floors(&["disc-over-plane", "furnace"], &[FROM_PHOTONS, ("persistent, shrinking radius", 0.6)]);
-}
-
 const FROM_PHOTONS: (&str, f64) = ("direct light from photons", 0.5);
 
 /// Choices with the most that their errors may be.
-fn study_floors(names: &[&str], choices: &[(&str, f64)]) {
+/// Photons on a floor below a disc; a factor forgotten would be no noise.
+#[test]
+fn floors_are_studied_against_their_closed_form() {
+    let names = &["disc-over-plane", "furnace"][..of_run(1, 2)];
+    let choices = &[FROM_PHOTONS, ("persistent, shrinking radius", 0.6)][..of_run(1, 2)];
     let Some(gpu) = device() else { return };
     for name in names {
         let request = request(name, 4);

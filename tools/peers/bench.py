@@ -83,13 +83,7 @@ def measure(asked):
     chosen = choose(asked.only)
     if asked.plot and asked.plot.suffix not in (".svg", ".png"):
         raise Failure(f"--plot {asked.plot}: the name must end in .svg or .png")
-    for path in filter(None, (asked.json, asked.plot)):
-        if not path.absolute().parent.is_dir():
-            raise Failure(f"{path}: there is no folder {path.absolute().parent}; make it first")
-    load = os.getloadavg()[0]
-    if load > IDLE:
-        tell(f"warning: {load:.1f} processes are already at work on this machine; the times below are worth little")
-    confine(asked.threads)
+    load = prepare(asked)
     right, right_error = reference.irradiance(reference.QUICK if asked.quick else reference.FINE)
     with tempfile.TemporaryDirectory(prefix="bench_peers-") as folder:
         machine = Machine(asked.threads, Path(folder))
@@ -118,6 +112,18 @@ def measure(asked):
         report.write_json(found, asked.json)
     if asked.plot:
         report.plot(found, TARGETS, asked.plot)
+
+
+def prepare(asked):
+    """Looks for the folders of the results, and leaves this process its cores; the load of the machine before."""
+    for path in filter(None, (asked.json, asked.plot)):
+        if not path.absolute().parent.is_dir():
+            raise Failure(f"{path}: there is no folder {path.absolute().parent}; make it first")
+    load = os.getloadavg()[0]
+    if load > IDLE:
+        tell(f"warning: {load:.1f} processes are already at work on this machine; the times below are worth little")
+    confine(asked.threads)
+    return load
 
 
 def choose(only):

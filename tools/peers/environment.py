@@ -27,30 +27,33 @@ def is_inside():
 
 
 def enter(program):
-    """Goes on as the same program inside the environment, which is made first if it is not there or not as wanted."""
-    wanted = "\n".join(PACKAGES)
-    finished = folder() / "packages.txt"
-    if not (finished.exists() and finished.read_text() == wanted):
-        make(finished, wanted)
-    python = folder() / "bin" / "python"
+    """Goes on as the same program inside the environment."""
+    python = python_of(folder(), PACKAGES)
     os.execv(python, [str(python), str(program), *sys.argv[1:]])
 
 
-def make(finished, wanted):
+def python_of(folder, packages, own=sys.executable):
+    """The Python of an environment with these packages, which is made by one's own Python if it is not there or not as wanted."""
+    wanted, finished, python = "\n".join(packages), folder / "packages.txt", folder / "bin" / "python"
+    if finished.exists() and finished.read_text() == wanted:
+        return python
     if sys.version_info < (3, 11):
         raise Failure(f"the peers need Python 3.11 or newer; this is {sys.version.split()[0]}")
-    print(f"bench_peers: installing {', '.join(PACKAGES)} into {folder()}", file=sys.stderr)
+    print(f"{Path(sys.argv[0]).name}: installing {', '.join(packages)} into {folder}", file=sys.stderr)
     finished.unlink(missing_ok=True)
-    python = folder() / "bin" / "python"
-    for what, command in [
-        ("make a Python environment (Debian: apt-get install python3-venv)", [sys.executable, "-m", "venv", "--clear", str(folder())]),
-        ("install the peers from PyPI", [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *PACKAGES]),
-    ]:
-        result = subprocess.run(command, capture_output=True, text=True)
-        if result.returncode != 0:
-            lines = (result.stderr.strip() or result.stdout.strip() or "no message").splitlines()
-            raise Failure(f"cannot {what}: {lines[-1]}")
+    said("make a Python environment (Debian: apt-get install python3-venv)", [own, "-m", "venv", "--clear", folder])
+    said("install from PyPI", [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *packages])
     finished.write_text(wanted)
+    return python
+
+
+def said(what, command):
+    """What a command prints."""
+    result = subprocess.run([str(word) for word in command], capture_output=True, text=True)
+    if result.returncode != 0:
+        lines = (result.stderr.strip() or result.stdout.strip() or "no message").splitlines()
+        raise Failure(f"cannot {what}: {lines[-1]}")
+    return result.stdout
 
 
 def llvm():

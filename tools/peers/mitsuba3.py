@@ -174,14 +174,20 @@ class ParticleTracer(Tracer):
         return summed[0] / summed[1] / launches * np.pi / box.ALBEDO
 
 
-def main(asked):
-    start = time.perf_counter()
+def started(variant, threads):
+    """Mitsuba and Dr.Jit."""
     import drjit
     import mitsuba
 
-    mitsuba.set_variant("llvm_ad_mono")
+    mitsuba.set_variant(variant)
     mitsuba.set_log_level(mitsuba.LogLevel.Error)
-    drjit.set_thread_count(asked["threads"])
+    drjit.set_thread_count(threads)
+    return mitsuba, drjit
+
+
+def main(asked):
+    start = time.perf_counter()
+    mitsuba, drjit = started("llvm_ad_mono", asked["threads"])
     tracer = {"path": PathTracer, "ptracer": ParticleTracer}[asked["tracer"]](mitsuba, drjit)
     begin = time.perf_counter()
     total, sample_count = 0.0, 0

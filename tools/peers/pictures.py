@@ -20,12 +20,12 @@ from pathlib import Path
 import numpy as np
 
 from peers import environment, report
-from peers.bench import IDLE, SAME, first_below, processor, tell
+from peers.bench import SAME, first_below, prepare, processor, tell
 from peers.failure import Failure
-from peers.mitsuba3 import Mitsuba
+from peers.mitsuba3 import Mitsuba, started
 from peers.photonmill import Photonmill
 from peers.reference import root_mean_square
-from peers.run import Machine, clocked, confine
+from peers.run import Machine, clocked
 
 TARGETS, QUICK_TARGETS = [0.2, 0.1, 0.05], [0.5, 0.3]
 # Settings that photonmill's pilot chooses.
@@ -272,12 +272,7 @@ def measure(asked):
     size = asked.size or (32 if asked.quick else 128)
     limit_s = asked.limit or (3.0 if asked.quick else 60.0)
     reference_s = asked.reference_seconds or (10.0 if asked.quick else 300.0)
-    if asked.json and not asked.json.absolute().parent.is_dir():
-        raise Failure(f"{asked.json}: there is no folder {asked.json.absolute().parent}; make it first")
-    load = os.getloadavg()[0]
-    if load > IDLE:
-        tell(f"warning: {load:.1f} processes are already at work on this machine; the times below are worth little")
-    confine(asked.threads)
+    load = prepare(asked)
     with tempfile.TemporaryDirectory(prefix="bench_peers-") as folder:
         machine = Machine(asked.threads, Path(folder))
         photonmill, mitsuba = PhotonmillPicture(machine, asked.photonmill.absolute()), MitsubaPicture(machine)
@@ -406,12 +401,7 @@ class Painter:
 
 def main(asked):
     start = time.perf_counter()
-    import drjit
-    import mitsuba
-
-    mitsuba.set_variant("llvm_ad_rgb")
-    mitsuba.set_log_level(mitsuba.LogLevel.Error)
-    drjit.set_thread_count(asked["threads"])
+    mitsuba, _ = started("llvm_ad_rgb", asked["threads"])
     painter = Painter(mitsuba, SCENES[asked["scene"]], asked["folder"], asked["size"], asked["together"])
     budget, together = asked["budget"], asked["together"]
     begin = time.perf_counter()

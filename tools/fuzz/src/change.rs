@@ -1,4 +1,4 @@
-//! A glTF file's JSON changed in one place, and .glb files taken apart and put together. The tests of the loader change files
+//! A glTF file's JSON changed in one place, and .glb files taken apart. The tests of the loader change files
 //! in the same way.
 
 use serde_json::{Value, json};
@@ -11,16 +11,6 @@ pub fn parts(file: &[u8]) -> Option<(&[u8], &[u8])> {
     }
     let end = 20usize.checked_add(length(12)?)?;
     Some((file.get(20..end)?, file.get(end + 8..).unwrap_or_default()))
-}
-
-pub fn pack(value: &Value, binary: &[u8]) -> Vec<u8> {
-    let chunk = |kind: &[u8; 4], content: &[u8], fill: u8| {
-        let mut content = content.to_vec();
-        content.resize(content.len().next_multiple_of(4), fill);
-        [&(content.len() as u32).to_le_bytes(), kind.as_slice(), &content].concat()
-    };
-    let chunks = [chunk(b"JSON", value.to_string().as_bytes(), b' '), chunk(b"BIN\0", binary, 0)].concat();
-    [b"glTF".as_slice(), &2u32.to_le_bytes(), &(12 + chunks.len() as u32).to_le_bytes(), &chunks].concat()
 }
 
 /// Pointers to all values within a value.

@@ -36,13 +36,13 @@ fn read(file: &[u8]) -> Option<SavedRun> {
 }
 
 /// Writes, reports and shows a run as `merge` does, and goes on with it where it is of the paper's box.
-fn use_run(run: &SavedRun) {
+pub fn use_run(run: &SavedRun) {
     let bytes = run.to_bytes();
     assert_eq!(bytes, SavedRun::from_bytes(&bytes).expect("what was written can be read").to_bytes());
     let _ = (run.missing(), run.emitted());
     let SavedFilm::Scene(film) = &run.film else {
         assert!(!merge_report::text(run, 1, None).is_empty());
-        return seeds::part_of_box(run.share, Some(run.clone())).map_or_else(|error| refused(&error), drop);
+        return seeds::part_of_box(run.share, Some(run.clone())).map_or_else(|error| drop(refused(&error)), drop);
     };
     assert!(!merge_report::text(run, 1, Some(film)).is_empty());
     let report: Value = serde_json::from_slice(&merge_report::json(run, film, &[])).expect("a report is JSON");

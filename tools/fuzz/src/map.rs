@@ -1,6 +1,6 @@
 //! Bytes of a file of photons -> opened -> used as `map info`, `map export` and `--map` do: photons, or one line that says why not.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use super::change::Random;
@@ -18,30 +18,34 @@ use photonmill::scene::geometry::Geometry;
 use photonmill::settings::scene::SceneSettings;
 
 static FILE: LazyLock<PathBuf> = LazyLock::new(|| file("a.pm"));
-static CLOUD: LazyLock<PathBuf> = LazyLock::new(|| file("a.ply"));
-static SEEDS: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| vec![seeds::photon_map()]);
+static SEEDS: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| vec![seeds::photon_map(&file("seed.pm"))]);
 /// What the seed's photons are of.
 static SCENE: LazyLock<(Scene, Geometry)> = LazyLock::new(seeds::scene);
 
 pub fn run(bytes: &[u8]) {
     std::fs::write(&*FILE, bytes).expect("the file can be written");
-    let outcome = MapFile::open("--map", &FILE).map(|map| {
-        assert!(!photon_map::text(&map.header).is_empty() && !photon_map::json(&map.header).is_empty());
-        // Photons may have been changed, and be of no use to this scene.
-        [export(&map), gather(&map)].into_iter().filter_map(Result::err).for_each(|error| refused(&error));
-    });
-    if let Err(error) = outcome {
+    if let Err(error) = use_map(&FILE) {
         refused(&error);
     }
 }
 
+pub fn use_map(path: &Path) -> Result<()> {
+    let map = MapFile::open("--map", path)?;
+    assert!(!photon_map::text(&map.header).is_empty() && !photon_map::json(&map.header).is_empty());
+    // Photons may have been changed, and be of no use to this scene.
+    for error in [export(&map, &path.with_extension("ply")), gather(&map)].into_iter().filter_map(Result::err) {
+        refused(&error);
+    }
+    Ok(())
+}
+
 /// A cloud has as many points as it says.
-fn export(map: &MapFile) -> Result<()> {
+fn export(map: &MapFile, path: &Path) -> Result<()> {
     let names: Vec<&str> = map.header.maps.iter().map(|map| map.name.as_str()).collect();
-    let mut cloud = std::fs::File::create(&*CLOUD).expect("the cloud can be written");
+    let mut cloud = std::fs::File::create(path).expect("the cloud can be written");
     let unwritten = |error: std::io::Error| -> Error { panic!("the cloud cannot be written: {error}") };
     let count = photon_map::write_ply(map, map.rounds(), &names, &mut cloud, &unwritten)?;
-    let cloud = std::fs::read(&*CLOUD).expect("the cloud can be read");
+    let cloud = std::fs::read(path).expect("the cloud can be read");
     let end = b"\nend_header\n";
     let header_length = cloud.windows(end.len()).position(|bytes| bytes == end).expect("the header ends") + end.len();
     let (header, points) = (String::from_utf8_lossy(&cloud[..header_length]), &cloud[header_length..]);

@@ -5,8 +5,8 @@ pub mod checkpoint;
 pub mod gltf;
 pub mod map;
 mod mutation;
-mod sealed;
-mod seeds;
+pub mod sealed;
+pub mod seeds;
 pub mod settings;
 
 use std::path::PathBuf;
@@ -20,9 +20,10 @@ pub fn panics_are_caught() {
 }
 
 /// A refusal is one line, and the user's to mend.
-pub fn refused(error: &Error) {
+pub fn refused(error: &Error) -> String {
     let line = error.to_string();
     assert!(error.exit_code() == 2 && !line.is_empty() && line.lines().count() == 1, "{line:?}");
+    line
 }
 
 /// A file of this process; `run` lays it into memory.

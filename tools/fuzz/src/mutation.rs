@@ -3,9 +3,10 @@
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
+use photonmill::scene::gltf::source::binary_file;
 use serde_json::{Value, json};
 
-use super::change::{Random, change, pack, parts, pointers};
+use super::change::{Random, change, parts, pointers};
 
 /// Bytes, how many of them count, and how many there may be; returns how many count now.
 pub type MutateBytes = fn(&mut [u8], usize, usize) -> usize;
@@ -32,11 +33,11 @@ pub fn mutate(file: &[u8], seed: u32, mutate_bytes: MutateBytes) -> Option<Vec<u
         None => (serde_json::from_slice(file).ok()?, None),
     };
     match binary {
-        Some(binary) if random.below(3) == 0 => return Some(pack(&value, &grown(binary, mutate_bytes))),
+        Some(binary) if random.below(3) == 0 => return Some(binary_file(&value, &grown(binary, mutate_bytes), &[])),
         None if random.below(3) == 0 => change_embedded(&mut value, &mut random, mutate_bytes)?,
         _ => (0..=random.below(3)).for_each(|_| change(&mut value, &mut random)),
     }
-    Some(binary.map_or_else(|| value.to_string().into_bytes(), |binary| pack(&value, &binary)))
+    Some(binary.map_or_else(|| value.to_string().into_bytes(), |binary| binary_file(&value, &binary, &[])))
 }
 
 /// libFuzzer's own changes, with room for a few bytes more.

@@ -1,6 +1,7 @@
 //! Files of runs and of photons, small and made without a device: what fuzzing begins with.
 
 use std::fs::File;
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -31,14 +32,13 @@ use photonmill::scene::{Scene, Surface, built_in};
 use photonmill::settings::scene::SceneSettings;
 use photonmill::settings::{Builder, RoomSettings};
 
-use super::file;
+/// Keeps all that a run saves.
+#[derive(Default)]
+pub struct Saved(pub Vec<SavedRun>);
 
-/// Keeps what a run saves last.
-struct Latest(Option<SavedRun>);
-
-impl SaveRun for Latest {
+impl SaveRun for Saved {
     fn save(&mut self, run: &Arc<SavedRun>, _: bool) -> photonmill::error::Result<()> {
-        self.0 = Some(SavedRun::clone(run));
+        self.0.push(SavedRun::clone(run));
         Ok(())
     }
 }
@@ -46,11 +46,11 @@ impl SaveRun for Latest {
 /// A part of a run of the paper's box, so small that it takes no time; it goes on with what there is of it.
 pub fn part_of_box(share: Share, resume: Option<SavedRun>) -> photonmill::error::Result<SavedRun> {
     let settings = RoomSettings { photons: 101, rounds: 4, mesh: 2, builder: Builder::Cpu, rng: Rng::Philox, ..RoomSettings::default() };
-    let (never, mut latest) = (AtomicBool::new(false), Latest(None));
+    let (never, mut saved) = (AtomicBool::new(false), Saved::default());
     let resume = resume.map(|run| ("seed".into(), run));
-    let keep = Keep { scene: "open-box", share, resume, every: Duration::ZERO, save: Some(&mut latest), dealt: None };
+    let keep = Keep { scene: "open-box", share, resume, every: Duration::ZERO, save: Some(&mut saved), dealt: None };
     room::run(None, &open_box(&settings), &settings, &mut Control { cancelled: &never, progress: &mut |_| {}, keep })?;
-    Ok(latest.0.expect("a run saves its end"))
+    Ok(saved.0.pop().expect("a run saves its end"))
 }
 
 /// A box with a mirror for a wall, so that photons make a caustic map too.
@@ -61,7 +61,7 @@ pub fn scene() -> (Scene, Geometry) {
 }
 
 /// A part of eight blocks of a picture of four pixels, as far as what it holds must fit.
-fn part_of_picture(share: Share, keeps_parts: bool) -> SavedRun {
+pub fn part_of_picture(share: Share, keeps_parts: bool) -> SavedRun {
     let ((scene, geometry), settings) = (scene(), SceneSettings { keeps_parts, ..SceneSettings::default() });
     let sensor = Sensor::Picture { width: 2, height: 2 };
     let plan = ScenePlan::new(&scene, &geometry, &settings, sensor, &Limits::of_host()).expect("it can be planned").film;
@@ -112,13 +112,13 @@ pub fn runs() -> Vec<Vec<u8>> {
 }
 
 /// A file of photons of two rounds.
-pub fn photon_map() -> Vec<u8> {
-    let ((scene, geometry), path) = (scene(), file("seed.pm"));
+pub fn photon_map(path: &Path) -> Vec<u8> {
+    let (scene, geometry) = scene();
     let settings = SceneSettings { photons: 4, caustic_photons: 4, bounces: 3, ..SceneSettings::default() };
     let sensor = Sensor::Picture { width: 2, height: 2 };
     let plan = ScenePlan::new(&scene, &geometry, &settings, sensor, &Limits::of_host()).expect("it can be planned");
     let write = || {
-        let mut file = File::create(&path)?;
+        let mut file = File::create(path)?;
         let mut writer = MapWriter::new(&mut file, &scene.name, &geometry, &plan, "none")?;
         for _ in 0..2 {
             // As many as no other map has.
@@ -133,7 +133,7 @@ pub fn photon_map() -> Vec<u8> {
             writer.end_round();
         }
         writer.finish()?;
-        std::fs::read(&path)
+        std::fs::read(path)
     };
     write().expect("the file can be written")
 }
