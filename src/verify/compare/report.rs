@@ -19,7 +19,7 @@ struct Report<'a> {
     b: &'a Path,
     width: u32,
     height: u32,
-    values: &'static str,
+    values: Values,
     left_out: LeftOut,
     #[serde(flatten)]
     deviation: &'a Deviation,
@@ -43,7 +43,7 @@ impl Comparison<'_> {
             b: &b.path,
             width: a.width,
             height: a.height,
-            values: a.values.name(),
+            values: a.values,
             left_out: self.pair.left_out,
             deviation: &self.deviation,
             flip: self.flip.as_ref().map(|Flip { mean, exposures, .. }| FlipEntry {
