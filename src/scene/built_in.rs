@@ -5,11 +5,8 @@ use glam::{DVec3, Vec3};
 use super::light::{Light, LightKind};
 use super::material::{Material, Surface};
 use super::room::face_axis;
-use super::{Camera, Mesh, Scene, closed_forms, open_box, showcase};
+use super::{Camera, Mesh, Named, Scene, closed_forms, open_box, showcase};
 use crate::settings::{Preset, RoomSettings};
-
-/// A name, and what makes the scene but for that.
-pub(super) type Named = (&'static str, fn() -> Scene);
 
 const SCENES: [Named; 5] = [
     ("open-box", || open_box(Preset::Modified)),

@@ -4,10 +4,9 @@ use std::f64::consts::PI;
 
 use glam::{DVec3, Vec3};
 
-use super::built_in::Named;
 use super::light::{Light, LightKind};
 use super::material::{Material, Surface};
-use super::{Camera, Mesh, Scene};
+use super::{Camera, Mesh, Named, Scene};
 use crate::settings::EmissionLaw;
 
 pub(crate) const SCENES: [Named; 8] = [

@@ -67,6 +67,9 @@ pub struct Reading {
     pub at: Option<f64>,
 }
 
+/// A built-in scene: its name, and what makes it but for that.
+type Named = (&'static str, fn() -> Scene);
+
 /// Meshes in world space, metres, y up, with what they are made of and what lights them.
 #[derive(Debug, Clone, Default)]
 pub struct Scene {

@@ -2,10 +2,9 @@
 
 use glam::{DVec3, Vec3};
 
-use super::built_in::Named;
 use super::light::{Light, LightKind};
 use super::material::{Layers, Material, Medium, Surface};
-use super::{Camera, Mesh, Scene};
+use super::{Camera, Mesh, Named, Scene};
 
 pub(super) const SCENES: [Named; 2] = [("sunlit-room", sunlit_room), ("prism", prism)];
 
