@@ -106,7 +106,7 @@ pub(super) fn packed(found: &Reproduction) -> Option<Verdict> {
 
 /// A pass of the CPU, relative to both of the paper's builders on the GPU.
 pub(super) fn on_gpu(found: &Reproduction, pass: Pass) -> Option<Verdict> {
-    let device = found.machine.device.as_ref()?;
+    let device = found.device.as_ref()?;
     let (topic, published, how) = match pass {
         Pass::Map => ("The GPU builds the map faster than the CPU", published::MAP_MS, ""),
         Pass::Rendering(_) => ("The GPU renders faster than the CPU", published::RENDERING_MS, ", by brute force"),
@@ -385,7 +385,7 @@ mod tests {
     fn a_software_device_is_called_one() {
         let mut found = sample::reproduction();
         assert!(on_gpu(&found, Pass::Map).unwrap().text.contains("software device"));
-        found.machine.device.as_mut().unwrap().is_cpu = false;
+        found.device.as_mut().unwrap().is_cpu = false;
         assert!(!on_gpu(&found, Pass::Map).unwrap().text.contains("software device"));
     }
 }
