@@ -6,12 +6,12 @@ use glam::{DVec2, DVec3, DVec4, Vec3};
 use gltf::json::texture::{CLAMP_TO_EDGE, LINEAR};
 use serde_json::{Map, Value, json};
 
-use super::names::{GEOMETRY, Names};
+use super::names::{GEOMETRY, Names, texture_name};
 use super::{Layout, MeshLightmap};
 use crate::scene::gltf::writer::{Writer, sampler};
 use crate::scene::layers::{Layers, TextureUse, UvTransform};
 use crate::scene::material::Coverage;
-use crate::scene::{Material, Mesh, Scene};
+use crate::scene::{Material, Mesh, Scene, bounds_of};
 
 /// How a document shows the baked light.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,7 +51,7 @@ impl Geometry {
     }
 
     fn add(&mut self, mesh: &Mesh, lightmap: Option<&MeshLightmap>, material: &Material) {
-        let (low, high) = mesh.positions.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(*p), high.max(*p)));
+        let (low, high) = bounds_of(mesh.positions.iter().copied());
         let translation = (0.5 * (low + high)).as_vec3();
         let positions: Vec<Vec3> = mesh.positions.iter().map(|position| (*position - translation.as_dvec3()).as_vec3()).collect();
         let (low, high) = positions.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), p| (low.min(*p), high.max(*p)));
@@ -153,7 +153,7 @@ pub fn document(scene: &Scene, layout: &Layout, geometry: &Geometry, names: &Nam
     document.json["asset"] = json!({"version": "2.0", "generator": concat!("photonmill ", env!("CARGO_PKG_VERSION"))});
     let used = textures_used(scene);
     for index in &used {
-        document.texture(names.texture(*index), sampler(&scene.textures[*index]));
+        document.texture(texture_name(*index), sampler(&scene.textures[*index]));
     }
     // Not mipmapped: smaller levels would mix charts.
     let of_charts = || json!({"magFilter": LINEAR, "minFilter": LINEAR, "wrapS": CLAMP_TO_EDGE, "wrapT": CLAMP_TO_EDGE});

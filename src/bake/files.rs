@@ -7,7 +7,9 @@ use glam::Vec3;
 use serde_json::json;
 
 use super::document::{self, Geometry, Kind};
-use super::names::{self, ENDINGS, ERROR, GEOMETRY, IRRADIANCE, LIGHTMAP, LIGHTMAP_SCENE, Names, PAGE_ENDINGS, RADIANCE, RADIANCE_SCENE};
+use super::names::{
+    self, ENDINGS, ERROR, GEOMETRY, IRRADIANCE, LIGHTMAP, LIGHTMAP_SCENE, Names, PAGE_ENDINGS, RADIANCE, RADIANCE_SCENE, texture_name,
+};
 use super::original::{self, Extended};
 use super::pages::Pages;
 use super::{Layout, Map, MeshLightmap, Object};
@@ -54,20 +56,20 @@ pub fn write(folder: &Folder, scene: &Scene, layout: &Layout, maps: &[Map], expo
         let document = document::document(scene, layout, &geometry, &names, kind, |mesh| intensities[&mesh]);
         (name.to_owned(), serde_json::to_vec_pretty(&document).expect("a document is plain data"))
     });
-    let files = pictures.chain(textures(scene, &names)).chain([(GEOMETRY.to_owned(), geometry.file.bytes.clone())]).chain(documents);
+    let files = pictures.chain(textures(scene)).chain([(GEOMETRY.to_owned(), geometry.file.bytes.clone())]).chain(documents);
     write_all(files.map(|(name, content)| (folder.file(&name), content)))
 }
 
 /// Names and contents of the files of a scene's textures.
-fn textures<'a>(scene: &'a Scene, names: &'a Names) -> impl Iterator<Item = (String, Vec<u8>)> + 'a {
-    document::textures_used(scene).into_iter().map(|index| (names.texture(index), colour::texture_png(&scene.textures[index])))
+fn textures<'a>(scene: &'a Scene) -> impl Iterator<Item = (String, Vec<u8>)> + 'a {
+    document::textures_used(scene).into_iter().map(|index| (texture_name(index), colour::texture_png(&scene.textures[index])))
 }
 
 /// Names of the files of a built-in scene's bake.
 pub fn names(scene: &Scene, layout: &Layout) -> Vec<String> {
     let names = Names::new(scene, layout);
     let pictures = (0..layout.objects.len()).flat_map(|object| ENDINGS.map(|ending| format!("{}{ending}", names.stem(object))));
-    let textures = document::textures_used(scene).into_iter().map(|index| names.texture(index));
+    let textures = document::textures_used(scene).into_iter().map(texture_name);
     pictures.chain(textures).chain([GEOMETRY, RADIANCE_SCENE, LIGHTMAP_SCENE].map(str::to_owned)).collect()
 }
 
@@ -189,7 +191,7 @@ pub fn preview(scene: &Scene, layout: &Layout, maps: &[Map], exposure: f32) -> V
     let names = Names::new(scene, layout);
     let geometry = Geometry::new(scene, layout);
     let json = document::document(scene, layout, &geometry, &names, Kind::Radiance, |_| 1.0);
-    let mut pictures: HashMap<String, Vec<u8>> = textures(scene, &names).collect();
+    let mut pictures: HashMap<String, Vec<u8>> = textures(scene).collect();
     for map in maps {
         let object = &layout.objects[map.object];
         pictures.insert(names.radiance(object.meshes[0]), radiance_png(scene, layout, object, map, exposure));

@@ -9,7 +9,8 @@ use rayon::prelude::*;
 
 use super::sides::closed_parts;
 use super::{CoveredTexel, MeshLightmap, PHASE_COUNT, SurfacePoint, TexelSample};
-use crate::scene::Scene;
+use crate::scene::box_tree::BoxTree;
+use crate::scene::{Scene, bounds_of, distance_to};
 
 /// Of a texel's length: how high above the surface points are judged, and up to which height what covers them lies on it.
 const LIFT: f64 = 1e-3;
@@ -31,22 +32,11 @@ struct Face {
     hides: f64,
 }
 
-struct Node {
-    low: DVec3,
-    high: DVec3,
-    /// First face and number of a leaf, or the place of the second child and 0: the first one follows.
-    first: usize,
-    count: usize,
-}
-
-/// All opaque triangles of a scene, in a tree of boxes.
+/// All opaque triangles of a scene.
 pub struct Faces {
     faces: Vec<Face>,
-    nodes: Vec<Node>,
+    tree: BoxTree,
 }
-
-/// Faces of a leaf.
-const LEAF: usize = 4;
 
 impl Faces {
     /// `meshes` say which backs are baked: those are looked at, and hide nothing.
@@ -70,28 +60,13 @@ impl Faces {
             };
             (0..if is_opaque { mesh.triangles.len() } else { 0 }).map(face)
         };
-        let mut faces: Vec<Face> = (0..scene.meshes.len()).flat_map(of_mesh).filter(|face| face.normal.is_finite()).collect();
-        let mut nodes = Vec::new();
-        if !faces.is_empty() {
-            build(&mut faces, 0, &mut nodes);
-        }
-        Faces { faces, nodes }
+        let faces: Vec<Face> = (0..scene.meshes.len()).flat_map(of_mesh).filter(|face| face.normal.is_finite()).collect();
+        Faces { tree: BoxTree::new(faces.par_iter().map(|face| face.corners), 0.0), faces }
     }
 
     /// Calls back for faces in leaves whose boxes meet something.
     fn visit<'a>(&'a self, meets: impl Fn(DVec3, DVec3) -> bool, mut look: impl FnMut(&'a Face)) {
-        let mut open = if self.nodes.is_empty() { Vec::new() } else { vec![0] };
-        while let Some(place) = open.pop() {
-            let node = &self.nodes[place];
-            if !meets(node.low, node.high) {
-                continue;
-            }
-            if node.count > 0 {
-                self.faces[node.first..node.first + node.count].iter().for_each(&mut look);
-            } else {
-                open.extend([place + 1, node.first]);
-            }
-        }
+        self.tree.visit(meets, |face| look(&self.faces[face]));
     }
 
     /// The nearest face along a ray up to a distance, and that distance.
@@ -104,7 +79,7 @@ impl Faces {
             a.min(b).max_element().max(0.0) <= a.max(b).min_element().min(found.get())
         };
         self.visit(meets, |face| {
-            if let Some(distance) = face.distance(origin, direction).filter(|distance| *distance < found.get())
+            if let Some(distance) = distance_to(face.corners, origin, direction).filter(|distance| *distance < found.get())
                 && counts(face)
             {
                 found.set(distance);
@@ -136,8 +111,8 @@ impl Faces {
         if length <= 1e-9 * extent {
             return None;
         }
-        let low = samples.iter().fold(DVec3::INFINITY, |low, sample| low.min(sample.position)) - NEAR * length;
-        let high = samples.iter().fold(DVec3::NEG_INFINITY, |high, sample| high.max(sample.position)) + NEAR * length;
+        let (low, high) = bounds_of(samples.iter().map(|sample| sample.position));
+        let (low, high) = (low - NEAR * length, high + NEAR * length);
         let mut is_alone = true;
         let is_own = |face: &Face| {
             let plane = &samples[0];
@@ -184,40 +159,4 @@ impl Faces {
             hit.is_some_and(|(face, _)| face.hides * face.normal.dot(direction) > 0.0)
         })
     }
-}
-
-impl Face {
-    /// Along a ray (Moeller and Trumbore 1997).
-    fn distance(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
-        let [a, b, c] = self.corners;
-        let (u, v) = (b - a, c - a);
-        let p = direction.cross(v);
-        let determinant = u.dot(p);
-        let from = origin - a;
-        let q = from.cross(u);
-        let (s, t) = (from.dot(p) / determinant, direction.dot(q) / determinant);
-        let distance = v.dot(q) / determinant;
-        // Written so that a ray in the triangle's plane misses it.
-        (s >= 0.0 && t >= 0.0 && s + t <= 1.0 && distance > 0.0).then_some(distance)
-    }
-}
-
-/// Puts the node of some faces, and all below it, at the end; `first` is the place of the first one.
-fn build(faces: &mut [Face], first: usize, nodes: &mut Vec<Node>) {
-    let corners = || faces.iter().flat_map(|face| face.corners);
-    let (low, high) = corners().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), corner| (low.min(corner), high.max(corner)));
-    let place = nodes.len();
-    nodes.push(Node { low, high, first, count: faces.len() });
-    if faces.len() <= LEAF {
-        return;
-    }
-    let axis = (high - low).max_position();
-    let middle = faces.len() / 2;
-    let key = |face: &Face| face.corners.iter().map(|corner| corner[axis]).sum::<f64>();
-    faces.select_nth_unstable_by(middle, |a, b| key(a).total_cmp(&key(b)));
-    let (left, right) = faces.split_at_mut(middle);
-    build(left, first, nodes);
-    let second = nodes.len();
-    build(right, first + middle, nodes);
-    (nodes[place].first, nodes[place].count) = (second, 0);
 }

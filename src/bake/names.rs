@@ -53,10 +53,6 @@ impl Names {
     pub fn lightmap(&self, mesh: usize) -> String {
         format!("{}{LIGHTMAP}", self.stem(self.of_meshes[mesh]))
     }
-
-    pub fn texture(&self, texture: usize) -> String {
-        texture_name(texture)
-    }
 }
 
 /// Beginnings of file names, so that with each ending they are unlike all others and those taken, which are lower case.
@@ -79,7 +75,7 @@ pub fn stems<'a>(wanted: impl Iterator<Item = &'a str>, endings: &[&str], mut ta
     wanted.map(&mut unlike).collect()
 }
 
-fn texture_name(texture: usize) -> String {
+pub fn texture_name(texture: usize) -> String {
     format!("texture_{texture}.png")
 }
 

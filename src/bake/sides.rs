@@ -8,7 +8,7 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
-use crate::scene::{Mesh, Scene, connected as connection};
+use crate::scene::{Mesh, Scene, bounds_of, connected as connection};
 use crate::verify::judge::Judge;
 
 /// Points of a connected part that are asked about, and paths from each side of them.
@@ -146,9 +146,7 @@ fn connected(mesh: &Mesh) -> Vec<Vec<usize>> {
 pub fn closed_parts(scene: &Scene, mesh: &Mesh) -> Vec<f64> {
     let mut closed = vec![0.0; mesh.triangles.len()];
     for triangles in connected(mesh) {
-        let corners = || triangles.iter().flat_map(|triangle| mesh.corners(*triangle));
-        let low = corners().fold(DVec3::INFINITY, DVec3::min);
-        let high = corners().fold(DVec3::NEG_INFINITY, DVec3::max);
+        let (low, high) = bounds_of(triangles.iter().flat_map(|triangle| mesh.corners(*triangle)));
         let is_seen_inside = scene.cameras.iter().any(|camera| camera.eye.cmpge(low).all() && camera.eye.cmple(high).all());
         if !is_seen_inside && is_closed(mesh, &triangles) {
             let facing = volume(mesh, &triangles).signum();

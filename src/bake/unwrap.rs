@@ -1,13 +1,13 @@
 //! Lightmap coordinates of an object: a set of its own that is fit for a lightmap, else charts by the crate `uvunwrap`
 //! (conformal maps, split where they distort, packed with padding).
 
-use glam::{DVec2, DVec3, Vec2};
+use glam::{DVec2, Vec2};
 use uvunwrap::{Atlas, Density, MeshInput, Options, Packing};
 
 use super::part::Part;
 use super::raster::Lattice;
 use super::{MAX_SIDE, MIN_SIDE, bleeding};
-use crate::scene::Mesh;
+use crate::scene::{Mesh, bounds_of};
 
 /// The meshes of an object with lightmap coordinates that share one map.
 #[derive(Debug, Clone)]
@@ -140,7 +140,7 @@ fn overlap(parts: &[Part], width: u32, height: u32) -> bool {
 /// New charts.
 fn charts(meshes: &[&Mesh], texels_per_metre: f64, max_side: u32) -> Result<Unwrapped, String> {
     let used = meshes.iter().flat_map(|mesh| mesh.triangles.iter().flatten().map(|vertex| mesh.positions[*vertex as usize]));
-    let (low, high) = used.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), position| (low.min(position), high.max(position)));
+    let (low, high) = bounds_of(used);
     // Around the origin and of size one, so that 32-bit floats hold a mesh of any size anywhere.
     let (centre, extent) = (0.5 * (low + high), (high - low).max_element());
     let positions = |mesh: &&Mesh| -> Vec<[f32; 3]> {

@@ -10,6 +10,7 @@ use super::{JsonOrStdoutArg, complain, optional_file, say_beside};
 use crate::error::{Error, Result, require, within};
 use crate::output::destination::{Destination, check_distinct, check_not_read, write_all};
 use crate::output::exr_file;
+use crate::output::words::lower_case;
 use crate::render::Percent;
 use crate::text::percent;
 use crate::verify::compare::Comparison;
@@ -75,8 +76,8 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
         within("--error-blocks", blocks, 2..=MAX_BLOCKS, "blocks of rounds that a standard error comes from")?;
         require(has_errors, "--error-blocks", blocks, "needs --errors-a, --errors-b or both")?;
     }
-    require(args.show.is_none() || args.output.is_some(), "--show", show.name(), "needs -o FILE, the picture that shows it")?;
-    require(show != Show::Z || has_errors, "--show", show.name(), "needs --errors-a, --errors-b or both")?;
+    require(args.show.is_none() || args.output.is_some(), "--show", lower_case(show), "needs -o FILE, the picture that shows it")?;
+    require(show != Show::Z || has_errors, "--show", lower_case(show), "needs --errors-a, --errors-b or both")?;
     let output = optional_file("-o", args.output.as_ref())?;
     if let Some(path) = &args.output {
         let is_png = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"));

@@ -7,8 +7,6 @@ use std::path::Path;
 use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
 use image::RgbImage;
 use image::codecs::jpeg::JpegEncoder;
 use maud::{Markup, html};
@@ -16,7 +14,7 @@ use serde_json::Value;
 
 use crate::error::{Error, Result};
 use crate::output::destination::{Folder, write_all};
-use crate::output::page::page;
+use crate::output::page::{self, page};
 use crate::output::words::duration;
 use crate::text::percent;
 
@@ -126,10 +124,10 @@ fn page_of(figures: &[Markup], device: &str, complete: bool) -> String {
 }
 
 fn figure([title, caption, command]: [&str; 3], pictures: &[RgbImage], report: &Value) -> Markup {
-    let jpeg = |picture: &RgbImage| {
+    let shown = |picture: &RgbImage| {
         let mut jpeg = Vec::new();
         JpegEncoder::new_with_quality(&mut jpeg, 88).encode_image(picture).expect("a picture in memory can be encoded");
-        STANDARD.encode(&jpeg)
+        page::picture("jpeg", &jpeg, picture.dimensions(), title)
     };
     let rows = report["timings"].as_array().into_iter().flatten();
     let round = rows.into_iter().find(|row| row["name"] == "round");
@@ -138,9 +136,7 @@ fn figure([title, caption, command]: [&str; 3], pictures: &[RgbImage], report: &
     html! {
         figure {
             div.pictures[pictures.len() > 1] {
-                @for picture in pictures {
-                    img src={ "data:image/jpeg;base64," (jpeg(picture)) } width=(picture.width()) height=(picture.height()) alt=(title);
-                }
+                @for picture in pictures { (shown(picture)) }
             }
             figcaption {
                 p { strong { (title) } " " (caption) }

@@ -33,11 +33,7 @@ impl Interval {
 
     /// The mean of independent values, by Student's t; of a single one nothing is known.
     pub fn of_mean(values: &[f64], confidence: f64) -> Interval {
-        let count = values.len() as f64;
-        let mean = values.iter().sum::<f64>() / count;
-        let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0);
-        let half_width = if values.len() < 2 { f64::INFINITY } else { quantile(count - 1.0, confidence) * (variance / count).sqrt() };
-        Interval::around(mean, half_width)
+        Moments::of(values, 2).interval(confidence)
     }
 
     /// The same of values above 0 whose logarithm is more nearly normal than they, as squared errors are: the interval
@@ -50,8 +46,7 @@ impl Interval {
 
     /// The geometric mean of positive values, by Student's t on their logarithms.
     pub fn of_geometric_mean(values: &[f64]) -> Interval {
-        let Moments { mean, variance_of_mean, freedom } = Moments::of_logarithms(values);
-        Interval::around(mean, quantile(freedom, CONFIDENCE) * variance_of_mean.sqrt()).map(f64::exp)
+        Moments::of_logarithms(values).interval(CONFIDENCE).map(f64::exp)
     }
 
     /// The ratio of two geometric means of positive values, by Welch's t on their logarithms: B. L. Welch, The
@@ -61,11 +56,12 @@ impl Interval {
     /// Communications of the ACM 29, 1986.
     pub fn of_ratio(over: &[f64], under: &[f64]) -> Interval {
         let [over, under] = [over, under].map(Moments::of_logarithms);
-        let variance = over.variance_of_mean + under.variance_of_mean;
+        let variance_of_mean = over.variance_of_mean + under.variance_of_mean;
         let share = |part: &Moments| part.variance_of_mean.powi(2) / part.freedom;
         // Runs that are equal to the last digit have no spread.
-        let freedom = if variance > 0.0 { variance.powi(2) / (share(&over) + share(&under)) } else { over.freedom.min(under.freedom) };
-        Interval::around(over.mean - under.mean, quantile(freedom, CONFIDENCE) * variance.sqrt()).map(f64::exp)
+        let is_spread = variance_of_mean > 0.0;
+        let freedom = if is_spread { variance_of_mean.powi(2) / (share(&over) + share(&under)) } else { over.freedom.min(under.freedom) };
+        Moments { mean: over.mean - under.mean, variance_of_mean, freedom }.interval(CONFIDENCE).map(f64::exp)
     }
 
     /// The slope of a line through this many points, by Student's t on its standard error.
@@ -132,7 +128,7 @@ impl Decision {
     }
 }
 
-/// Mean and spread of the logarithms of values.
+/// Mean and spread of values or of their logarithms.
 struct Moments {
     mean: f64,
     variance_of_mean: f64,
@@ -141,13 +137,22 @@ struct Moments {
 }
 
 impl Moments {
-    fn of_logarithms(values: &[f64]) -> Moments {
+    /// Fewer values than `least` have an unbounded spread.
+    fn of(values: &[f64], least: usize) -> Moments {
         let count = values.len() as f64;
-        let mean = values.iter().map(|value| value.ln()).sum::<f64>() / count;
-        let squares = values.iter().map(|value| (value.ln() - mean).powi(2)).sum::<f64>();
+        let mean = values.iter().sum::<f64>() / count;
+        let squares = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
         let freedom = count - 1.0;
-        let variance_of_mean = if values.len() < LEAST_VALUES { f64::INFINITY } else { squares / freedom / count };
+        let variance_of_mean = if values.len() < least { f64::INFINITY } else { squares / freedom / count };
         Moments { mean, variance_of_mean, freedom }
+    }
+
+    fn of_logarithms(values: &[f64]) -> Moments {
+        Moments::of(&values.iter().map(|value| value.ln()).collect::<Vec<_>>(), LEAST_VALUES)
+    }
+
+    fn interval(&self, confidence: f64) -> Interval {
+        Interval::around(self.mean, quantile(self.freedom, confidence) * self.variance_of_mean.sqrt())
     }
 }
 

@@ -24,10 +24,7 @@ pub struct Destination {
 
 /// A folder that will hold files; made when they are written.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Folder {
-    option: &'static str,
-    path: PathBuf,
-}
+pub struct Folder(Destination);
 
 impl Destination {
     /// Fails now if `path` could not be written later. `option` is named in errors.
@@ -113,8 +110,7 @@ impl Destination {
 impl Folder {
     /// Fails now if no file could be written into `path` later.
     pub fn open(option: &'static str, path: &Path) -> Result<Folder> {
-        let folder = Folder { option, path: path.to_owned() };
-        let refuse = |reason: String| Error::Output { option, path: path.to_owned(), reason };
+        let itself = Destination { option, path: path.to_owned() };
         let is_file = |path: &Path| path.exists() && !path.is_dir();
         let faults = [
             (is_file(path), "it is not a folder"),
@@ -123,30 +119,30 @@ impl Folder {
             (path.ancestors().any(is_file), "a part of its path is a file"),
         ];
         if let Some((_, fault)) = faults.iter().find(|(is_so, _)| *is_so) {
-            return Err(refuse((*fault).to_owned()));
+            return Err(itself.refuse(fault));
         }
         let nearest = path.ancestors().find(|ancestor| ancestor.is_dir()).unwrap_or(Path::new("."));
         // A name that is too long is refused only by the folder that is to hold it, which may not be there yet.
         for name in path.iter().filter(|_| !path.exists()) {
-            check_name(&nearest.join(name)).map_err(|error| refuse(refusal(&error)))?;
+            check_name(&nearest.join(name)).map_err(|error| itself.failed(&error))?;
         }
         // Making a folder asks for the same right as making a file.
-        temporary_in(nearest).map_err(|error| refuse(refusal(&error)))?;
-        Ok(folder)
+        temporary_in(nearest).map_err(|error| itself.failed(&error))?;
+        Ok(Folder(itself))
     }
 
     pub fn path(&self) -> &Path {
-        &self.path
+        &self.0.path
     }
 
     /// The folder itself, which no file may be.
     pub fn itself(&self) -> Destination {
-        Destination { option: self.option, path: self.path.clone() }
+        self.0.clone()
     }
 
     /// A file in the folder.
     pub fn file(&self, name: &str) -> Destination {
-        Destination { option: self.option, path: self.path.join(name) }
+        Destination { option: self.0.option, path: self.0.path.join(name) }
     }
 }
 

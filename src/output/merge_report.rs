@@ -1,7 +1,5 @@
 //! What a merge of a run's parts says of itself: text for people, JSON for programs.
 
-use std::fmt::Write;
-
 use serde::Serialize;
 use serde_json::{Map, Value};
 
@@ -49,17 +47,9 @@ pub fn json(run: &SavedRun, film: &SceneFilm, missing: &[String]) -> Vec<u8> {
 
 /// `film` where its errors can be told without the scene.
 pub fn text(run: &SavedRun, files: usize, film: Option<&SceneFilm>) -> String {
-    let mut text = String::new();
-    let blocks = run.done.count();
-    writeln!(
-        text,
-        "{}: {} from {}, of {} that the run was to have",
-        run.identity.scene,
-        counted(blocks, "block"),
-        counted(files as u64, "file"),
-        run.wanted
-    )
-    .unwrap();
+    let SavedRun { identity, wanted, .. } = run;
+    let (blocks, files) = (counted(run.done.count(), "block"), counted(files as u64, "file"));
+    let mut text = format!("{}: {blocks} from {files}, of {wanted} that the run was to have\n", identity.scene);
     for fates in run.fates.iter().filter(|fates| fates.emitted > 0) {
         text.push_str(&ledger(&fates.ledger()));
     }

@@ -1,5 +1,7 @@
 //! Pages as HTML in one file that loads nothing.
 
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::svg::Chart;
@@ -42,6 +44,11 @@ pub fn software_notice(more: &str) -> Markup {
     html! {
         p.notice { strong { "This device is software." } " It runs Vulkan on the CPU, so 'GPU' times on this page are CPU times." (more) }
     }
+}
+
+/// A picture within the page, of a `kind` such as 'png'.
+pub fn picture(kind: &str, file: &[u8], (width, height): (u32, u32), alt: &str) -> Markup {
+    html! { img src={ "data:image/" (kind) ";base64," (STANDARD.encode(file)) } width=(width) height=(height) alt=(alt); }
 }
 
 /// A table that scrolls by itself where the page is narrow.

@@ -162,11 +162,9 @@ pub(super) fn errors(error: &FilmError, lost: f64, (measure, confidence): (Measu
         }
         None if error.rounds == 1 => text.push_str("noise: unknown after a single round\n"),
         None if error.blocks < LEAST_BLOCKS => {
-            writeln!(
-                text,
-                "noise: unknown, as fewer than {LEAST_BLOCKS} blocks of rounds are whole; use more `rounds` or a smaller `block`"
-            )
-            .unwrap();
+            text += &format!(
+                "noise: unknown, as fewer than {LEAST_BLOCKS} blocks of rounds are whole; use more `rounds` or a smaller `block`\n"
+            );
         }
         None => text.push_str("noise: unknown\n"),
     }
@@ -176,19 +174,15 @@ pub(super) fn errors(error: &FilmError, lost: f64, (measure, confidence): (Measu
     if let Intervals { source: ErrorSource { degrees_of_freedom, .. }, standard_errors: Some(reach) } =
         Intervals::of(error.blocks, confidence)
     {
-        writeln!(
-            text,
-            "        each {point}'s standard error has {degrees_of_freedom} degrees of freedom; a {sure} % interval reaches {reach:.2} standard errors to either side"
-        )
-        .unwrap();
+        text += &format!(
+            "        each {point}'s standard error has {degrees_of_freedom} degrees of freedom; a {sure} % interval reaches {reach:.2} standard errors to either side\n"
+        );
     }
     if !error.tail_is_known(confidence) {
         let most = if error.unseen.is_finite() { format!("{:.2} %", percent(error.unseen)) } else { "any share".to_owned() };
-        writeln!(
-            text,
-            "tail of the noise: not known yet. A lamp in mirrors or glass, too rare to have been seen, may add {most} ({sure} % confidence)"
-        )
-        .unwrap();
+        text += &format!(
+            "tail of the noise: not known yet. A lamp in mirrors or glass, too rare to have been seen, may add {most} ({sure} % confidence)\n"
+        );
     }
     if let Some(Bias { relative, lower, upper, from, .. }) = &error.bias {
         let from = match from {
@@ -203,14 +197,10 @@ pub(super) fn errors(error: &FilmError, lost: f64, (measure, confidence): (Measu
             }
         };
         if let Some(from) = from {
-            writeln!(
-                text,
-                "bias of the radius: {:.2} %, from {:.2} % to {:.2} % ({sure} % confidence; from {from} at two radii, which do not show what is much narrower than both)",
-                percent(*relative),
-                percent(*lower),
-                percent(*upper),
-            )
-            .unwrap();
+            let [bias, lower, upper] = [*relative, *lower, *upper].map(percent);
+            text += &format!(
+                "bias of the radius: {bias:.2} %, from {lower:.2} % to {upper:.2} % ({sure} % confidence; from {from} at two radii, which do not show what is much narrower than both)\n"
+            );
         }
     }
     let measured = error.bias.filter(|bias| bias.from != BiasFrom::NoMap);
@@ -272,14 +262,15 @@ pub(super) fn losses(losses: &Losses, bounces: u32) -> String {
 }
 
 /// Why a run ended before its last round, unless the user interrupted it.
-pub(super) fn end_in_words(end: End, stop: &Stop) -> Option<String> {
-    match end {
+pub(super) fn ended(end: End, stop: &Stop, rounds: u32, most: u32) -> String {
+    let why = match end {
         End::Cancelled => None,
         End::Rounds => stop.error.map(|error| format!("before the requested error of {} % was reached", 100.0 * error)),
         End::Error => Some("at the requested error".to_owned()),
         End::Time => Some(format!("after the requested {} s{}", stop.seconds.unwrap_or_default(), unreached(stop))),
         End::Photons => Some(format!("at the requested {}{}", counted(stop.photons.unwrap_or_default(), "photon"), unreached(stop))),
-    }
+    };
+    why.map_or_else(String::new, |why| format!("ended {why}: {} of at most {most}\n", counted(rounds, "round")))
 }
 
 fn unreached(stop: &Stop) -> String {

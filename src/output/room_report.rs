@@ -4,7 +4,8 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
-use super::report::{Common, common, end_in_words, ending, ledger, losses};
+use super::report::{Common, common, ended, ending, ledger, losses};
+use super::words::lower_case;
 use crate::engine::error::bound::FilmError;
 use crate::engine::room::RunResult;
 use crate::engine::room::film::{WallEstimate, irradiance_weights};
@@ -110,29 +111,23 @@ pub fn error(outcome: &RunResult, scene: &RoomScene) -> FilmError {
 
 /// The run in words: device, settings, ledger, errors and timing table.
 pub fn text(outcome: &RunResult, error: &FilmError) -> String {
-    let mut text = String::new();
     let settings = &outcome.plan.settings;
-    let device = outcome.device.as_ref().map_or_else(|| format!("CPU, {}", host_driver(outcome)), DeviceFacts::label);
-    writeln!(text, "{device}").unwrap();
+    let mut text = outcome.device.as_ref().map_or_else(|| format!("CPU, {}", host_driver(outcome)), DeviceFacts::label) + "\n";
     outcome.more_devices.iter().for_each(|facts| writeln!(text, "{}", facts.label()).unwrap());
-    writeln!(
-        text,
-        "open-box, {}: {} of {} photons, {}, radius {} m, {} gather{}, {} sums, {} seed {}",
+    text += &format!(
+        "open-box, {}: {} of {} photons, {}, radius {} m, {} gather{}, {} sums, {} seed {}\n",
         settings.builder.name(),
         counted(outcome.film.rounds.max(1), "round"),
         settings.photons,
         counted(settings.bounces, "bounce"),
         settings.radius,
-        format!("{:?}", settings.gather).to_lowercase(),
+        lower_case(settings.gather),
         settings.nearest.map_or_else(String::new, |nearest| format!(" of the {nearest} nearest")),
-        format!("{:?}", settings.sums).to_lowercase(),
-        format!("{:?}", settings.rng).to_lowercase(),
+        lower_case(settings.sums),
+        lower_case(settings.rng),
         settings.seed
-    )
-    .unwrap();
-    if let Some(why) = end_in_words(outcome.end, &settings.stop) {
-        writeln!(text, "ended {why}: {} of at most {}", counted(outcome.film.rounds, "round"), settings.rounds).unwrap();
-    }
+    );
+    text += &ended(outcome.end, &settings.stop, outcome.film.rounds, settings.rounds);
     for decision in &outcome.plan.decisions {
         let verb = if decision.kept { "with" } else { "without" };
         writeln!(text, "  {verb} {}: {}", decision.effect, decision.reason).unwrap();

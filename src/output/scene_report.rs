@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
-use super::report::{Common, common, end_in_words, ending, goals, ledger, losses, shares, up_to};
+use super::report::{Common, common, ended, ending, goals, ledger, losses, shares, up_to};
 use crate::constants::MAX_BOUNCES;
 use crate::engine::End;
 use crate::engine::scene::RunResult;
@@ -181,19 +181,22 @@ pub fn plan_line(plan: &ScenePlan, scene: &str, unit: f64, point: &str, is_of_fi
         Sensor::Picture { width, height } => format!("{width} x {height} pixels"),
         Sensor::Receivers { count } => counted(count, point),
     };
-    let maps: Vec<String> = plan.maps().map(|map| counted(map.photons, &format!("{} photon", map.name))).collect();
     let radii: Vec<String> = plan.maps().map(|map| format!("{:.4} m ({})", map.radius * unit, map.name)).collect();
-    let (maps, radius) = match maps.is_empty() {
-        true => ("no photons".to_owned(), String::new()),
-        false => (maps.join(" and "), format!("; first radius {}", radii.join(", "))),
-    };
+    let radius = if radii.is_empty() { String::new() } else { format!("; first radius {}", radii.join(", ")) };
     format!(
-        "plan: {scene}, {what}; {} of {maps}{}{radius}; {:.1} MiB on the device{}",
+        "plan: {scene}, {what}; {} of {}{}{radius}; {:.1} MiB on the device{}",
         up_to(&plan.settings.stop, plan.settings.rounds),
+        photons_of(plan),
         if is_of_file { " from the file" } else { "" },
         plan.bytes as f64 / f64::from(1 << 20),
         goals(&plan.settings.stop)
     )
+}
+
+/// How many photons each map has.
+fn photons_of(plan: &ScenePlan) -> String {
+    let maps: Vec<String> = plan.maps().map(|map| counted(map.photons, &format!("{} photon", map.name))).collect();
+    if maps.is_empty() { "no photons".to_owned() } else { maps.join(" and ") }
 }
 
 /// One line on a radius by a trial round that is wider than what many points lie in.
@@ -306,24 +309,19 @@ pub fn text(scene: &str, lit: &RunResult, point: &str, explain: bool) -> String 
     let mut text = String::new();
     let settings = &lit.plan.settings;
     lit.device.iter().chain(&lit.more_devices).for_each(|facts| writeln!(text, "{}", facts.label()).unwrap());
-    let maps: Vec<String> = lit.plan.maps().map(|map| counted(map.photons, &format!("{} photon", map.name))).collect();
-    let maps = if maps.is_empty() { "no photons".to_owned() } else { maps.join(" and ") };
+    let maps = photons_of(&lit.plan);
     let capped = if settings.bounces < MAX_BOUNCES { format!(", at most {}", counted(settings.bounces, "bounce")) } else { String::new() };
     writeln!(text, "{scene}: {} of {maps}{capped}, seed {}", counted(lit.film.rounds, "round"), settings.seed).unwrap();
     if lit.film.rounds == 1 && lit.end == End::Time {
         let traced = lit.ledger().emitted;
         let planned: u64 = lit.plan.maps().map(|map| u64::from(map.photons)).sum();
         if traced < planned {
-            writeln!(
-                text,
-                "time was up in the first round, after {traced} of {planned} photons, so the result is noisy and its error unknown; use fewer `photons`, so that several rounds fit into `time`"
-            )
-            .unwrap();
+            text += &format!(
+                "time was up in the first round, after {traced} of {planned} photons, so the result is noisy and its error unknown; use fewer `photons`, so that several rounds fit into `time`\n"
+            );
         }
     }
-    if let Some(why) = end_in_words(lit.end, &settings.stop) {
-        writeln!(text, "ended {why}: {} of at most {}", counted(lit.film.rounds, "round"), settings.rounds).unwrap();
-    }
+    text += &ended(lit.end, &settings.stop, lit.film.rounds, settings.rounds);
     if explain {
         writeln!(text, "\n{}", plan_table(&lit.plan, Some((&lit.timings, &lit.film.part_totals)))).unwrap();
     }

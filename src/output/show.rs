@@ -8,54 +8,30 @@ use super::metadata::Metadata;
 use crate::constants::PART_COUNT;
 use crate::engine::scene::SceneFilm;
 use crate::scene::{Camera, Scene};
+use crate::settings::named;
 use crate::verify::judge::{FirstSurface, first_surfaces};
 
 const RGB: [&str; 3] = ["R", "G", "B"];
 /// Parts of the light, by their numbers.
 const PARTS: [Layer; PART_COUNT as usize] = [Layer::Direct, Layer::Specular, Layer::Caustic, Layer::Indirect];
 
-/// Of an EXR, beside the light.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Layer {
-    Direct,
-    Specular,
-    Caustic,
-    Indirect,
-    StandardError,
-    /// The most light that was not seen may add.
-    Unseen,
-    Albedo,
-    Normal,
-    Depth,
+named! {
+    /// Of an EXR, beside the light.
+    pub enum Layer {
+        Direct = "direct",
+        Specular = "specular",
+        Caustic = "caustic",
+        Indirect = "indirect",
+        StandardError = "standard_error",
+        /// The most light that was not seen may add.
+        Unseen = "unseen",
+        Albedo = "albedo",
+        Normal = "normal",
+        Depth = "depth",
+    }
 }
 
 impl Layer {
-    pub const ALL: [Layer; 9] = [
-        Layer::Direct,
-        Layer::Specular,
-        Layer::Caustic,
-        Layer::Indirect,
-        Layer::StandardError,
-        Layer::Unseen,
-        Layer::Albedo,
-        Layer::Normal,
-        Layer::Depth,
-    ];
-
-    pub fn name(self) -> &'static str {
-        match self {
-            Layer::Direct => "direct",
-            Layer::Specular => "specular",
-            Layer::Caustic => "caustic",
-            Layer::Indirect => "indirect",
-            Layer::StandardError => "standard_error",
-            Layer::Unseen => "unseen",
-            Layer::Albedo => "albedo",
-            Layer::Normal => "normal",
-            Layer::Depth => "depth",
-        }
-    }
-
     /// A part of the light.
     pub fn is_part(self) -> bool {
         PARTS.contains(&self)

@@ -126,6 +126,8 @@ fn sheen(alpha: f64, cosine: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::common::layered::METALS;
+    use crate::common::plates;
 
     /// (A, B) of GGX as the kernels interpolate them.
     fn looked_up(alpha: f64, cosine: f64) -> DVec2 {
@@ -138,19 +140,8 @@ mod tests {
 
     #[test]
     fn albedos_agree_with_quadrature() {
-        // Of F = 1, by quadrature over the hemisphere and by sampling of visible normals, which agree to four digits.
-        const COSINES: [f64; 5] = [1.0, 0.8, 0.5, 0.2, 0.05];
-        const KNOWN: [(f64, [f64; 5]); 7] = [
-            (0.01, [1.0000, 1.0000, 0.9998, 0.9986, 0.9763]),
-            (0.05, [0.9972, 0.9964, 0.9927, 0.9626, 0.8899]),
-            (0.1, [0.9883, 0.9846, 0.9692, 0.9046, 0.9118]),
-            (0.25, [0.9158, 0.8973, 0.8573, 0.8482, 0.9331]),
-            (0.5, [0.6878, 0.6820, 0.6983, 0.7899, 0.9125]),
-            (0.75, [0.4639, 0.4923, 0.5646, 0.7155, 0.8806]),
-            (1.0, [0.3069, 0.3513, 0.4507, 0.6416, 0.8478]),
-        ];
-        for (alpha, known) in KNOWN {
-            for (cosine, known) in COSINES.into_iter().zip(known) {
+        for (alpha, known) in METALS.into_iter().filter(|(alpha, _)| *alpha > 0.0) {
+            for (cosine, known) in plates::COSINES.into_iter().zip(known) {
                 let (table, direct) = (looked_up(alpha, cosine).element_sum(), ggx(alpha, cosine).element_sum());
                 assert!((direct - known).abs() <= 1e-3 * known, "alpha {alpha}, cosine {cosine}: {direct} instead of {known}");
                 assert!((table - known).abs() <= 1e-3 * known, "alpha {alpha}, cosine {cosine}: {table} in the table, not {known}");
@@ -158,7 +149,7 @@ mod tests {
         }
         let means = |alpha: f64| {
             let row = alpha.sqrt() * (ROUGHNESSES - 1) as f64;
-            let at = |row: usize| TABLE[ROUGHNESSES * super::COSINES + row].as_dvec2().element_sum();
+            let at = |row: usize| TABLE[ROUGHNESSES * COSINES + row].as_dvec2().element_sum();
             at(row as usize) + (at((row as usize + 1).min(ROUGHNESSES - 1)) - at(row as usize)) * row.fract()
         };
         for (alpha, known) in [(0.1, 0.9721), (0.25, 0.8823), (0.5, 0.7002), (1.0, 0.4091)] {

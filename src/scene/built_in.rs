@@ -5,31 +5,36 @@ use glam::{DVec3, Vec3};
 use super::light::{Light, LightKind};
 use super::material::{Material, Surface};
 use super::room::face_axis;
-use super::{Camera, Mesh, Scene, closed_forms, open_box, showcase};
+use super::{Camera, Mesh, Named, Scene, closed_forms, open_box, showcase};
 use crate::settings::{Preset, RoomSettings};
 
+const SCENES: [Named; 5] = [
+    ("open-box", || open_box(Preset::Modified)),
+    ("open-box-phong", || open_box(Preset::Phong)),
+    ("cornell", cornell),
+    ("cornell-spheres", cornell_spheres),
+    ("caustic-sphere", caustic_sphere),
+];
+
 /// Every built-in scene, those of [`closed_forms`] last.
+fn all() -> impl Iterator<Item = Named> {
+    SCENES.into_iter().chain(showcase::SCENES).chain(closed_forms::SCENES)
+}
+
 pub fn names() -> Vec<&'static str> {
-    [&["open-box", "open-box-phong", "cornell", "cornell-spheres", "caustic-sphere"], &showcase::NAMES[..], &closed_forms::NAMES[..]]
-        .concat()
+    all().map(|(name, _)| name).collect()
 }
 
 pub fn by_name(name: &str) -> Option<Scene> {
-    match name {
-        "open-box" => Some(open_box(name, Preset::Modified)),
-        "open-box-phong" => Some(open_box(name, Preset::Phong)),
-        "cornell" => Some(cornell()),
-        "cornell-spheres" => Some(cornell_spheres()),
-        "caustic-sphere" => Some(caustic_sphere()),
-        _ => showcase::by_name(name).or_else(|| closed_forms::by_name(name)),
-    }
+    let (name, make) = all().find(|(known, _)| *known == name)?;
+    Some(Scene { name: name.into(), ..make() })
 }
 
 /// The paper's box, with the lamps and walls of one of its experiments.
-fn open_box(name: &str, preset: Preset) -> Scene {
+fn open_box(preset: Preset) -> Scene {
     let settings = RoomSettings::preset(preset);
     let room = open_box::open_box(&settings);
-    let mut scene = Scene { name: name.into(), ..Scene::default() };
+    let mut scene = Scene::default();
     for (face, wall) in room.walls() {
         let rectangle = room.rectangle(face);
         // u x v looks along the positive axis; the wall faces into the room.
@@ -74,7 +79,6 @@ fn cornell_room() -> Scene {
     let (x, y, z) = (DVec3::X * BOX, DVec3::Y * BOX, DVec3::Z * BOX);
     let lamp = DVec3::new(0.35, 0.999, 0.35) * BOX;
     Scene {
-        name: "cornell".into(),
         meshes: vec![
             Mesh::parallelogram("floor", DVec3::ZERO, z, x, 0),
             Mesh::parallelogram("ceiling", y, x, z, 0),
@@ -116,7 +120,6 @@ fn cornell() -> Scene {
 /// A mirror sphere at the back left, a glass sphere at the front right.
 fn cornell_spheres() -> Scene {
     let mut scene = cornell_room();
-    scene.name = "cornell-spheres".into();
     let smooth = |name: &str, surface: Surface| Material { surface, ..Material::lambert(name, Vec3::ONE) };
     scene.materials.push(smooth("mirror", Surface::Mirror));
     scene.materials.push(smooth("glass", Surface::Dielectric { ior: 1.5 }));
@@ -130,7 +133,6 @@ fn caustic_sphere() -> Scene {
     let lamp = Material { emission: Vec3::splat(300.0), ..Material::lambert("lamp", Vec3::splat(0.5)) };
     let glass = Material { surface: Surface::Dielectric { ior: 1.5 }, ..Material::lambert("glass", Vec3::ONE) };
     Scene {
-        name: "caustic-sphere".into(),
         meshes: vec![
             Mesh::parallelogram("plane", DVec3::new(-1.0, 0.0, -1.0), DVec3::Z * 2.0, DVec3::X * 2.0, 0),
             Mesh::parallelogram("lamp", DVec3::new(-0.45, 1.5, -0.05), DVec3::X * 0.1, DVec3::Z * 0.1, 1),

@@ -6,41 +6,22 @@ use glam::{DVec3, Vec3};
 
 use super::light::{Light, LightKind};
 use super::material::{Material, Surface};
-use super::{Camera, Mesh, Scene};
+use super::{Camera, Mesh, Named, Scene};
 use crate::settings::EmissionLaw;
 
-pub const NAMES: [&str; 8] = [
-    "furnace",
-    "integrating-sphere",
-    "point-over-plane",
-    "disc-over-plane",
-    "sun-over-plane",
-    "sky-over-plane",
-    "mirror-corridor",
-    "glass-slab",
+pub(crate) const SCENES: [Named; 8] = [
+    ("furnace", furnace),
+    ("integrating-sphere", integrating_sphere),
+    ("point-over-plane", || over_plane(LightKind::Point { position: DVec3::Y, intensity: Vec3::ONE })),
+    ("disc-over-plane", || {
+        let (centre, normal, law) = (DVec3::Y, DVec3::NEG_Y, EmissionLaw::Cosine);
+        over_plane(LightKind::Disc { centre, normal, radius: DISC_RADIUS, power: Vec3::ONE, law })
+    }),
+    ("sun-over-plane", || over_plane(LightKind::Directional { direction: DVec3::new(0.0, -0.8, -0.6), irradiance: Vec3::splat(2.0) })),
+    ("sky-over-plane", || over_plane(LightKind::Environment { radiance: Vec3::ONE })),
+    ("mirror-corridor", mirror_corridor),
+    ("glass-slab", glass_slab),
 ];
-
-pub fn by_name(name: &str) -> Option<Scene> {
-    let mut scene = match name {
-        "furnace" => furnace(),
-        "integrating-sphere" => integrating_sphere(),
-        "point-over-plane" => over_plane(LightKind::Point { position: DVec3::Y, intensity: Vec3::splat(1.0) }),
-        "disc-over-plane" => over_plane(LightKind::Disc {
-            centre: DVec3::Y,
-            normal: DVec3::NEG_Y,
-            radius: DISC_RADIUS,
-            power: Vec3::ONE,
-            law: EmissionLaw::Cosine,
-        }),
-        "sun-over-plane" => over_plane(LightKind::Directional { direction: DVec3::new(0.0, -0.8, -0.6), irradiance: Vec3::splat(2.0) }),
-        "sky-over-plane" => over_plane(LightKind::Environment { radiance: Vec3::ONE }),
-        "mirror-corridor" => mirror_corridor(),
-        "glass-slab" => glass_slab(),
-        _ => return None,
-    };
-    scene.name = name.to_owned();
-    Some(scene)
-}
 
 /// Radius of the lamp of `disc-over-plane`, metres.
 pub const DISC_RADIUS: f64 = 0.25;

@@ -180,7 +180,8 @@ impl Material {
     /// does not see the back of a layered surface that has one side).
     pub fn is_lambertian(&self) -> bool {
         let Layers { metallic, specular, transmission, diffuse_transmission, coat, sheen_colour, iridescence, is_unlit, .. } = self.layers;
-        let is_diffuse = [metallic, specular, transmission, diffuse_transmission, coat, iridescence] == [0.0; 6] && sheen_colour == Vec3::ZERO;
+        let is_diffuse =
+            [metallic, specular, transmission, diffuse_transmission, coat, iridescence] == [0.0; 6] && sheen_colour == Vec3::ZERO;
         is_diffuse && !is_unlit && self.two_sided && self.coverage == Coverage::Whole && self.normal_map.is_none()
     }
 

@@ -5,6 +5,8 @@ use std::collections::HashMap;
 use glam::{DVec2, DVec3, DVec4};
 use rayon::prelude::*;
 
+use super::bounds_of;
+
 /// One primitive of one node: vertices, triangles, one material.
 #[derive(Debug, Clone, Default)]
 pub struct Mesh {
@@ -101,11 +103,7 @@ impl Mesh {
     /// Whether the triangles of meshes bound a volume together: as many have an edge in one direction as in the other. Corners at one
     /// place are one corner, also where a sine of a whole turn has put them 1e-16 apart.
     pub fn are_closed<'m>(meshes: impl IntoIterator<Item = &'m Mesh> + Clone) -> bool {
-        let (min, max) = meshes
-            .clone()
-            .into_iter()
-            .flat_map(|mesh| &mesh.positions)
-            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), at| (min.min(*at), max.max(*at)));
+        let (min, max) = bounds_of(meshes.clone().into_iter().flat_map(|mesh| &mesh.positions).copied());
         let cell = (max - min).max_element() * SEAM_SHARE;
         let place = |corner: DVec3| ((corner - min) / cell).to_array().map(|cells| cells.round() as u64);
         let mut surplus: HashMap<_, i64> = HashMap::new();

@@ -2,6 +2,7 @@
 //! built in; and the paper's box, a convex room ([`room::RoomScene`]).
 
 pub mod albedo;
+pub mod box_tree;
 pub mod built_in;
 pub mod bvh;
 pub mod camera;
@@ -65,6 +66,9 @@ pub struct Reading {
     /// Seconds into the first animation, for the pose of its nodes; `None`: the pose at rest.
     pub at: Option<f64>,
 }
+
+/// A built-in scene: its name, and what makes it but for that.
+type Named = (&'static str, fn() -> Scene);
 
 /// Meshes in world space, metres, y up, with what they are made of and what lights them.
 #[derive(Debug, Clone, Default)]
@@ -203,17 +207,8 @@ impl Scene {
 
     /// Metres from a place to the nearest triangle in a unit direction, if there is one.
     pub fn distance_along(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
-        let of_triangle = |[a, b, c]: [DVec3; 3]| {
-            // Moller and Trumbore (1997).
-            let (ab, ac, from) = (b - a, c - a, origin - a);
-            let p = direction.cross(ac);
-            let scale = 1.0 / ab.dot(p);
-            let q = from.cross(ab);
-            let (u, v, t) = (scale * from.dot(p), scale * direction.dot(q), scale * ac.dot(q));
-            (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0).then_some(t)
-        };
-        let of_mesh =
-            |mesh: &Mesh| (0..mesh.triangles.len()).filter_map(|triangle| of_triangle(mesh.corners(triangle))).min_by(f64::total_cmp);
+        let of_triangle = |mesh: &Mesh, triangle| distance_to(mesh.corners(triangle), origin, direction);
+        let of_mesh = |mesh: &Mesh| (0..mesh.triangles.len()).filter_map(|triangle| of_triangle(mesh, triangle)).min_by(f64::total_cmp);
         self.meshes.par_iter().filter_map(of_mesh).min_by(f64::total_cmp)
     }
 
@@ -221,4 +216,19 @@ impl Scene {
     pub fn is_lit(&self) -> bool {
         !self.lights.is_empty() || self.meshes.iter().any(|mesh| self.materials[mesh.material].is_emissive())
     }
+}
+
+/// Along a ray to a triangle, which one in the triangle's plane misses (Moeller and Trumbore 1997).
+pub fn distance_to([a, b, c]: [DVec3; 3], origin: DVec3, direction: DVec3) -> Option<f64> {
+    let (ab, ac, from) = (b - a, c - a, origin - a);
+    let p = direction.cross(ac);
+    let scale = 1.0 / ab.dot(p);
+    let q = from.cross(ab);
+    let (u, v, t) = (scale * from.dot(p), scale * direction.dot(q), scale * ac.dot(q));
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0).then_some(t)
+}
+
+/// Smallest box around points: (lower corner, upper corner).
+pub fn bounds_of(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
+    points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), point| (low.min(point), high.max(point)))
 }

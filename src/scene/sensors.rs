@@ -2,16 +2,13 @@
 //! so such a point gets one of its own, in its plane, which all light passes as if it were not there.
 
 use std::borrow::Cow;
+use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
-use std::time::Duration;
 
-use glam::{DVec3, Vec3, Vec3A};
-use obvhs::BvhBuildParams;
-use obvhs::aabb::Aabb;
-use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::builder::build_bvh2;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::box_tree::BoxTree;
 use super::material::{Coverage, Layers};
 use super::planes::IN_PLANE;
 use super::{LobeKinds, Material, Mesh, Scene};
@@ -57,7 +54,7 @@ fn material() -> Material {
 struct Surfaces {
     /// Corners, unit normal, and whether the back counts.
     triangles: Vec<([DVec3; 3], DVec3, bool)>,
-    tree: Bvh2,
+    tree: BoxTree,
     /// Metres off a triangle at which a point lies on it.
     tolerance: f64,
 }
@@ -70,40 +67,15 @@ impl Surfaces {
         };
         let meshes = scene.meshes.iter().filter(|mesh| kinds[mesh.material].matt);
         let triangles: Vec<_> = meshes.flat_map(of_mesh).filter(|(_, normal, _)| normal.is_finite()).collect();
-        let bounds = |corners: &[DVec3; 3]| {
-            let [a, b, c] = *corners;
-            let (min, max) = (a.min(b).min(c) - tolerance, a.max(b).max(c) + tolerance);
-            Aabb::new(Vec3A::from(min.as_vec3().map(f32::next_down)), Vec3A::from(max.as_vec3().map(f32::next_up)))
-        };
-        let boxes: Vec<Aabb> = triangles.par_iter().map(|(corners, ..)| bounds(corners)).collect();
-        // The builder wants at least one box.
-        let tree = match boxes.len() {
-            0 => Bvh2::default(),
-            _ => build_bvh2(&boxes, BvhBuildParams::fast_build(), &mut Duration::default()),
-        };
-        Surfaces { triangles, tree, tolerance }
+        Surfaces { tree: BoxTree::new(triangles.par_iter().map(|(corners, ..)| *corners), tolerance), triangles, tolerance }
     }
 
     /// Whether a point with this normal lies on one.
     fn hold(&self, position: DVec3, normal: DVec3) -> bool {
-        let mut open = if self.triangles.is_empty() { Vec::new() } else { vec![0] };
-        while let Some(place) = open.pop() {
-            let node = &self.tree.nodes[place];
-            let bounds = node.aabb();
-            if position.cmplt(bounds.min.as_dvec3()).any() || position.cmpgt(bounds.max.as_dvec3()).any() {
-                continue;
-            }
-            let first = node.first_index as usize;
-            if !node.is_leaf() {
-                open.extend([first, first + 1]);
-                continue;
-            }
-            let mut own = self.tree.primitive_indices[first..first + node.prim_count as usize].iter();
-            if own.any(|triangle| self.lies_on(*triangle as usize, position, normal)) {
-                return true;
-            }
-        }
-        false
+        let is_found = Cell::new(false);
+        let meets = |low: DVec3, high: DVec3| !is_found.get() && position.cmpge(low).all() && position.cmple(high).all();
+        self.tree.visit(meets, |triangle| is_found.set(is_found.get() || self.lies_on(triangle, position, normal)));
+        is_found.get()
     }
 
     fn lies_on(&self, triangle: usize, position: DVec3, normal: DVec3) -> bool {

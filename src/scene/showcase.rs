@@ -4,17 +4,9 @@ use glam::{DVec3, Vec3};
 
 use super::light::{Light, LightKind};
 use super::material::{Layers, Material, Medium, Surface};
-use super::{Camera, Mesh, Scene};
+use super::{Camera, Mesh, Named, Scene};
 
-pub const NAMES: [&str; 2] = ["sunlit-room", "prism"];
-
-pub fn by_name(name: &str) -> Option<Scene> {
-    match name {
-        "sunlit-room" => Some(sunlit_room()),
-        "prism" => Some(prism()),
-        _ => None,
-    }
-}
+pub(super) const SCENES: [Named; 2] = [("sunlit-room", sunlit_room), ("prism", prism)];
 
 /// A cuboid between two corners; its faces look outwards.
 fn cuboid(name: &str, low: [f64; 3], high: [f64; 3], material: usize) -> Vec<Mesh> {
@@ -62,7 +54,6 @@ fn sunlit_room() -> Scene {
     let sky = LightKind::Environment { radiance: Vec3::new(36.0, 46.0, 62.0) };
     let (eye, towards) = (DVec3::new(2.1, 1.6, 1.8), DVec3::new(-0.9, 0.45, -1.4));
     Scene {
-        name: "sunlit-room".into(),
         meshes,
         materials,
         lights: [("sun", sun), ("sky", sky)].map(|(name, kind)| Light { name: name.into(), kind }).into(),
@@ -128,7 +119,6 @@ fn prism() -> Scene {
     let spot = LightKind::Spot { position: lamp, direction: beam, intensity: Vec3::splat(60.0), inner_angle: 0.05, outer_angle: 0.06 };
     let room = LightKind::Environment { radiance: Vec3::splat(0.05) };
     Scene {
-        name: "prism".into(),
         meshes,
         materials,
         lights: [("lamp", spot), ("room", room)].map(|(name, kind)| Light { name: name.into(), kind }).into(),

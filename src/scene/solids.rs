@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::connected::{bits, connected};
 use super::layers::Medium;
-use super::{Material, Scene};
+use super::{Material, Scene, bounds_of};
 
 /// Triangles that are connected by their corners' places, of one material.
 struct Shell {
@@ -93,8 +93,7 @@ fn shells_of(scene: &Scene, meshes: &[u32], corners_of: impl Fn(u32, u32) -> [DV
     let all: Vec<((u32, u32), [DVec3; 3])> = triangles.map(|(mesh, triangle)| ((mesh, triangle), corners_of(mesh, triangle))).collect();
     let shell = |group: Vec<usize>| {
         let (triangles, corners): (Vec<(u32, u32)>, Vec<[DVec3; 3]>) = group.into_iter().map(|place| all[place]).unzip();
-        let min = corners.iter().flatten().fold(DVec3::INFINITY, |min, corner| min.min(*corner));
-        let max = corners.iter().flatten().fold(DVec3::NEG_INFINITY, |max, corner| max.max(*corner));
+        let (min, max) = bounds_of(corners.iter().flatten().copied());
         Shell { triangles, corners, min, max }
     };
     connected(all.iter().map(|(_, corners)| corners.map(bits))).into_iter().map(shell).collect()

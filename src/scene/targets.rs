@@ -5,6 +5,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DVec3, Vec3};
 
+use super::bounds_of;
 use super::connected::{bits, connected};
 use super::geometry::Geometry;
 use crate::constants::*;
@@ -51,8 +52,7 @@ fn gathered(mut groups: Vec<Vec<DVec3>>, most: usize, all: &mut Vec<Vec<DVec3>>)
         all.push(groups.concat());
     } else {
         let middle = |group: &Vec<DVec3>| group.iter().sum::<DVec3>() / group.len() as f64;
-        let (low, high) =
-            groups.iter().map(middle).fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), at| (low.min(at), high.max(at)));
+        let (low, high) = bounds_of(groups.iter().map(middle));
         let axis = (high - low).max_position();
         groups.sort_by_cached_key(|group| (middle(group)[axis] * f64::from(1 << 30)) as i64);
         let second = groups.split_off(groups.len() / 2);
@@ -93,7 +93,7 @@ fn merged(groups: Vec<Vec<DVec3>>) -> Vec<Vec<DVec3>> {
 /// A small sphere around points: from the middle of their box the centre goes towards the farthest point, by ever
 /// smaller steps (Badoiu and Clarkson 2003), and the best one is kept.
 fn sphere_around(points: &[DVec3]) -> Sphere {
-    let (low, high) = points.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), at| (low.min(*at), high.max(*at)));
+    let (low, high) = bounds_of(points.iter().copied());
     let mut centre = 0.5 * (low + high);
     let mut best = Sphere { centre, radius: f64::INFINITY };
     for step in 0..SPHERE_STEPS {

@@ -20,6 +20,23 @@ macro_rules! named {
         }
     };
 }
+pub(crate) use named;
+
+/// A struct whose fields stand with their defaults.
+macro_rules! with_defaults {
+    ($(#[$doc:meta])* $seen:vis struct $type:ident { $($(#[$note:meta])* $shown:vis $field:ident: $kind:ty = $usual:expr,)* }) => {
+        $(#[$doc])*
+        $seen struct $type {
+            $($(#[$note])* $shown $field: $kind,)*
+        }
+
+        impl Default for $type {
+            fn default() -> $type {
+                $type { $($field: $usual,)* }
+            }
+        }
+    };
+}
 
 pub mod builder;
 pub mod scene;
@@ -110,52 +127,54 @@ pub enum Preset {
 /// Walls of the open box in the order of their numbers; the sixth face is the opening.
 pub const WALL_NAMES: [&str; 5] = ["left", "right", "floor", "ceiling", "back"];
 
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct RoomSettings {
-    pub builder: Builder,
-    /// Photons emitted in a round, by all lights together.
-    pub photons: u32,
-    pub rounds: u32,
-    /// Most bounces of a photon.
-    pub bounces: u32,
-    /// Radius of the density estimate, metres.
-    pub radius: f64,
-    /// Photons within the radius, a round, that count as full illumination.
-    pub full_light: f64,
-    pub seed: u64,
-    pub rng: Rng,
-    pub gather: Gather,
-    pub sums: Sums,
-    /// Estimate with this many nearest photons of a round within the radius; `None`: with all of them.
-    pub nearest: Option<u32>,
-    pub math: Math,
-    pub emission: EmissionLaw,
-    /// Phong exponent of each wall in the order of [`WALL_NAMES`]; `None` is Lambertian.
-    pub shininess: [Option<f32>; 5],
-    pub phong_direction: PhongDirection,
-    /// Eye of the Phong weight, metres.
-    pub eye: [f32; 3],
-    /// Radius of each disc of light, metres.
-    pub light_radius: f64,
-    /// Power of the floor's and of the left wall's light, watts.
-    pub light_power: [f64; 2],
-    /// Share of photons that each wall reflects.
-    pub reflectance: f32,
-    /// Texels along each side of a wall.
-    pub mesh: u32,
-    /// Divide irradiance by the part of the disc that lies on the wall.
-    pub edge_correction: bool,
-    /// Threads of the CPU builder.
-    pub threads: usize,
-    /// Look for values that are infinite or no number.
-    pub paranoid: bool,
-    pub stop: Stop,
-    /// Invocations of a work group.
-    pub group_size: u32,
-    /// Counters that the atomic builder's work groups take turns at; `None`: as many as serve the device.
-    pub counters: Option<u32>,
-    /// Most photons traced at once; `None`: as many as the device's buffers hold.
-    pub chunk: Option<u32>,
+with_defaults! {
+    #[derive(Debug, Clone, PartialEq, Serialize)]
+    pub struct RoomSettings {
+        pub builder: Builder = Builder::Atomic,
+        /// Photons emitted in a round, by all lights together.
+        pub photons: u32 = PAPER_PHOTONS,
+        pub rounds: u32 = 1,
+        /// Most bounces of a photon.
+        pub bounces: u32 = 15,
+        /// Radius of the density estimate, metres.
+        pub radius: f64 = 0.05,
+        /// Photons within the radius, a round, that count as full illumination.
+        pub full_light: f64 = 90.0,
+        pub seed: u64 = 1,
+        pub rng: Rng = Rng::Rand48,
+        pub gather: Gather = Gather::Grid,
+        pub sums: Sums = Sums::Integer,
+        /// Estimate with this many nearest photons of a round within the radius; `None`: with all of them.
+        pub nearest: Option<u32> = None,
+        pub math: Math = Math::Fast,
+        pub emission: EmissionLaw = EmissionLaw::Uniform,
+        /// Phong exponent of each wall in the order of [`WALL_NAMES`]; `None` is Lambertian.
+        pub shininess: [Option<f32>; 5] = [None; 5],
+        pub phong_direction: PhongDirection = PhongDirection::Mirror,
+        /// Eye of the Phong weight, metres.
+        pub eye: [f32; 3] = [0.0, 0.0, 1.0],
+        /// Radius of each disc of light, metres.
+        pub light_radius: f64 = 0.05,
+        /// Power of the floor's and of the left wall's light, watts.
+        pub light_power: [f64; 2] = [1.0, 1.0],
+        /// Share of photons that each wall reflects.
+        pub reflectance: f32 = 0.75,
+        /// Texels along each side of a wall.
+        pub mesh: u32 = 64,
+        /// Divide irradiance by the part of the disc that lies on the wall.
+        pub edge_correction: bool = true,
+        /// Threads of the CPU builder.
+        pub threads: usize = 1,
+        /// Look for values that are infinite or no number.
+        pub paranoid: bool = false,
+        pub stop: Stop = Stop::default(),
+        /// Invocations of a work group.
+        pub group_size: u32 = 128,
+        /// Counters that the atomic builder's work groups take turns at; `None`: as many as serve the device.
+        pub counters: Option<u32> = None,
+        /// Most photons traced at once; `None`: as many as the device's buffers hold.
+        pub chunk: Option<u32> = None,
+    }
 }
 
 /// Half the edge of the open box, metres.
@@ -164,43 +183,9 @@ pub const HALF_WIDTH: f64 = 0.25;
 /// Photons of the paper's round, to which its `full_light` refers.
 pub const PAPER_PHOTONS: u32 = 5000;
 
-impl Default for RoomSettings {
-    fn default() -> RoomSettings {
-        RoomSettings::preset(Preset::Modified)
-    }
-}
-
 impl RoomSettings {
     pub fn preset(preset: Preset) -> RoomSettings {
-        let modified = RoomSettings {
-            builder: Builder::Atomic,
-            photons: PAPER_PHOTONS,
-            rounds: 1,
-            bounces: 15,
-            radius: 0.05,
-            full_light: 90.0,
-            seed: 1,
-            rng: Rng::Rand48,
-            gather: Gather::Grid,
-            sums: Sums::Integer,
-            nearest: None,
-            math: Math::Fast,
-            emission: EmissionLaw::Uniform,
-            shininess: [None; 5],
-            phong_direction: PhongDirection::Mirror,
-            eye: [0.0, 0.0, 1.0],
-            light_radius: 0.05,
-            light_power: [1.0, 1.0],
-            reflectance: 0.75,
-            mesh: 64,
-            edge_correction: true,
-            threads: 1,
-            paranoid: false,
-            stop: Stop::default(),
-            group_size: 128,
-            counters: None,
-            chunk: None,
-        };
+        let modified = RoomSettings::default();
         match preset {
             Preset::Modified => modified,
             Preset::Naive => RoomSettings { builder: Builder::Naive, bounces: 2, ..modified },

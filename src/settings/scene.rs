@@ -103,104 +103,69 @@ impl Effect {
     }
 }
 
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct SceneSettings {
-    /// Photons of the global map, each pass.
-    pub photons: u32,
-    /// Photons of the caustic map, each pass.
-    pub caustic_photons: u32,
-    /// Independent passes, of which the result is the mean: whole blocks, or less than one.
-    pub rounds: u32,
-    /// Rounds of a block, a power of two, over all of which samples are even; `None`: so many that a pixel has
-    /// [`SAMPLES_PER_BLOCK`] samples in it. What is known of errors comes from the spread of blocks.
-    pub block: Option<u32>,
-    /// Bounces after which a photon is cut off; by default roulette ends it long before, which is null in JSON.
-    #[serde(serialize_with = "cap")]
-    pub bounces: u32,
-    pub seed: u64,
-    /// Photons of a round that the first radius of the global map is to hold at the median point, where a trial finds it.
-    pub neighbours: u32,
-    /// The same of the caustic map.
-    pub caustic_neighbours: u32,
-    /// Radius of the first pass's density estimate, metres; `None`: by a trial round
-    /// (`engine::scene::trial`), or by the scene's area and the photons where none is made.
-    pub radius: Option<f64>,
-    /// The same of the caustic map.
-    pub caustic_radius: Option<f64>,
-    /// How fast the radius shrinks, r_(i+1)^2 = r_i^2 (i + alpha) / (i + 1) (Knaus and Zwicker 2011);
-    /// 1 keeps it.
-    pub alpha: f64,
-    pub kernel: Kernel,
-    pub edge_correction: bool,
-    /// Paths from the camera through each pixel, each pass, a power of two; of a picture.
-    pub samples: u32,
-    /// Tiles of a picture that have more; `None`: none.
-    pub tiles: Option<TileSamples>,
-    /// Shadow rays from each visible point, each pass.
-    pub shadow_rays: u32,
-    /// Indirect light by a ray to the next surface instead of the map where the camera looks.
-    pub final_gather: bool,
-    /// Photons of the caustic map leave their lights only towards mirrors and glass (projection maps, Jensen 1996).
-    pub aim: bool,
-    pub illumination: Illumination,
-    pub part: Part,
-    /// Keep the parts of each pixel's light apart beside the whole: of a picture of all parts.
-    pub keeps_parts: bool,
-    pub filter: Filter,
-    /// `None`: persistent; ballot where lanes do not vote right in loops, and with strict arithmetic, which needs so many registers
-    /// that few photons would be under way.
-    pub builder: Option<Builder>,
-    pub math: Math,
-    /// Look for values that are infinite or no number.
-    pub paranoid: bool,
-    pub stop: Stop,
-    pub group_size: u32,
-    /// Most photons traced at once; `None`: as many as the device's buffers hold.
-    pub chunk: Option<u32>,
-    /// Effects forced on, and effects left out, whatever the scene holds.
-    pub with: Vec<Effect>,
-    pub without: Vec<Effect>,
+with_defaults! {
+    #[derive(Debug, Clone, PartialEq, Serialize)]
+    pub struct SceneSettings {
+        /// Photons of the global map, each pass.
+        pub photons: u32 = 1 << 17,
+        /// Photons of the caustic map, each pass.
+        pub caustic_photons: u32 = 1 << 17,
+        /// Independent passes, of which the result is the mean: whole blocks, or less than one.
+        pub rounds: u32 = LEAST_BLOCKS * SAMPLES_PER_BLOCK,
+        /// Rounds of a block, a power of two, over all of which samples are even; `None`: so many that a pixel has
+        /// [`SAMPLES_PER_BLOCK`] samples in it. What is known of errors comes from the spread of blocks.
+        pub block: Option<u32> = None,
+        /// Bounces after which a photon is cut off; by default roulette ends it long before, which is null in JSON.
+        #[serde(serialize_with = "cap")]
+        pub bounces: u32 = MAX_BOUNCES,
+        pub seed: u64 = 1,
+        /// Photons of a round that the first radius of the global map is to hold at the median point, where a trial finds it.
+        pub neighbours: u32 = NEIGHBOURS,
+        /// The same of the caustic map.
+        pub caustic_neighbours: u32 = CAUSTIC_NEIGHBOURS,
+        /// Radius of the first pass's density estimate, metres; `None`: by a trial round
+        /// (`engine::scene::trial`), or by the scene's area and the photons where none is made.
+        pub radius: Option<f64> = None,
+        /// The same of the caustic map.
+        pub caustic_radius: Option<f64> = None,
+        /// How fast the radius shrinks, r_(i+1)^2 = r_i^2 (i + alpha) / (i + 1) (Knaus and Zwicker 2011);
+        /// 1 keeps it.
+        pub alpha: f64 = 2.0 / 3.0,
+        pub kernel: Kernel = Kernel::Box,
+        pub edge_correction: bool = true,
+        /// Paths from the camera through each pixel, each pass, a power of two; of a picture.
+        pub samples: u32 = 1,
+        /// Tiles of a picture that have more; `None`: none.
+        pub tiles: Option<TileSamples> = None,
+        /// Shadow rays from each visible point, each pass.
+        pub shadow_rays: u32 = 4,
+        /// Indirect light by a ray to the next surface instead of the map where the camera looks.
+        pub final_gather: bool = false,
+        /// Photons of the caustic map leave their lights only towards mirrors and glass (projection maps, Jensen 1996).
+        pub aim: bool = true,
+        pub illumination: Illumination = Illumination::Split,
+        pub part: Part = Part::All,
+        /// Keep the parts of each pixel's light apart beside the whole: of a picture of all parts.
+        pub keeps_parts: bool = false,
+        pub filter: Filter = Filter::Box,
+        /// `None`: persistent; ballot where lanes do not vote right in loops, and with strict arithmetic, which needs so many registers
+        /// that few photons would be under way.
+        pub builder: Option<Builder> = None,
+        pub math: Math = Math::Fast,
+        /// Look for values that are infinite or no number.
+        pub paranoid: bool = false,
+        pub stop: Stop = Stop::default(),
+        pub group_size: u32 = 128,
+        /// Most photons traced at once; `None`: as many as the device's buffers hold.
+        pub chunk: Option<u32> = None,
+        /// Effects forced on, and effects left out, whatever the scene holds.
+        pub with: Vec<Effect> = Vec::new(),
+        pub without: Vec<Effect> = Vec::new(),
+    }
 }
 
 fn cap<S: serde::Serializer>(bounces: &u32, serializer: S) -> std::result::Result<S::Ok, S::Error> {
     Some(*bounces).filter(|bounces| *bounces < MAX_BOUNCES).serialize(serializer)
-}
-
-impl Default for SceneSettings {
-    fn default() -> SceneSettings {
-        SceneSettings {
-            photons: 1 << 17,
-            caustic_photons: 1 << 17,
-            rounds: LEAST_BLOCKS * SAMPLES_PER_BLOCK,
-            block: None,
-            bounces: MAX_BOUNCES,
-            seed: 1,
-            neighbours: NEIGHBOURS,
-            caustic_neighbours: CAUSTIC_NEIGHBOURS,
-            radius: None,
-            caustic_radius: None,
-            alpha: 2.0 / 3.0,
-            kernel: Kernel::Box,
-            edge_correction: true,
-            samples: 1,
-            tiles: None,
-            shadow_rays: 4,
-            final_gather: false,
-            aim: true,
-            illumination: Illumination::Split,
-            part: Part::All,
-            keeps_parts: false,
-            filter: Filter::Box,
-            builder: None,
-            math: Math::Fast,
-            paranoid: false,
-            stop: Stop::default(),
-            group_size: 128,
-            chunk: None,
-            with: Vec::new(),
-            without: Vec::new(),
-        }
-    }
 }
 
 pub const MAX_ROUNDS: u32 = 1 << 20;

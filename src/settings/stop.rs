@@ -24,26 +24,22 @@ pub const LEAST_BLOCKS: u32 = 8;
 /// Levels of confidence with which errors may be stated.
 pub const CONFIDENCES: std::ops::RangeInclusive<f64> = 0.5..=0.9999;
 
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Stop {
-    /// Relative error that is good enough.
-    pub error: Option<f64>,
-    /// What it is of.
-    pub measure: Measure,
-    /// Chance that the error is no larger than stated.
-    pub confidence: f64,
-    /// Wall time.
-    pub seconds: Option<f64>,
-    /// Photons of all rounds and maps.
-    pub photons: Option<u64>,
-    /// Relative error that the first round's radius brings with it, at most; it counts in `error`, and shrinks as the
-    /// mean square of the radius does. `None`: noise alone counts.
-    pub bias: Option<f64>,
-}
-
-impl Default for Stop {
-    fn default() -> Stop {
-        Stop { error: None, measure: Measure::Rmse, confidence: 0.95, seconds: None, photons: None, bias: None }
+with_defaults! {
+    #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+    pub struct Stop {
+        /// Relative error that is good enough.
+        pub error: Option<f64> = None,
+        /// What it is of.
+        pub measure: Measure = Measure::Rmse,
+        /// Chance that the error is no larger than stated.
+        pub confidence: f64 = 0.95,
+        /// Wall time.
+        pub seconds: Option<f64> = None,
+        /// Photons of all rounds and maps.
+        pub photons: Option<u64> = None,
+        /// Relative error that the first round's radius brings with it, at most; it counts in `error`, and shrinks as the
+        /// mean square of the radius does. `None`: noise alone counts.
+        pub bias: Option<f64> = None,
     }
 }
 

@@ -31,11 +31,6 @@ pub struct MovingCamera {
 const LEAST_ANGLE: f64 = 0.02;
 
 impl MovingCamera {
-    /// Around what lies so many metres along the view.
-    pub fn new(camera: Camera, pivot: f64) -> MovingCamera {
-        MovingCamera { camera, pivot }
-    }
-
     /// Whether anything has changed.
     pub fn apply(&mut self, motion: &Motion) -> bool {
         if *motion == Motion::default() {
@@ -84,7 +79,8 @@ mod tests {
     use super::*;
 
     fn camera() -> MovingCamera {
-        MovingCamera::new(Camera::looking_at("c", DVec3::new(1.0, 2.0, 5.0), DVec3::new(0.0, 1.0, 0.0), DVec3::Y, 0.7), 3.0)
+        let camera = Camera::looking_at("c", DVec3::new(1.0, 2.0, 5.0), DVec3::new(0.0, 1.0, 0.0), DVec3::Y, 0.7);
+        MovingCamera { camera, pivot: 3.0 }
     }
 
     fn target(moving: &MovingCamera) -> DVec3 {

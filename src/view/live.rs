@@ -19,6 +19,16 @@ pub enum Live<'a> {
     Room(Box<LiveRoom<'a>>),
 }
 
+/// The same of either.
+macro_rules! either {
+    ($run:expr, $live:ident => $value:expr) => {
+        match $run {
+            Live::Scene($live) => $value,
+            Live::Room($live) => $value,
+        }
+    };
+}
+
 /// Rounds per second, over the last ones.
 #[derive(Default)]
 pub struct Rate {
@@ -43,10 +53,7 @@ impl Rate {
 impl Status {
     /// Takes what the latest round has left.
     pub fn take(&mut self, live: &mut Live) {
-        self.ledger = match live {
-            Live::Scene(live) => live.run.state.ledger(),
-            Live::Room(live) => live.run.state.ledger(),
-        };
+        self.ledger = either!(live, live => live.run.state.ledger());
         if let Live::Scene(live) = live {
             (self.kept_rounds, self.kept_bytes) = live.kept();
         }
@@ -82,32 +89,20 @@ pub struct Look {
 impl<'a> Live<'a> {
     /// One more round; whether there are more.
     pub fn round(&mut self) -> Result<bool> {
-        match self {
-            Live::Scene(live) => live.round()?,
-            Live::Room(live) => live.round()?,
-        }
+        either!(self, live => live.round())?;
         Ok(!self.has_ended())
     }
 
     pub fn has_ended(&self) -> bool {
-        match self {
-            Live::Scene(live) => live.run.has_ended(),
-            Live::Room(live) => live.run.has_ended(),
-        }
+        either!(self, live => live.run.has_ended())
     }
 
     pub fn rounds(&self) -> u32 {
-        match self {
-            Live::Scene(live) => live.run.state.rounds(),
-            Live::Room(live) => live.run.state.rounds(),
-        }
+        either!(self, live => live.run.state.rounds())
     }
 
     pub fn take_timings(&mut self) -> Timings {
-        match self {
-            Live::Scene(live) => std::mem::take(live.run.recorder.timings()),
-            Live::Room(live) => std::mem::take(live.run.recorder.timings()),
-        }
+        either!(self, live => std::mem::take(live.run.recorder.timings()))
     }
 
     /// The room's light is on its walls, whoever looks.
@@ -119,10 +114,7 @@ impl<'a> Live<'a> {
     }
 
     pub fn commands(&mut self) -> &mut Commands<'a> {
-        match self {
-            Live::Scene(live) => &mut live.run.recorder,
-            Live::Room(live) => &mut live.run.recorder,
-        }
+        either!(self, live => &mut live.run.recorder)
     }
 
     pub fn look(&mut self) -> Result<Look> {

@@ -73,14 +73,14 @@ impl<'a> Session<'a> {
                 let scene = &scene.scene;
                 let (min, max) = scene.bounds();
                 let ahead = scene.distance_along(camera.eye, camera.forward).filter(|distance| distance.is_finite());
-                MovingCamera::new(camera.clone(), ahead.unwrap_or(0.5 * (max - min).length()).max(1e-9))
+                MovingCamera { camera: camera.clone(), pivot: ahead.unwrap_or(0.5 * (max - min).length()).max(1e-9) }
             }
             Subject::Box => {
                 let room = open_box(&request.request.room_settings());
                 let middle = 0.5 * (room.min_corner + room.max_corner);
                 let half = 0.5 * (room.max_corner - room.min_corner).max_element();
                 let eye = middle + half * DVec3::new(0.7, 0.5, 3.2);
-                MovingCamera::new(Camera::looking_at("box", eye, middle, DVec3::Y, 0.8), eye.distance(middle))
+                MovingCamera { camera: Camera::looking_at("box", eye, middle, DVec3::Y, 0.8), pivot: eye.distance(middle) }
             }
         };
         let status = Status { title, device: gpu.facts().label(), is_box: matches!(request.subject, Subject::Box), ..Status::default() };

@@ -11,7 +11,7 @@ use photonmill::engine::film::{KeptBlock, LatestBlocks};
 use photonmill::engine::room;
 use photonmill::engine::run::blocks::Share;
 use photonmill::engine::run::saved::{SavedFilm, SavedRun};
-use photonmill::engine::run::watch::{Keep, SaveRun};
+use photonmill::engine::run::watch::Keep;
 use photonmill::engine::scene::{self, RunResult};
 use photonmill::error::Result;
 use photonmill::ledger::BounceFates;

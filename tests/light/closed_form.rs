@@ -9,7 +9,7 @@ use crate::common::family::{FALSE_ALARM, normal_p_value};
 use crate::common::known::kept;
 use crate::common::lit::sides;
 use crate::common::prelude::*;
-use photonmill::scene::closed_forms::NAMES;
+use photonmill::scene::closed_forms::SCENES;
 use photonmill::verify::selfcheck::{self, Estimate, Finding};
 
 /// What is found of one closed form, by its name.
@@ -63,7 +63,7 @@ fn the_cpu_builder_is_checked_without_a_device() {
 #[test]
 fn every_scene_of_a_closed_form_has_a_case() {
     let source = include_str!("../../src/verify/selfcheck/closed_forms.rs");
-    NAMES.iter().for_each(|name| assert!(source.contains(&format!("\"{name}\"")), "{name}"));
+    SCENES.iter().for_each(|(name, _)| assert!(source.contains(&format!("\"{name}\"")), "{name}"));
 }
 
 /// The judges, judged: families that complain about what is off and what is no number.

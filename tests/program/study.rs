@@ -155,7 +155,7 @@ fn study_the_open_box(end: &str) -> Option<(Study, String)> {
     }
     for part in first.parts.iter().filter(|part| !part.comparisons.is_empty()) {
         assert!(part.reference.contains("radiosity") && part.reference_error < 0.01, "{} {}", part.reference, part.reference_error);
-        assert!(part.curves().all(|curve| !curve.points.is_empty()), "{}", part.quantity);
+        assert!(part.curves().all(|(_, curve)| !curve.points.is_empty()), "{}", part.quantity);
         for (curve, point) in part.points() {
             let what = format!("{}: {}", part.quantity, curve.label);
             assert!(point.error().value > 1e-4, "{what}: no error by chance");

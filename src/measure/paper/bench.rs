@@ -14,14 +14,6 @@ use crate::text::counted;
 
 /// What the times were measured on.
 #[derive(Debug, Clone)]
-pub struct Machine {
-    /// `None` without Vulkan.
-    pub device: Option<Device>,
-    /// The host's processor.
-    pub cpu: String,
-}
-
-#[derive(Debug, Clone)]
 pub struct Device {
     pub name: String,
     pub driver: String,
@@ -57,14 +49,13 @@ impl<'a> Bench<'a> {
         if self.has_gpu() { builder } else { Builder::Cpu }
     }
 
-    pub fn machine(&self) -> Machine {
-        let device = self.gpu.map(Gpu::facts).map(|facts| Device {
+    pub fn device(&self) -> Option<Device> {
+        self.gpu.map(Gpu::facts).map(|facts| Device {
             name: facts.name.clone(),
             driver: facts.driver.clone(),
             has_timestamps: facts.timestamp_bits > 0,
             is_cpu: facts.kind == "cpu",
-        });
-        Machine { device, cpu: processor() }
+        })
     }
 
     /// Sets how many experiments there will be.
@@ -112,7 +103,7 @@ impl<'a> Bench<'a> {
 }
 
 /// The host's processor, as Linux calls it; elsewhere its architecture.
-fn processor() -> String {
+pub fn processor() -> String {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let listed = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = listed.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": ").map(|(_, name)| name.trim().to_owned()));

@@ -14,7 +14,7 @@ pub mod verdicts;
 
 use crate::error::{Error, Result};
 use crate::output::destination::{Folder, write_all};
-use bench::{Bench, Machine};
+use bench::{Bench, Device};
 use experiments::{LeftOut, RunningTime, TotalTime};
 use figures::{Figure, Panel};
 
@@ -33,7 +33,10 @@ pub struct Request {
 
 /// Everything that was found.
 pub struct Reproduction {
-    pub machine: Machine,
+    /// `None` without Vulkan.
+    pub device: Option<Device>,
+    /// The host's processor.
+    pub cpu: String,
     pub request: Request,
     pub figures: Vec<Figure>,
     pub running_times: Vec<RunningTime>,
@@ -48,7 +51,8 @@ pub struct Reproduction {
 /// Runs every experiment; one that is ended from outside leaves what was finished before it.
 pub fn reproduce(bench: &mut Bench, request: Request) -> Result<Reproduction> {
     let mut found = Reproduction {
-        machine: bench.machine(),
+        device: bench.device(),
+        cpu: bench::processor(),
         request,
         figures: Vec::new(),
         running_times: Vec::new(),

@@ -1,6 +1,6 @@
 //! A reproduction with made-up times, for the tests of what is said of it.
 
-use super::bench::{Device, Machine};
+use super::bench::Device;
 use super::experiments::{Implementation, LeftOut, Pass, RunningTime, TotalTime, command, row_of_table_1};
 use super::figures::{Figure, Panel};
 use super::{Reproduction, Request, published};
@@ -11,10 +11,8 @@ const LARGE: u32 = 65_536;
 
 pub fn reproduction() -> Reproduction {
     Reproduction {
-        machine: Machine {
-            device: Some(Device { name: "a device".to_owned(), driver: "its driver".to_owned(), has_timestamps: true, is_cpu: true }),
-            cpu: "a processor".to_owned(),
-        },
+        device: Some(Device { name: "a device".to_owned(), driver: "its driver".to_owned(), has_timestamps: true, is_cpu: true }),
+        cpu: "a processor".to_owned(),
         request: Request { large: LARGE, repeats: 7, threads: 1, longest_ms: 90e3 },
         figures: vec![Figure {
             number: 1,

@@ -29,8 +29,8 @@ pub fn main(study: &Study, part: &Part) -> Option<Chart> {
     if let Some(default) = part.default.as_ref().filter(|default| !default.points.is_empty()) {
         curves.push((default, "default settings, pilot included".to_owned(), 1));
     }
-    if let Some((axis, best)) = part.best_choice() {
-        curves.push((best, format!("best single change: {}", super::findings::named(axis, &best.label)), 2));
+    if let Some(best) = part.best_choice() {
+        curves.push((best.curve, format!("best single change: {}", best.name()), 2));
     }
     let mut series: Vec<Series> =
         curves.into_iter().map(|(curve, label, colour)| with_band(&above(curve, part.least_error), label, colour)).collect();
@@ -42,13 +42,7 @@ pub fn main(study: &Study, part: &Part) -> Option<Chart> {
 
 /// Times that the paper printed, with the errors that its numbers of rounds have on this device, over the curve of its own settings.
 fn of_the_paper(base: &Curve) -> Vec<(f64, f64)> {
-    let error = |rounds: u32| {
-        // As the power law between two numbers of rounds.
-        let pair = base.points.windows(2).find(|pair| pair[0].rounds <= rounds && rounds <= pair[1].rounds)?;
-        let [from, to] = [&pair[0], &pair[1]];
-        let share = (f64::from(rounds) / f64::from(from.rounds)).ln() / (f64::from(to.rounds) / f64::from(from.rounds)).ln();
-        Some(from.error().value * (to.error().value / from.error().value).powf(share))
-    };
+    let error = |rounds: u32| base.value_at(f64::from(rounds), |point| f64::from(point.rounds), |point| point.error().value);
     published::TABLE_1.into_iter().filter_map(|(rounds, ms)| Some((ms, error(rounds)?))).collect()
 }
 

@@ -31,12 +31,13 @@ impl Part {
         Some(bases.fold(first, |best, next| if further(best, next) { next } else { best }))
     }
 
-    pub fn curves(&self) -> impl Iterator<Item = &Curve> {
-        self.default.iter().chain(self.comparisons.iter().flat_map(|comparison| &comparison.curves))
+    pub fn curves(&self) -> impl Iterator<Item = (Axis, &Curve)> {
+        let of_default = self.default.iter().map(|curve| (Axis::Default, curve));
+        of_default.chain(self.comparisons.iter().flat_map(|comparison| comparison.curves.iter().map(|curve| (comparison.axis, curve))))
     }
 
     pub fn points(&self) -> impl Iterator<Item = (&Curve, &Point)> {
-        self.curves().flat_map(|curve| curve.points.iter().map(move |point| (curve, point)))
+        self.curves().flat_map(|(_, curve)| curve.points.iter().map(move |point| (curve, point)))
     }
 
     /// Points that no other beats in both error and time, the fastest first.
@@ -69,20 +70,16 @@ impl Part {
     }
 
     /// The choice that saves most time for the same error, by as much as is certain.
-    pub fn best_choice(&self) -> Option<(Axis, &Curve)> {
-        let choices = self.choices();
-        let faster = choices.iter().filter_map(|choice| Some((choice.effect.certain_gain()?, choice)));
-        let best = faster.min_by(|one, other| one.0.total_cmp(&other.0))?.1;
-        let (axis, label) = (best.axis, best.curve.label.as_str());
-        let comparison = self.comparisons.iter().find(|comparison| comparison.axis == axis)?;
-        comparison.curves.iter().find(|curve| curve.label == label).map(|curve| (axis, curve))
+    pub fn best_choice(&self) -> Option<Choice<'_>> {
+        let faster = self.choices().into_iter().filter_map(|choice| Some((choice.effect.certain_gain()?, choice)));
+        faster.min_by(|one, other| one.0.total_cmp(&other.0)).map(|(_, choice)| choice)
     }
 
     /// A sentence for each choice that was left out.
     pub fn not_measured(&self) -> Vec<String> {
-        let all = self.comparisons.iter().flat_map(|comparison| comparison.curves.iter().map(move |curve| (comparison.axis, curve)));
-        all.filter_map(|(axis, curve)| Some(format!("{} was not measured: {}.", named(axis, &curve.label), curve.left_out.as_ref()?)))
-            .collect()
+        let sentence =
+            |(axis, curve): (_, &Curve)| Some(format!("{} was not measured: {}.", named(axis, &curve.label), curve.left_out.as_ref()?));
+        self.curves().filter_map(sentence).collect()
     }
 
     /// Sentences made of this part's numbers, the most asked for first.
@@ -201,28 +198,21 @@ impl Choice<'_> {
 
     fn sentence(&self) -> String {
         let name = self.name();
-        match self.effect {
+        let (error, longer) = match self.effect {
             Effect::Apart([own, base]) => {
                 let reach = |(error, ms): (f64, f64)| format!("{} after {}", percent(error), duration(ms));
-                format!("{name} reaches {}, the base {}; the two ranges of error do not overlap.", reach(own), reach(base))
+                return format!("{name} reaches {}, the base {}; the two ranges of error do not overlap.", reach(own), reach(base));
             }
-            Effect::Differs(error, longer) if longer.value > 1.0 => {
-                let (at, interval) = (percent(error), between(longer, ratio));
-                format!("{name} takes {} as long as the base to reach {at} ({interval}).", ratio(longer.value))
+            Effect::SinglePoint => return name,
+            Effect::Differs(error, longer) | Effect::Undecided(error, longer) => (percent(error), longer),
+        };
+        let faster = Interval { value: 1.0 / longer.value, low: 1.0 / longer.high, high: 1.0 / longer.low };
+        match self.effect {
+            Effect::Undecided(..) => format!("{name} takes {} as long to reach {error} ({})", ratio(longer.value), between(longer, ratio)),
+            _ if longer.value > 1.0 => {
+                format!("{name} takes {} as long as the base to reach {error} ({}).", ratio(longer.value), between(longer, ratio))
             }
-            Effect::Differs(error, longer) => {
-                let faster = Interval { value: 1.0 / longer.value, low: 1.0 / longer.high, high: 1.0 / longer.low };
-                format!(
-                    "{name} is {} as fast as the base in reaching {} ({}).",
-                    ratio(faster.value),
-                    percent(error),
-                    between(faster, ratio)
-                )
-            }
-            Effect::Undecided(error, longer) => {
-                format!("{name} takes {} as long to reach {} ({})", ratio(longer.value), percent(error), between(longer, ratio))
-            }
-            Effect::SinglePoint => name,
+            _ => format!("{name} is {} as fast as the base in reaching {error} ({}).", ratio(faster.value), between(faster, ratio)),
         }
     }
 }
@@ -314,11 +304,7 @@ fn then_and_now(base: &Curve) -> Vec<String> {
         number(1000.0 * rate),
         number(rate * then)
     )];
-    let ms = base.points.windows(2).find(|pair| pair[0].photons <= photons && photons <= pair[1].photons).map(|pair| {
-        let share = (photons as f64 / pair[0].photons as f64).ln() / (pair[1].photons as f64 / pair[0].photons as f64).ln();
-        pair[0].ms().value * (pair[1].ms().value / pair[0].ms().value).powf(share)
-    });
-    if let Some(ms) = ms {
+    if let Some(ms) = base.value_at(photons as f64, |point| point.photons as f64, |point| point.ms().value) {
         let error = base.error_after(ms).map_or_else(String::new, |error| format!(", with an error of {}", percent(error.value)));
         sentences.push(format!("Here {} photons take {}, {} as fast as in 2008{error}.", count(photons), duration(ms), ratio(then / ms)));
     }
@@ -371,7 +357,7 @@ fn beyond(curve: &Curve, error: f64) -> String {
 
 /// Errors after the longest time that nine in ten of all curves were measured at.
 pub fn equal_time(part: &Part) -> Option<(f64, Vec<Row>)> {
-    let mut longest: Vec<f64> = part.curves().filter(|curve| curve.points.len() > 1).map(Curve::longest).collect();
+    let mut longest: Vec<f64> = part.curves().map(|(_, curve)| curve).filter(|curve| curve.points.len() > 1).map(Curve::longest).collect();
     longest.sort_by(f64::total_cmp);
     let ms = longest.get(longest.len() / 10)?.min(part.base()?.longest());
     Some((ms, rows(part, |curve| curve.error_after(ms).ok_or_else(|| measured_to(curve, ms)))))
@@ -380,7 +366,7 @@ pub fn equal_time(part: &Part) -> Option<(f64, Vec<Row>)> {
 /// Times to the smallest error that half of all curves reach.
 pub fn equal_error(part: &Part) -> Option<(f64, Vec<Row>)> {
     let base = part.base()?;
-    let reach = |error: f64| part.curves().filter(|curve| curve.time_to(error).is_some()).count();
+    let reach = |error: f64| part.curves().filter(|(_, curve)| curve.time_to(error).is_some()).count();
     let most = part.curves().count();
     let error = steps(part.least_error).find(|error| base.time_to(*error).is_some() && 2 * reach(*error) >= most)?;
     Some((error, rows(part, |curve| curve.time_to(error).ok_or_else(|| beyond(curve, error)))))
@@ -424,9 +410,7 @@ pub fn csv(study: &Study) -> Vec<u8> {
     let seed = study.request.seed;
     let mut rows = Vec::new();
     for part in &study.parts {
-        let of_default = part.default.iter().map(|curve| (Axis::Default, curve));
-        let of_axes = part.comparisons.iter().flat_map(|comparison| comparison.curves.iter().map(|curve| (comparison.axis, curve)));
-        for (axis, curve) in of_default.chain(of_axes) {
+        for (axis, curve) in part.curves() {
             rows.extend(curve.points.iter().map(|point| Row { part, axis, curve, point, seed }));
         }
     }

@@ -1,14 +1,12 @@
 //! The page: pictures, three sentences, a chart and a table in one file that loads nothing; the rest folds away.
 
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, PreEscaped, html};
 
 use super::findings::{Choice, Effect, between, ratio};
 use super::strip::{Frame, Strip};
 use super::{Part, Study, chart as charts, details, summary};
 use crate::measure::interval::Interval;
-use crate::output::page::{chart, page, software_notice, table};
+use crate::output::page::{chart, page, picture, software_notice, table};
 use crate::output::words::duration;
 use crate::text::{counted, percent};
 
@@ -68,8 +66,8 @@ fn pictures(strip: &Strip, least: f64) -> Markup {
 fn frame(frame: &Frame, least: f64) -> Markup {
     html! {
         div {
-            (image(&frame.picture, frame.size, &format!("The picture at an error of {}", known_error(frame.error, least))))
-            (image(&frame.difference, frame.size, "Its difference from the reference in false colours"))
+            (picture("png", &frame.picture, frame.size, &format!("The picture at an error of {}", known_error(frame.error, least))))
+            (picture("png", &frame.difference, frame.size, "Its difference from the reference in false colours"))
             strong { (asked(frame)) } " in " strong { (duration(frame.ms)) }
             div.soft { "true error " (known_error(frame.error, least)) ", " (counted(frame.rounds as usize, "round")) }
         }
@@ -84,10 +82,6 @@ fn known_error(error: f64, least: f64) -> String {
 /// A round number.
 fn asked(frame: &Frame) -> String {
     format!("{}\u{a0}%", 100.0 * frame.asked)
-}
-
-fn image(png: &[u8], (width, height): (u32, u32), alt: &str) -> Markup {
-    html! { img src={ "data:image/png;base64," (STANDARD.encode(png)) } width=(width) height=(height) alt=(alt); }
 }
 
 /// Any two pictures, one over the other up to a line that can be moved.
@@ -107,7 +101,7 @@ fn slider(strip: &Strip) -> Markup {
                 img id="above" alt="The picture chosen on the left";
             }
             input id="line" type="range" min="0" max="100" value="50" aria-label="Where the left picture ends";
-            div hidden id="reference" { (image(&strip.reference, strip.frames[0].size, "The reference")) }
+            div hidden id="reference" { (picture("png", &strip.reference, strip.frames[0].size, "The reference")) }
             script { (PreEscaped(SLIDER)) }
         }
     }

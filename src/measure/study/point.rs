@@ -186,16 +186,17 @@ impl Curve {
 
     /// Relative error after a time, where that lies between two points.
     pub fn error_after(&self, ms: f64) -> Option<Interval> {
+        let at = |error: fn(Interval) -> f64| self.value_at(ms, |point| point.ms().value, |point| error(point.error()));
+        Some(Interval { value: at(|error| error.value)?, low: at(|error| error.low)?, high: at(|error| error.high)? })
+    }
+
+    /// What follows from a power law between two points: their `y` where their `x` has this value.
+    pub fn value_at(&self, value: f64, x: impl Fn(&Point) -> f64, y: impl Fn(&Point) -> f64) -> Option<f64> {
         self.points.windows(2).find_map(|pair| {
-            let (t0, t1) = (pair[0].ms().value, pair[1].ms().value);
-            let share = (ms / t0).ln() / (t1 / t0).ln();
-            let between = |from: f64, to: f64| if from > 0.0 && to > 0.0 { from * (to / from).powf(share) } else { 0.0 };
-            let (e0, e1) = (pair[0].error(), pair[1].error());
-            (t0 <= ms && ms <= t1 && t1 > t0).then(|| Interval {
-                value: between(e0.value, e1.value),
-                low: between(e0.low, e1.low),
-                high: between(e0.high, e1.high),
-            })
+            let ([x0, x1], [y0, y1]) = ([&pair[0], &pair[1]].map(&x), [&pair[0], &pair[1]].map(&y));
+            let share = (value / x0).ln() / (x1 / x0).ln();
+            let found = if y0 > 0.0 && y1 > 0.0 { y0 * (y1 / y0).powf(share) } else { 0.0 };
+            (x0 <= value && value <= x1 && x1 > x0).then_some(found)
         })
     }
 

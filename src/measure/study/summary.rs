@@ -1,6 +1,6 @@
 //! Three sentences for whoever has a minute: what an error costs, what to change first, and what not to trust.
 
-use super::findings::{Effect, between, common_error, named, ratio};
+use super::findings::{Effect, between, common_error, ratio};
 use super::point::Curve;
 use super::{Part, Study};
 use crate::measure::interval::CONFIDENCE;
@@ -24,86 +24,57 @@ fn cost(study: &Study, part: &Part) -> String {
     points.retain(|point| point.1 >= part.least_error);
     points.dedup_by(|next, before| next.1 >= before.1);
     let reach = |&(ms, error): &(f64, f64)| format!("an error of {} takes {}", percent(error), duration(ms));
-    let told: Vec<String> = match points.as_slice() {
-        [] => {
-            return format!(
-                "On {device}, {how}, every error measured is below {}, the least that can be judged here.",
-                percent(part.least_error)
-            );
-        }
-        [first, .., last] => vec![reach(first), reach(last)],
-        [only] => vec![reach(only)],
-    };
-    let halving = match points.as_slice() {
-        [first, .., last] if last.1 < 0.8 * first.1 => {
+    let told = match points.as_slice() {
+        [] => format!("every error measured is below {}, the least that can be judged here.", percent(part.least_error)),
+        [only] => format!("{}.", reach(only)),
+        [first, .., last] => {
             let power = (last.0 / first.0).ln() / (first.1 / last.1).ln();
-            format!(" Half the error takes about {} the time.", times(2f64.powf(power)))
+            let halving = format!(" Half the error takes about {} the time.", times(2f64.powf(power)));
+            format!("{}, and {}.{}", reach(first), reach(last), if last.1 < 0.8 * first.1 { &halving } else { "" })
         }
-        _ => String::new(),
     };
-    format!("On {device}, {how}, {}.{halving}", told.join(", and "))
+    format!("On {device}, {how}, {told}")
 }
 
 fn first_change(part: &Part) -> String {
     let best = part.best_choice();
     if let Some(default) = part.default.as_ref().filter(|default| default.points.len() > 1) {
         // At the smallest error that both reach.
-        let against = best.map_or_else(
-            || part.base().map(|base| ("the base settings".to_owned(), base)),
-            |(axis, curve)| Some((named(axis, &curve.label), curve)),
-        );
+        let against = best
+            .map_or_else(|| part.base().map(|base| ("the base settings".to_owned(), base)), |choice| Some((choice.name(), choice.curve)));
         let compared = against.and_then(|(name, curve)| {
             let error = common_error(default, curve, part.least_error)?;
-            Some((name, error, curve.times_longer(default, error, CONFIDENCE)?))
+            Some((name, percent(error), curve.times_longer(default, error, CONFIDENCE)?))
         });
-        return match compared {
-            Some((name, error, longer)) if longer.low > 1.0 => format!(
-                "Leave the settings alone: to {} the best single change that was tried ({name}) takes {} as long as the defaults ({}).",
-                percent(error),
-                ratio(longer.value),
-                between(longer, ratio)
-            ),
-            Some((name, error, longer)) if longer.high < 1.0 => format!(
-                "Change this first: {name}. It reaches {} in {} of the defaults' time ({}).",
-                percent(error),
-                ratio(longer.value),
-                between(longer, ratio)
-            ),
-            Some((name, error, longer)) => format!(
-                "To {} the defaults and the best single change that was tried ({name}, {} of their time, {}) could not be told apart.",
-                percent(error),
-                ratio(longer.value),
-                between(longer, ratio)
-            ),
-            None => "The defaults and the other choices reached no error in common within this budget, so this study cannot tell which is faster."
-                .to_owned(),
+        let Some((name, error, longer)) = compared else {
+            return "The defaults and the other choices reached no error in common within this budget, so this study cannot tell which is faster."
+                .to_owned();
+        };
+        let (share, interval) = (ratio(longer.value), between(longer, ratio));
+        return if longer.low > 1.0 {
+            format!(
+                "Leave the settings alone: to {error} the best single change that was tried ({name}) takes {share} as long as the defaults ({interval})."
+            )
+        } else if longer.high < 1.0 {
+            format!("Change this first: {name}. It reaches {error} in {share} of the defaults' time ({interval}).")
+        } else {
+            format!(
+                "To {error} the defaults and the best single change that was tried ({name}, {share} of their time, {interval}) could not be told apart."
+            )
         };
     }
-    match best {
-        Some((axis, curve)) => {
-            let choices = part.choices();
-            let of = choices.iter().find(|choice| choice.axis == axis && choice.curve.label == curve.label);
-            match of.map(|choice| choice.effect) {
-                Some(Effect::Differs(error, longer)) => format!(
-                    "Change this first: {}. It reaches {} in {} of the time ({}).",
-                    named(axis, &curve.label),
-                    percent(error),
-                    ratio(longer.value),
-                    between(longer, ratio)
-                ),
-                Some(Effect::Apart([own, base])) => format!(
-                    "Change this first: {}. It reaches {} in {}, where the base has {} after {}.",
-                    named(axis, &curve.label),
-                    percent(own.0),
-                    duration(own.1),
-                    percent(base.0),
-                    duration(base.1)
-                ),
-                _ => String::new(),
-            }
+    let Some(choice) = best else { return "No single change that was tried is significantly faster than the base settings.".to_owned() };
+    let reached = match choice.effect {
+        Effect::Differs(error, longer) => {
+            format!("{} in {} of the time ({})", percent(error), ratio(longer.value), between(longer, ratio))
         }
-        None => "No single change that was tried is significantly faster than the base settings.".to_owned(),
-    }
+        Effect::Apart([(own, own_ms), (base, base_ms)]) => {
+            let [own, base] = [own, base].map(percent);
+            format!("{own} in {}, where the base has {base} after {}", duration(own_ms), duration(base_ms))
+        }
+        Effect::Undecided(..) | Effect::SinglePoint => return String::new(),
+    };
+    format!("Change this first: {}. It reaches {reached}.", choice.name())
 }
 
 fn doubts(part: &Part) -> String {

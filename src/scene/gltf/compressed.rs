@@ -2,7 +2,7 @@
 //! (EXT_meshopt_compression and its later name, KHR_meshopt_compression), primitives by Draco (KHR_draco_mesh_compression).
 
 use std::borrow::Cow;
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
 use meshoptimizer_rs::codec::{
@@ -15,7 +15,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::malformed::REMEDY;
-use super::members::{entries, index, items};
+use super::members::{INDICES, accessors, index, items};
 use super::writer::Writer;
 use super::{draco, named, one_line, uri};
 use crate::error::{Error, Result};
@@ -186,7 +186,11 @@ impl<'a> Packed<'a> {
         let found = self.packed_primitives()?;
         let decoded = self.decoded_streams(&found)?;
         // They stay as they are.
-        let mut taken = plain_accessors(&self.to.json);
+        let is_plain = |primitive: &Value, name: &str| {
+            let compressed = primitive["extensions"].get(DRACO);
+            compressed.is_none_or(|compressed| name != INDICES && compressed["attributes"].get(name).is_none())
+        };
+        let mut taken = accessors(&self.to.json, items(&self.to.json["nodes"]), is_plain);
         let mut indices_of: HashMap<Stream, usize> = HashMap::new();
         let mut accessor_of: HashMap<(Stream, u64), usize> = HashMap::new();
         for Primitive { mesh, number, what, stream } in &found {
@@ -195,7 +199,7 @@ impl<'a> Packed<'a> {
                 Some(known) => *known,
                 None => {
                     let accessor = json!({"componentType": 5125, "count": indices.len(), "type": "SCALAR"});
-                    let old = index(&self.to.json["meshes"][mesh]["primitives"][number]["indices"]).filter(|old| taken.insert(*old));
+                    let old = index(&self.to.json["meshes"][mesh]["primitives"][number][INDICES]).filter(|old| taken.insert(*old));
                     let added = self.set_accessor(old, accessor, None, (bytemuck::cast_slice(indices), what))?;
                     *indices_of.entry(*stream).or_insert(added)
                 }
@@ -317,25 +321,6 @@ impl<'a> Packed<'a> {
 
 fn too_large() -> String {
     format!("unpacks to more than the {MAX_BYTES} bytes that all together may have")
-}
-
-/// Numbers of accessors that something uses which Draco has not compressed.
-fn plain_accessors(json: &Value) -> HashSet<usize> {
-    let mut found = HashSet::new();
-    for primitive in items(&json["meshes"]).flat_map(|mesh| items(&mesh["primitives"])) {
-        let compressed = primitive["extensions"].get(DRACO);
-        found.extend(index(&primitive["indices"]).filter(|_| compressed.is_none()));
-        let is_plain = |name: &String| compressed.is_none_or(|compressed| compressed["attributes"].get(name).is_none());
-        found.extend(entries(&primitive["attributes"]).filter(|(name, _)| is_plain(name)).filter_map(|(_, accessor)| index(accessor)));
-        found.extend(items(&primitive["targets"]).flat_map(entries).filter_map(|(_, accessor)| index(accessor)));
-    }
-    for sampler in items(&json["animations"]).flat_map(|animation| items(&animation["samplers"])) {
-        found.extend(["input", "output"].iter().filter_map(|member| index(&sampler[member])));
-    }
-    found.extend(items(&json["skins"]).filter_map(|skin| index(&skin["inverseBindMatrices"])));
-    let of_instances = items(&json["nodes"]).flat_map(|node| entries(&node["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]));
-    found.extend(of_instances.filter_map(|(_, accessor)| index(accessor)));
-    found
 }
 
 fn drop_extensions(object: &mut Value, names: &[&str]) {

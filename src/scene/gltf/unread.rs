@@ -10,7 +10,7 @@ use serde::de::IntoDeserializer;
 use serde::de::value::Error as Fault;
 use serde_json::{Value, json};
 
-use super::members::{entries, index, items, items_mut};
+use super::members::{accessors, entries, index, items, items_mut};
 use super::{LeftOut, VISIBILITY, called, image_light, is_read, named};
 use crate::scene::layers::PARAMETERS;
 use crate::text::echo;
@@ -83,7 +83,7 @@ pub(super) fn take_out(root: &mut Value, is_posed: bool, left_out: &mut LeftOut)
         }
     }
     allow_missing_members(root);
-    let accessors = accessors(root, &nodes);
+    let accessors = accessors(root, nodes.iter().map(|node| &root["nodes"][*node]), |_, _| true);
     for (_, unused) in items_mut(root, "accessors").filter(|(place, _)| !accessors.contains(place)) {
         *unused = json!({"componentType": 5121, "count": 1, "type": "SCALAR"});
     }
@@ -156,25 +156,6 @@ fn nodes_of_scene(root: &Value) -> BTreeSet<usize> {
         if root["nodes"][node]["extensions"][VISIBILITY]["visible"] != false && found.insert(node) {
             next.extend(items(&root["nodes"][node]["children"]).filter_map(index));
         }
-    }
-    found
-}
-
-/// Numbers of all that the scene reads.
-fn accessors(root: &Value, nodes: &BTreeSet<usize>) -> BTreeSet<usize> {
-    let members = |object: &Value| -> Vec<usize> { entries(object).filter_map(|(_, of)| index(of)).collect() };
-    let mut found = BTreeSet::new();
-    for primitive in items(&root["meshes"]).flat_map(|mesh| items(&mesh["primitives"])) {
-        found.extend(members(&primitive["attributes"]));
-        found.extend(index(&primitive["indices"]));
-        found.extend(items(&primitive["targets"]).flat_map(members));
-    }
-    for node in nodes.iter().map(|node| &root["nodes"][*node]) {
-        found.extend(members(&node["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]));
-        found.extend(index(&node["skin"]).and_then(|skin| index(&root["skins"][skin]["inverseBindMatrices"])));
-    }
-    for sampler in items(&root["animations"]).flat_map(|animation| items(&animation["samplers"])) {
-        found.extend(["input", "output"].iter().filter_map(|member| index(&sampler[member])));
     }
     found
 }

@@ -23,14 +23,6 @@ const MOST_Z: f64 = 5.0;
 const NONE: [u8; 3] = [128; 3];
 
 impl Show {
-    pub fn name(self) -> &'static str {
-        match self {
-            Show::Difference => "difference",
-            Show::Z => "z",
-            Show::Flip => "flip",
-        }
-    }
-
     /// What the first and the last colour mean.
     pub fn scale(self) -> String {
         match self {

@@ -7,23 +7,25 @@
 use flip_rs::{DEFAULT_PPD, RgbImage, ldr_flip};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use serde::Serialize;
 
 use super::pair::Pair;
 use super::picture::Values;
 use crate::output::colour::{luminance, srgb_code};
 
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Flip {
     /// Over the pixels that are compared.
     pub mean: f64,
+    /// Of the display that the eye is thought to see: 0.7 m from one that has 3840 pixels in 0.7 m.
+    pub pixels_per_degree: f32,
     /// Stops at which linear pictures were shown; none of display values.
     pub exposures: Vec<f64>,
     /// By pixel; 0 where pixels are not compared.
+    #[serde(skip)]
     pub map: Vec<f32>,
 }
 
-/// Of the display that the eye is thought to see: 0.7 m from one that has 3840 pixels in 0.7 m.
-pub const PIXELS_PER_DEGREE: f32 = DEFAULT_PPD;
 /// Rows that are computed as one.
 const BAND: usize = 64;
 /// How far the filters of this display reach, pixels: three standard deviations of the widest.
@@ -67,7 +69,7 @@ impl Flip {
         let compared = map.iter().zip(&pair.is_compared).filter(|(_, is_compared)| **is_compared);
         let count = pair.is_compared.len() - pair.left_out.pixels;
         let mean = compared.map(|(value, _)| f64::from(*value)).sum::<f64>() / count as f64;
-        Some(Flip { mean, exposures, map })
+        Some(Flip { mean, pixels_per_degree: DEFAULT_PPD, exposures, map })
     }
 }
 
@@ -75,7 +77,7 @@ impl Flip {
 fn flip(both: [&[[u8; 3]]; 2], width: usize, height: usize) -> Vec<f32> {
     let [reference, test] =
         both.map(|codes| RgbImage::new(width, height, codes.as_flattened().to_vec()).expect("there is a code for each pixel"));
-    ldr_flip(&reference, &test, PIXELS_PER_DEGREE).expect("pictures of one size are compared").into_pixels()
+    ldr_flip(&reference, &test, DEFAULT_PPD).expect("pictures of one size are compared").into_pixels()
 }
 
 /// What a display shows of a pixel; stops are those of linear values.

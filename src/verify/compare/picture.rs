@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use glam::Vec3;
 use image::codecs::png::PngDecoder;
 use image::{DynamicImage, ImageDecoder, Limits};
+use serde::Serialize;
 
 use crate::scene::file;
 use crate::scene::linear_picture::{self, LinearPicture, MAX_TEXELS};
@@ -13,21 +14,13 @@ use crate::scene::linear_picture::{self, LinearPicture, MAX_TEXELS};
 const PNG_MAGIC: &[u8] = b"\x89PNG";
 
 /// What the numbers of a picture mean.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Values {
     /// Radiance, or what else is proportional to light: .exr, .hdr.
     Linear,
     /// sRGB codes as a display takes them, from 0 to 1: .png.
     Display,
-}
-
-impl Values {
-    pub fn name(self) -> &'static str {
-        match self {
-            Values::Linear => "linear",
-            Values::Display => "display",
-        }
-    }
 }
 
 /// Row by row from the top.

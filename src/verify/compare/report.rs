@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::Comparison;
 use super::deviation::{Deviation, Largest};
-use super::flip::{Flip, PIXELS_PER_DEGREE};
+use super::flip::Flip;
 use super::pair::LeftOut;
 use super::picture::{Picture, Values};
 use super::z_scores::ZScores;
@@ -19,20 +19,13 @@ struct Report<'a> {
     b: &'a Path,
     width: u32,
     height: u32,
-    values: &'static str,
+    values: Values,
     left_out: LeftOut,
     #[serde(flatten)]
     deviation: &'a Deviation,
-    flip: Option<FlipEntry<'a>>,
+    flip: Option<&'a Flip>,
     z: Option<&'a ZScores>,
     warnings: Vec<String>,
-}
-
-#[derive(Serialize)]
-struct FlipEntry<'a> {
-    mean: f64,
-    pixels_per_degree: f32,
-    exposures: &'a [f64],
 }
 
 impl Comparison<'_> {
@@ -43,14 +36,10 @@ impl Comparison<'_> {
             b: &b.path,
             width: a.width,
             height: a.height,
-            values: a.values.name(),
+            values: a.values,
             left_out: self.pair.left_out,
             deviation: &self.deviation,
-            flip: self.flip.as_ref().map(|Flip { mean, exposures, .. }| FlipEntry {
-                mean: *mean,
-                pixels_per_degree: PIXELS_PER_DEGREE,
-                exposures,
-            }),
+            flip: self.flip.as_ref(),
             z: self.z.as_ref(),
             warnings: self.warnings(),
         };

@@ -228,24 +228,19 @@ impl Lobes {
         let beyond = self.inputs.colour_beyond() * leaves_diffuse;
         let under_coat = self.coat_leaves;
         let under = under_coat * self.sheen_leaves;
+        let [diffuse, beyond, reflection] = [diffuse, beyond, reflection].map(DVec3::max_element);
+        let is_clear = dielectric * transmission * base_colour.max_element() > 0.0;
+        // Albedos, and whether the lobes are there.
         let albedos = [
-            (Kind::Diffuse, diffuse.max_element() * self.sheen_leaves),
-            (Kind::Reflection, reflection.max_element() * under),
-            (Kind::Transmission, transmitted.max_element() * under),
-            (Kind::Coat, self.inputs.coat_albedo(self.frame.coat_n.dot(self.frame.wo))),
-            (Kind::Sheen, self.inputs.sheen_albedo(n_v) * under_coat),
-            (Kind::DiffuseTransmission, beyond.max_element() * self.sheen_leaves),
+            (Kind::Diffuse, diffuse * self.sheen_leaves, diffuse > 0.0),
+            (Kind::Reflection, reflection * under, reflection > 0.0),
+            (Kind::Transmission, transmitted.max_element() * under, is_clear),
+            (Kind::Coat, self.inputs.coat_albedo(self.frame.coat_n.dot(self.frame.wo)), self.inputs.coat > 0.0),
+            (Kind::Sheen, self.inputs.sheen_albedo(n_v) * under_coat, self.inputs.sheen_colour.max_element() > 0.0),
+            (Kind::DiffuseTransmission, beyond * self.sheen_leaves, beyond > 0.0),
         ];
-        let largest = albedos.iter().fold(0.0f64, |largest, (_, albedo)| largest.max(*albedo));
-        let raised = albedos.map(|(kind, albedo)| {
-            let is_there = match kind {
-                Kind::Diffuse => diffuse.max_element() > 0.0,
-                Kind::DiffuseTransmission => beyond.max_element() > 0.0,
-                Kind::Reflection => reflection.max_element() > 0.0,
-                Kind::Transmission => dielectric * transmission * base_colour.max_element() > 0.0,
-                Kind::Coat => self.inputs.coat > 0.0,
-                Kind::Sheen => self.inputs.sheen_colour.max_element() > 0.0,
-            };
+        let largest = albedos.iter().fold(0.0f64, |largest, (_, albedo, _)| largest.max(*albedo));
+        let raised = albedos.map(|(kind, albedo, is_there)| {
             // What deltas scatter is known exactly.
             (kind, if is_there && !self.is_delta(kind) { albedo.max(LEAST_CHANCE * largest) } else { albedo })
         });
@@ -425,13 +420,9 @@ impl Lobes {
         let d_v = |facets: Facets| facets.distribution(h) * facets.visibility(wo, wi);
         let under = || self.under_coat(wi) * self.under_sheen(wi);
         match kind {
-            Kind::Diffuse => {
+            Kind::Diffuse | Kind::DiffuseTransmission => {
                 let share = self.diffuse * self.reaches_diffuse(n_l, self.frame.coat_n.dot(wi).abs()) * self.under_sheen(wi);
-                FRAC_1_PI * share * self.inputs.diffuse_colour()
-            }
-            Kind::DiffuseTransmission => {
-                let share = self.diffuse * self.reaches_diffuse(n_l, self.frame.coat_n.dot(wi).abs()) * self.under_sheen(wi);
-                FRAC_1_PI * share * self.inputs.colour_beyond()
+                FRAC_1_PI * share * if kind.is_beyond() { self.inputs.colour_beyond() } else { self.inputs.diffuse_colour() }
             }
             Kind::Reflection => d_v(self.base()) * under() * self.reflectance(v_h),
             Kind::Transmission => {

@@ -9,7 +9,8 @@ use super::measure::{irradiance, mean_radiance, radiance};
 use super::{Case, Estimate};
 use crate::error::Result;
 use crate::gpu::Gpu;
-use crate::scene::closed_forms::{DISC_RADIUS, WALL_ALBEDO, by_name};
+use crate::scene::built_in;
+use crate::scene::closed_forms::{DISC_RADIUS, WALL_ALBEDO};
 use crate::scene::light::LightKind;
 use crate::scene::{Camera, Scene};
 use crate::settings::scene::{Illumination, SceneSettings};
@@ -26,7 +27,7 @@ const WAYS: [(Illumination, Builder); 4] = [
 ];
 
 fn scene(name: &str) -> Scene {
-    by_name(name).unwrap_or_else(|| panic!("there is no scene {name}"))
+    built_in::by_name(name).unwrap_or_else(|| panic!("there is no scene {name}"))
 }
 
 /// A fixed radius, so that the bias, where there is one, is known.

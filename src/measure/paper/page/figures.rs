@@ -1,12 +1,11 @@
 //! Figures: labelled panels, what the paper's figure shows, and whether the same is seen here.
 
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, html};
 
 use super::summary::badge;
 use crate::measure::paper::figures::{Figure, letter};
 use crate::measure::paper::{Reproduction, verdicts};
+use crate::output::page::picture;
 
 pub fn figures(found: &Reproduction) -> Markup {
     html! {
@@ -30,7 +29,7 @@ fn figure(found: &Reproduction, figure: &Figure) -> Markup {
             @for (place, panel) in figure.panels.iter().enumerate() {
                 @let label = format!("({}) {}", letter(place), panel.label);
                 figure {
-                    img src={ "data:image/png;base64," (STANDARD.encode(&panel.png)) } width=(panel.side) height=(panel.side) alt={ "The open box, figure " (figure.number) " " (label) };
+                    (picture("png", &panel.png, (panel.side as u32, panel.side as u32), &format!("The open box, figure {} {label}", figure.number)))
                     figcaption { (label) }
                 }
             }

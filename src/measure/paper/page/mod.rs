@@ -37,12 +37,12 @@ fn head(found: &Reproduction) -> Markup {
                 dt { "2008" }
                 dd { (published::HARDWARE) }
                 dt { "Here" }
-                @match &found.machine.device {
+                @match &found.device {
                     Some(device) => dd { (device.name) "; driver " (device.driver) },
                     None => dd { "no Vulkan device" },
                 }
                 dt { "CPU here" }
-                dd { (found.machine.cpu) }
+                dd { (found.cpu) }
                 dt { "Sizes" }
                 dd { (count(u64::from(published::PHOTONS))) " photons per round and 2 bounces as in the paper; other sizes have " (count(u64::from(found.request.large))) " photons per round, 15 bounces, or both" }
             }
@@ -53,7 +53,7 @@ fn head(found: &Reproduction) -> Markup {
 
 fn device_notice(found: &Reproduction) -> Markup {
     html! {
-        @match &found.machine.device {
+        @match &found.device {
             None => p.notice { "No Vulkan device was found. Figures and times come from the CPU builder only." },
             Some(device) => {
                 @if device.is_cpu {
@@ -93,7 +93,7 @@ mod tests {
     #[test]
     fn the_page_has_everything_and_loads_nothing() {
         let mut found = sample::reproduction();
-        found.machine.device.as_mut().unwrap().name = "<b>&\"device".to_owned();
+        found.device.as_mut().unwrap().name = "<b>&\"device".to_owned();
         let page = html(&found);
         for address in ["http", "@import", "url(", "<link", "<script"] {
             assert!(!page.contains(address), "{address} in the page");
@@ -124,7 +124,7 @@ mod tests {
         let page = html(&found);
         assert!(page.contains("Incomplete") && page.contains("Too few experiments were completed to say."));
         assert!(!page.contains("Beyond the paper") && !page.contains("<svg"), "nothing is said or drawn of what was not measured");
-        found.machine.device = None;
+        found.device = None;
         assert!(html(&found).contains("No Vulkan device was found"));
     }
 }

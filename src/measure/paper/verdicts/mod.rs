@@ -4,6 +4,7 @@ mod light;
 mod times;
 
 use super::Reproduction;
+use super::experiments::Pass;
 use crate::measure::interval::{Decision, Interval};
 use crate::output::words::number;
 
@@ -144,8 +145,8 @@ pub fn all(found: &Reproduction) -> Vec<Verdict> {
     let verdicts = [
         times::append(found),
         times::packed(found),
-        times::map_on_gpu(found),
-        times::rendering_on_gpu(found),
+        times::on_gpu(found, Pass::Map),
+        times::on_gpu(found, times::BRUTE),
         times::linear(found),
         times::empty_slots(found),
         times::memory(found),

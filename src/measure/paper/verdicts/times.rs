@@ -11,7 +11,7 @@ use crate::settings::{Builder, Gather};
 
 /// Exponents of time against photons within this of 1 count as linear.
 const LINEAR_WITHIN: f64 = 0.1;
-const BRUTE: Pass = Pass::Rendering(Gather::Brute);
+pub(super) const BRUTE: Pass = Pass::Rendering(Gather::Brute);
 
 /// The time of one builder over another's, and where both were measured.
 struct Ratio {
@@ -104,17 +104,9 @@ pub(super) fn packed(found: &Reproduction) -> Option<Verdict> {
     )
 }
 
-pub(super) fn map_on_gpu(found: &Reproduction) -> Option<Verdict> {
-    on_gpu(found, Pass::Map)
-}
-
-pub(super) fn rendering_on_gpu(found: &Reproduction) -> Option<Verdict> {
-    on_gpu(found, BRUTE)
-}
-
 /// A pass of the CPU, relative to both of the paper's builders on the GPU.
-fn on_gpu(found: &Reproduction, pass: Pass) -> Option<Verdict> {
-    let device = found.machine.device.as_ref()?;
+pub(super) fn on_gpu(found: &Reproduction, pass: Pass) -> Option<Verdict> {
+    let device = found.device.as_ref()?;
     let (topic, published, how) = match pass {
         Pass::Map => ("The GPU builds the map faster than the CPU", published::MAP_MS, ""),
         Pass::Rendering(_) => ("The GPU renders faster than the CPU", published::RENDERING_MS, ", by brute force"),
@@ -344,7 +336,7 @@ mod tests {
         found.running_times.retain(|time| time.implementation.builder == Builder::Cpu);
         let topics: Vec<&str> = all(&found).iter().map(|verdict| verdict.topic).collect();
         assert!(
-            append(&found).is_none() && packed(&found).is_none() && map_on_gpu(&found).is_none() && ballot(&found).is_none(),
+            append(&found).is_none() && packed(&found).is_none() && on_gpu(&found, Pass::Map).is_none() && ballot(&found).is_none(),
             "{topics:?}"
         );
     }
@@ -392,8 +384,8 @@ mod tests {
     #[test]
     fn a_software_device_is_called_one() {
         let mut found = sample::reproduction();
-        assert!(map_on_gpu(&found).unwrap().text.contains("software device"));
-        found.machine.device.as_mut().unwrap().is_cpu = false;
-        assert!(!map_on_gpu(&found).unwrap().text.contains("software device"));
+        assert!(on_gpu(&found, Pass::Map).unwrap().text.contains("software device"));
+        found.device.as_mut().unwrap().is_cpu = false;
+        assert!(!on_gpu(&found, Pass::Map).unwrap().text.contains("software device"));
     }
 }
