@@ -20,7 +20,6 @@ use spirq::var::Variable;
 #[path = "glsl/compile.rs"]
 mod compile;
 #[path = "src/constants.rs"]
-#[expect(dead_code, reason = "only the table of all constants is used here")]
 mod constants;
 
 fn main() {
@@ -56,9 +55,9 @@ fn main() {
     fs::write(spirv.join(LIST), list(&glsl, &modules)).expect("OUT_DIR can be written");
     write_worlds(&mut structs, &scene_elements);
     let buffer_count =
-        format!("/// Storage buffers that the kernel with the most of them binds.\npub const MAX_BUFFERS: u32 = {max_buffers};\n");
+        format!("/// Storage buffers that the kernel with the most of them binds.\npub(crate) const MAX_BUFFERS: u32 = {max_buffers};\n");
     let source = format!(
-        "{structs}\n{buffer_count}\n/// Every struct in a buffer or push-constant block of a kernel.\npub const STRUCTS: &[(&str, ReflectedStruct)] = &[\n{layouts}];\n"
+        "{structs}\n{buffer_count}\n/// Every struct in a buffer or push-constant block of a kernel.\npub(crate) const STRUCTS: &[(&str, ReflectedStruct)] = &[\n{layouts}];\n"
     );
     fs::write(out.join("kernels.rs"), source).expect("OUT_DIR can be written");
     fs::write(out.join("records.rs"), format!("records! {{\n{}\n}}\n", records.into_values().collect::<Vec<_>>().join("\n")))
@@ -416,13 +415,13 @@ fn camel_case(name: &str) -> String {
 fn write_kernel(source: &mut String, path: &str, name: &str, kernel: &Kernel) {
     let type_name = camel_case(name);
     let push = kernel.push.as_ref().map_or("()".to_owned(), |record| format!("crate::records::{}", struct_name(record)));
-    writeln!(source, "/// `glsl/{path}`.\npub struct {type_name}<'a> {{").unwrap();
+    writeln!(source, "/// `glsl/{path}`.\npub(crate) struct {type_name}<'a> {{").unwrap();
     let world = world_of(name, &kernel.scene);
     if let Some((world, _)) = world {
-        writeln!(source, "    pub {}: &'a {world},", world.to_lowercase()).unwrap();
+        writeln!(source, "    pub(crate) {}: &'a {world},", world.to_lowercase()).unwrap();
     }
     for buffer in &kernel.buffers {
-        writeln!(source, "    pub {}: &'a Buffer<{}>,", buffer.name, buffer.element).unwrap();
+        writeln!(source, "    pub(crate) {}: &'a Buffer<{}>,", buffer.name, buffer.element).unwrap();
     }
     writeln!(source, "}}\n\nimpl Kernel for {type_name}<'_> {{").unwrap();
     writeln!(source, "    type Push = {push};").unwrap();
@@ -479,9 +478,9 @@ fn world_of(kernel: &str, scene: &[Buffer]) -> Option<(&'static str, &'static [&
 /// The scene of each world, by the types that kernels give its buffers.
 fn write_worlds(source: &mut String, elements: &BTreeMap<String, String>) {
     for (world, buffers) in WORLDS {
-        writeln!(source, "/// What kernels look at: set 0, the same for all of them.\npub struct {world} {{").unwrap();
+        writeln!(source, "/// What kernels look at: set 0, the same for all of them.\npub(crate) struct {world} {{").unwrap();
         for name in buffers {
-            writeln!(source, "    pub {name}: Buffer<{}>,", elements[*name]).unwrap();
+            writeln!(source, "    pub(crate) {name}: Buffer<{}>,", elements[*name]).unwrap();
         }
         writeln!(source, "}}\n\nimpl {world} {{").unwrap();
         write_buffers(source, buffers.iter().copied());

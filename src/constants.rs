@@ -3,9 +3,10 @@
 
 macro_rules! constants {
     ($($(#[$doc:meta])* $name:ident = $value:expr;)*) => {
-        $($(#[$doc])* pub const $name: u32 = $value;)*
+        $($(#[$doc])* #[allow(dead_code, reason = "some are for GLSL alone")] pub(crate) const $name: u32 = $value;)*
         /// Every constant above, by name, as `build.rs` defines it for GLSL.
-        pub const SHARED_WITH_GLSL: &[(&str, u32)] = &[$((stringify!($name), $value)),*];
+        #[allow(dead_code, reason = "build.rs uses it, and tests")]
+        pub(crate) const SHARED_WITH_GLSL: &[(&str, u32)] = &[$((stringify!($name), $value)),*];
     };
 }
 

@@ -9,7 +9,7 @@ use crate::ledger::Ledger;
 use crate::text::{counted, echo};
 
 /// What a machine without Vulkan lacks: the loader, a driver, or both.
-pub const INSTALL_VULKAN: &str = if cfg!(target_os = "macos") {
+pub(crate) const INSTALL_VULKAN: &str = if cfg!(target_os = "macos") {
     "install the Vulkan loader and MoltenVK (brew install vulkan-loader molten-vk)"
 } else if cfg!(windows) {
     "install the current graphics driver of your GPU's vendor, which brings the Vulkan loader"

@@ -51,11 +51,11 @@ impl std::fmt::Display for Ledger {
 }
 
 /// Relative flux per channel in units of 2^-`TOTAL_FLUX_BITS`; [`crate::plan::scene::MapPlan::photon_flux`] makes watts of it.
-pub type FluxUnits = [u64; 3];
+pub(crate) type FluxUnits = [u64; 3];
 
 /// What the photons of a scene's map lose to limits, and how many photons the map has held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Totals {
+pub(crate) struct Totals {
     /// Entries of the map over all chunks.
     pub stored: u64,
     /// Photons still under way after the last bounce that is allowed, and their flux.
@@ -84,7 +84,7 @@ impl Totals {
 
 /// Fates bounce by bounce, from which the ledger follows.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Fates {
+pub(crate) struct Fates {
     pub emitted: u64,
     /// Photons that survived each bounce, which stores them in the room, and that were absorbed, escaped and dropped there.
     /// The last count of a scene takes in all later bounces.
@@ -94,7 +94,7 @@ pub struct Fates {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct BounceFates {
+pub(crate) struct BounceFates {
     pub stored: u64,
     pub absorbed: u64,
     pub escaped: u64,
@@ -102,17 +102,17 @@ pub struct BounceFates {
 }
 
 impl Fates {
-    pub fn new(bounces: u32) -> Fates {
+    pub(crate) fn new(bounces: u32) -> Fates {
         Fates { emitted: 0, bounces: vec![BounceFates::default(); bounces as usize], totals: None }
     }
 
     /// Of the photons of a scene's map.
-    pub fn of_scene(bounces: u32) -> Fates {
+    pub(crate) fn of_scene(bounces: u32) -> Fates {
         Fates { totals: Some(Totals::default()), ..Fates::new(bounces.min(TALLY_ROWS)) }
     }
 
     /// Counts photons as cut off that were under way when a run was interrupted.
-    pub fn interrupt(&mut self) {
+    pub(crate) fn interrupt(&mut self) {
         let Ledger { emitted, absorbed, escaped, cut_off, dropped, .. } = self.ledger();
         let open = emitted.saturating_sub(absorbed + escaped + cut_off + dropped);
         let totals = self.totals.get_or_insert_default();
@@ -121,7 +121,7 @@ impl Fates {
     }
 
     /// Whether they are what files may hold: counts whose sum is no more than this, and flux that can be added up.
-    pub fn is_sound(&self, most: u64) -> bool {
+    pub(crate) fn is_sound(&self, most: u64) -> bool {
         let of_bounces = self.bounces.iter().flat_map(|bounce| [bounce.stored, bounce.absorbed, bounce.escaped, bounce.dropped]);
         let totals = self.totals.unwrap_or_default();
         let others = [self.emitted, totals.stored, totals.cut_off, totals.clamped, totals.interrupted];
@@ -130,7 +130,7 @@ impl Fates {
     }
 
     /// What kernels have counted; nobody knows yet of how many photons.
-    pub fn counted(tallies: &[Tally], totals: Option<Totals>) -> Fates {
+    pub(crate) fn counted(tallies: &[Tally], totals: Option<Totals>) -> Fates {
         let fates = |tally: &Tally| BounceFates {
             stored: tally.stored.into(),
             absorbed: tally.absorbed.into(),
@@ -140,12 +140,12 @@ impl Fates {
         Fates { emitted: 0, bounces: tallies.iter().map(fates).collect(), totals }
     }
 
-    pub fn add(&mut self, other: &Fates) {
+    pub(crate) fn add(&mut self, other: &Fates) {
         self.combine(other, |sum, count| *sum += count);
     }
 
     /// Takes away what is among these.
-    pub fn subtract(&mut self, other: &Fates) {
+    pub(crate) fn subtract(&mut self, other: &Fates) {
         self.combine(other, |sum, count| *sum -= count);
     }
 
@@ -163,7 +163,7 @@ impl Fates {
         }
     }
 
-    pub fn ledger(&self) -> Ledger {
+    pub(crate) fn ledger(&self) -> Ledger {
         let sum = |fate: fn(&BounceFates) -> u64| self.bounces.iter().map(fate).sum();
         Ledger {
             emitted: self.emitted,
@@ -201,7 +201,7 @@ impl Losses {
     pub const SAFETY: f64 = 2.0;
 
     /// Of the paper's room, whose lights have so many watts and whose photons all carry alike.
-    pub fn of_room(fates: &Fates, watts: f64) -> Losses {
+    pub(crate) fn of_room(fates: &Fates, watts: f64) -> Losses {
         let Ledger { emitted, cut_off, stored, .. } = fates.ledger();
         if emitted == 0 {
             return Losses::default();
@@ -220,7 +220,7 @@ impl Losses {
 impl Fates {
     /// Landings that a photon which was cut off would still have had, from the chance with which photons survived their latest
     /// bounces.
-    pub fn further_landings(&self) -> f64 {
+    pub(crate) fn further_landings(&self) -> f64 {
         let entered = |bounce: &BounceFates| bounce.stored + bounce.absorbed + bounce.escaped;
         let latest = self.bounces.iter().rev().take(self.bounces.len().div_ceil(2));
         let (survived, all) = latest.fold((0, 0), |(survived, all), bounce| (survived + bounce.stored, all + entered(bounce)));
@@ -229,7 +229,7 @@ impl Fates {
 }
 
 /// How the one photon of these tallies ended.
-pub fn fate(tallies: &[Tally]) -> &'static str {
+pub(crate) fn fate(tallies: &[Tally]) -> &'static str {
     if tallies.iter().any(|tally| tally.escaped > 0) {
         "escaped"
     } else if tallies.iter().any(|tally| tally.absorbed > 0) {

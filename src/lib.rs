@@ -25,8 +25,7 @@
 //!
 //! Versions follow [semantic versioning](https://semver.org). The public API is [`render`] with the types that it takes and gives back
 //! ([`gpu::Gpu`] and its options, [`scene::Scene`], the settings, [`engine::scene::RunResult`], [`error::Error`]), the
-//! program's commands and options, the files that it writes, and the Python module. All else is public for the program and the tests, and may
-//! change in any release.
+//! program's commands and options, the files that it writes, and the Python module. `tests/program/promised.txt` lists all that is public.
 //!
 //! As long as the version is 0.x, a release that raises x may change all of that, and the changelog says what; one that raises the last
 //! number breaks nothing. The same version gives the same bits for the same seed on the same device and driver; another version need not. The
@@ -50,10 +49,13 @@
 //!
 //! `tests/program/architecture.rs` checks it.
 
+#![allow(rustdoc::private_intra_doc_links, reason = "the guide names parts of the program")]
 #![cfg_attr(
     not(all(feature = "program", feature = "window", feature = "lab")),
-    allow(dead_code, reason = "what only the program, the window or the lab uses")
+    allow(dead_code, unused_imports, reason = "what only the program, the window or the lab uses")
 )]
+// What nobody outside can reach is `pub(crate)`. With fewer features, less can be reached.
+#![cfg_attr(all(not(test), not(fuzzing), feature = "program", feature = "window", feature = "lab"), warn(unreachable_pub))]
 
 // Tests and fuzzing name what they use as a user of the library does.
 #[cfg(any(test, fuzzing))]
@@ -62,33 +64,33 @@ extern crate self as photonmill;
 pub mod bake;
 #[cfg(feature = "program")]
 pub mod cli;
-pub mod constants;
-pub mod cpu;
+pub(crate) mod constants;
+pub(crate) mod cpu;
 pub mod engine;
 pub mod error;
 #[expect(unsafe_code, reason = "Vulkan's functions are unsafe, and so are mapped files")]
 pub mod gpu;
 #[cfg(doc)]
 pub mod guide;
-pub mod ledger;
+pub(crate) mod ledger;
 #[cfg(feature = "lab")]
 pub mod measure;
 #[expect(unsafe_code, reason = "the functions of Open Image Denoise, which is loaded at run time, are unsafe")]
-pub mod oidn;
+pub(crate) mod oidn;
 pub mod output;
-pub mod path;
-pub mod photon;
-pub mod plan;
-pub mod records;
+pub(crate) mod path;
+pub(crate) mod photon;
+pub(crate) mod plan;
+pub(crate) mod records;
 pub mod render;
-pub mod rng;
+pub(crate) mod rng;
 pub mod scene;
 pub mod settings;
-pub mod text;
-pub mod timings;
-pub mod verify;
+pub(crate) mod text;
+pub(crate) mod timings;
+pub(crate) mod verify;
 #[cfg(feature = "window")]
-pub mod view;
+pub(crate) mod view;
 
 #[cfg(any(test, fuzzing))]
 #[doc(hidden)]

@@ -41,7 +41,7 @@ struct Functions {
 }
 
 /// A device of the library.
-pub struct Denoiser {
+pub(crate) struct Denoiser {
     functions: Functions,
     device: Handle,
     /// Such as 2.3.3.
@@ -49,14 +49,14 @@ pub struct Denoiser {
 }
 
 /// Noise-free layers of what is seen first.
-pub struct Guides<'a> {
+pub(crate) struct Guides<'a> {
     pub albedo: &'a [Vec3],
     pub normal: &'a [Vec3],
 }
 
 impl Denoiser {
     /// Fails where the library is not installed.
-    pub fn open() -> Result<Denoiser> {
+    pub(crate) fn open() -> Result<Denoiser> {
         let absent = |reason: &str| {
             let remedy = "install Open Image Denoise (package oidn or libopenimagedenoise of many systems, or its release from openimagedenoise.org with its lib folder in LD_LIBRARY_PATH), or omit `denoise`";
             Error::Denoiser { reason: format!("{reason}; {remedy}") }
@@ -80,7 +80,7 @@ impl Denoiser {
     }
 
     /// A picture of linear light without its noise.
-    pub fn denoise(&self, (width, height): (u32, u32), light: &[Vec3], guides: &Guides) -> Result<Vec<Vec3>> {
+    pub(crate) fn denoise(&self, (width, height): (u32, u32), light: &[Vec3], guides: &Guides) -> Result<Vec<Vec3>> {
         let pixels = width as usize * height as usize;
         assert_eq!([light.len(), guides.albedo.len(), guides.normal.len()], [pixels; 3], "{width} x {height} pixels");
         let mut denoised = vec![Vec3::ZERO; pixels];

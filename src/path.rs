@@ -5,7 +5,7 @@ use glam::{UVec2, Vec3};
 
 /// A photon in flight.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Path {
+pub(crate) struct Path {
     pub position: Vec3,
     /// Wall it stands on, or `NO_WALL` once it has died in its slot.
     pub wall: u32,
@@ -20,10 +20,10 @@ pub struct Path {
 /// Room for one path on the device. Its three words of four do not stand side by side: [`unpack`].
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
-pub struct StoredPath(pub [[u32; 4]; 3]);
+pub(crate) struct StoredPath(pub [[u32; 4]; 3]);
 
 /// Path `index` of an array that is full: the first words of all paths, then the second ones, then the third ones.
-pub fn unpack(array: &[StoredPath], index: usize) -> Path {
+pub(crate) fn unpack(array: &[StoredPath], index: usize) -> Path {
     let words: &[[u32; 4]] = bytemuck::cast_slice(array);
     let [[x, y, z, wall], [dx, dy, dz, photon], [low, high, flux, _]] = [0, 1, 2].map(|k| words[k * array.len() + index]);
     let vector = |bits: [u32; 3]| Vec3::from_array(bits.map(f32::from_bits));

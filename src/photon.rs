@@ -10,7 +10,7 @@ use crate::records::Room;
 /// A photon where a wall reflected it.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
-pub struct Photon {
+pub(crate) struct Photon {
     pub position: Vec3,
     /// Wall, or `NO_WALL` in an empty slot.
     pub wall: u32,
@@ -25,12 +25,12 @@ pub struct Photon {
 /// One entry of the photon map on the device; `glsl/world/room/photon.glsl` tells its bits.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
-pub struct StoredPhoton(pub [u32; 4]);
+pub(crate) struct StoredPhoton(pub [u32; 4]);
 
 /// Which photon an entry of the photon map is.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
-pub struct Origin {
+pub(crate) struct Origin {
     pub photon: u32,
     pub bounce: u32,
 }
@@ -38,7 +38,7 @@ pub struct Origin {
 /// A photon where it arrived at a surface that scatters: one entry of the map of a scene of triangles.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
-pub struct MapPhoton {
+pub(crate) struct MapPhoton {
     pub position: Vec3,
     /// That it arrived at: twice its number, plus 1 on its back.
     pub plane: u32,
@@ -49,7 +49,7 @@ pub struct MapPhoton {
 
 impl MapPhoton {
     /// Towards where it came from, to a ten-thousandth of a radian. Twin of `unpack_direction` in `glsl/math/directions.glsl`.
-    pub fn came_from(&self) -> Vec3 {
+    pub(crate) fn came_from(&self) -> Vec3 {
         let coordinate = |code: u32| ((code & 0x7fff) as f32 - 16383.0) / 16383.0;
         let (x, y) = (coordinate(self.wi), coordinate(self.wi >> 15));
         let z = 1.0 - x.abs() - y.abs();
@@ -58,14 +58,14 @@ impl MapPhoton {
     }
 
     /// Mask of the way in which its light arrived, one of `ARRIVED_...`.
-    pub fn arrival(&self) -> u32 {
+    pub(crate) fn arrival(&self) -> u32 {
         1 << (self.wi >> 30)
     }
 }
 
 impl Photon {
     /// Of a photon in its wall's plane to the bit, as any that was traced is.
-    pub fn stored(&self) -> StoredPhoton {
+    pub(crate) fn stored(&self) -> StoredPhoton {
         let axis = (self.wall / 2) & 3;
         let place = [1, 2].map(|after| self.position[(axis as usize + after) % 3].to_bits());
         StoredPhoton([
@@ -76,20 +76,20 @@ impl Photon {
         ])
     }
 
-    pub fn origin(&self) -> Origin {
+    pub(crate) fn origin(&self) -> Origin {
         Origin { photon: self.photon, bounce: self.bounce }
     }
 }
 
 impl StoredPhoton {
     /// `NO_WALL` of an empty slot.
-    pub fn wall(self) -> u32 {
+    pub(crate) fn wall(self) -> u32 {
         let [.., flux, weight] = self.0;
         if flux >> 30 == 3 { NO_WALL } else { flux >> 30 << 1 | weight >> 31 }
     }
 
     /// The photon as it was, to the bit; of an empty slot nothing but that it is one.
-    pub fn photon(self, origin: Origin, room: &Room) -> Photon {
+    pub(crate) fn photon(self, origin: Origin, room: &Room) -> Photon {
         let StoredPhoton([first, second, flux, weight]) = self;
         let wall = self.wall();
         let mut position = Vec3::ZERO;

@@ -11,7 +11,7 @@ use crate::constants::MAX_GROUPS;
 
 /// One field of a record, as reflection names it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Field {
+pub(crate) struct Field {
     pub name: &'static str,
     pub kind: &'static str,
     pub offset: usize,
@@ -19,14 +19,14 @@ pub struct Field {
 
 /// A record's name, size in bytes and fields.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Layout {
+pub(crate) struct Layout {
     pub name: &'static str,
     pub size_bytes: usize,
     pub fields: &'static [Field],
 }
 
 /// A Rust type that stands for a GLSL type inside a record.
-pub trait GlslType {
+pub(crate) trait GlslType {
     const KIND: &'static str;
 }
 
@@ -42,13 +42,14 @@ macro_rules! records {
             $(#[$doc])*
             #[repr(C)]
             #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
-            pub struct $name { $($(#[$field_doc])* pub $field: $kind,)* }
+            pub(crate) struct $name { $($(#[$field_doc])* pub(crate) $field: $kind,)* }
 
             impl GlslType for $name { const KIND: &'static str = stringify!($name); }
         )*
 
         /// Every record.
-        pub const LAYOUTS: &[Layout] = &[$(Layout {
+        #[allow(dead_code, reason = "tests compare it with GLSL")]
+        pub(crate) const LAYOUTS: &[Layout] = &[$(Layout {
             name: stringify!($name),
             size_bytes: size_of::<$name>(),
             fields: &[$(Field {
@@ -64,7 +65,7 @@ include!(concat!(env!("OUT_DIR"), "/records.rs"));
 
 impl DispatchSizePush {
     /// An invocation for each of what a counter counts, `capacity` at most.
-    pub fn new(counter: u32, capacity: u32, items_per_group: u32) -> DispatchSizePush {
+    pub(crate) fn new(counter: u32, capacity: u32, items_per_group: u32) -> DispatchSizePush {
         DispatchSizePush { counter, capacity, items_per_group, max_groups: MAX_GROUPS }
     }
 }

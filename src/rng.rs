@@ -14,7 +14,7 @@ use crate::records::RandomKey;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 #[repr(u32)]
-pub enum Rng {
+pub(crate) enum Rng {
     /// The paper's: the C library's 48-bit generator, one sequence leap-frogged over the photons of
     /// a round (van Meel et al. 2008): photon i draws numbers i, i + N, i + 2N, ... of `srand48(seed)`.
     Rand48 = constants::RNG_RAND48,
@@ -32,11 +32,11 @@ pub enum Rng {
 
 /// Bounces for which a photon's MT19937 stream suffices: its outputs 0 to 226 need nothing beyond
 /// the 624 words that seeding makes.
-pub const MT_MAX_BOUNCES: u32 = (624 - MT_MIDDLE - EMISSION_DRAWS) / BOUNCE_DRAWS;
+pub(crate) const MT_MAX_BOUNCES: u32 = (624 - MT_MIDDLE - EMISSION_DRAWS) / BOUNCE_DRAWS;
 
 /// x -> multiplier * x + increment mod 2^48: one or many steps of rand48.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Affine48 {
+pub(crate) struct Affine48 {
     pub multiplier: u64,
     pub increment: u64,
 }
@@ -46,10 +46,10 @@ const MASK48: u64 = (1 << 48) - 1;
 impl Affine48 {
     const IDENTITY: Affine48 = Affine48 { multiplier: 1, increment: 0 };
     /// One step of drand48.
-    pub const STEP: Affine48 = Affine48 { multiplier: 0x5_DEEC_E66D, increment: 0xB };
+    pub(crate) const STEP: Affine48 = Affine48 { multiplier: 0x5_DEEC_E66D, increment: 0xB };
 
     #[inline(always)]
-    pub fn apply(self, state: u64) -> u64 {
+    pub(crate) fn apply(self, state: u64) -> u64 {
         self.multiplier.wrapping_mul(state).wrapping_add(self.increment) & MASK48
     }
 
@@ -59,7 +59,7 @@ impl Affine48 {
     }
 
     /// `count` steps at once, by repeated squaring.
-    pub fn steps(count: u64) -> Affine48 {
+    pub(crate) fn steps(count: u64) -> Affine48 {
         let mut result = Affine48::IDENTITY;
         let mut power = Affine48::STEP;
         let mut rest = count;
@@ -76,7 +76,7 @@ impl Affine48 {
 
 /// Low 32 bits and high bits of a 48- or 64-bit number, as GLSL takes them.
 #[inline(always)]
-pub fn words(value: u64) -> UVec2 {
+pub(crate) fn words(value: u64) -> UVec2 {
     UVec2::new(value as u32, (value >> 32) as u32)
 }
 
@@ -87,18 +87,18 @@ fn from_words(words: UVec2) -> u64 {
 
 /// The state one draw on.
 #[inline(always)]
-pub fn rand48_step(state: UVec2) -> UVec2 {
+pub(crate) fn rand48_step(state: UVec2) -> UVec2 {
     words(Affine48::STEP.apply(from_words(state)))
 }
 
 /// State of `srand48(seed)`.
-pub fn srand48(seed: u32) -> u64 {
+pub(crate) fn srand48(seed: u32) -> u64 {
     (u64::from(seed) << 16) | 0x330E
 }
 
 /// The streams of a run: what its seed, photons a round and draws a photon make of the generator.
 #[derive(Debug, Clone, Copy)]
-pub struct Streams {
+pub(crate) struct Streams {
     pub rng: Rng,
     pub seed: u64,
     /// Photons of a round.
@@ -108,7 +108,7 @@ pub struct Streams {
 
 impl Streams {
     /// The key that all photons of a round share.
-    pub fn key(self, round: u32) -> RandomKey {
+    pub(crate) fn key(self, round: u32) -> RandomKey {
         // From one draw of a photon to its next.
         let leap = Affine48::steps(u64::from(self.photons));
         RandomKey {
@@ -121,7 +121,7 @@ impl Streams {
     }
 
     /// From the first state of photon i in round 0 to that of photon `first_photon` + i in `round`.
-    pub fn jump(self, round: u32, first_photon: u32) -> Affine48 {
+    pub(crate) fn jump(self, round: u32, first_photon: u32) -> Affine48 {
         // The caller has checked that a run's draws stay below 2^48 (RoomSettings::validate).
         Affine48::steps(u64::from(round) * u64::from(self.photons) * self.draws_per_photon + u64::from(first_photon))
     }
@@ -129,7 +129,7 @@ impl Streams {
     /// First states of photons 0 to `count` - 1 of round 0: the initial set that, as the paper says,
     /// the host prepares. Later rounds and photons are reached from it by [`Streams::jump`]. Only
     /// rand48 needs any; the others get one unused entry.
-    pub fn first_states(self, count: u32) -> Vec<UVec2> {
+    pub(crate) fn first_states(self, count: u32) -> Vec<UVec2> {
         if self.rng != Rng::Rand48 {
             return vec![UVec2::ZERO; self.first_state_count(count) as usize];
         }
@@ -143,7 +143,7 @@ impl Streams {
     }
 
     /// How many those are.
-    pub fn first_state_count(self, count: u32) -> u64 {
+    pub(crate) fn first_state_count(self, count: u32) -> u64 {
         if self.rng == Rng::Rand48 { u64::from(count) } else { 1 }
     }
 }
@@ -162,7 +162,7 @@ fn rand48_next(state: &mut UVec2, key: &RandomKey) -> f32 {
 }
 
 #[inline(always)]
-pub fn mix32(mut x: u32) -> u32 {
+pub(crate) fn mix32(mut x: u32) -> u32 {
     x ^= x >> 16;
     x = x.wrapping_mul(0x7feb_352d);
     x ^= x >> 15;
@@ -177,7 +177,7 @@ fn mt_word(previous: u32, index: u32) -> u32 {
 
 /// States of the twisters that `init_genrand(seed)` starts: seeds, and their words `MT_MIDDLE`.
 #[inline(always)]
-pub fn mt_open<const N: usize>(seeds: [u32; N]) -> [[u32; N]; 2] {
+pub(crate) fn mt_open<const N: usize>(seeds: [u32; N]) -> [[u32; N]; 2] {
     let mut words = seeds;
     for index in 1..=MT_MIDDLE {
         for word in &mut words {
@@ -189,7 +189,7 @@ pub fn mt_open<const N: usize>(seeds: [u32; N]) -> [[u32; N]; 2] {
 
 /// The 32-bit output number `draw` of the twister.
 #[inline(always)]
-pub fn mt_next_word(words: &mut UVec2, draw: u32) -> u32 {
+pub(crate) fn mt_next_word(words: &mut UVec2, draw: u32) -> u32 {
     let next = mt_word(words.x, draw + 1);
     let mixed = (words.x & 0x8000_0000) | (next & 0x7fff_ffff);
     let mut y = words.y ^ (mixed >> 1) ^ ((mixed & 1) * 0x9908_b0df);
@@ -203,7 +203,7 @@ pub fn mt_next_word(words: &mut UVec2, draw: u32) -> u32 {
 
 /// Philox4x32-10.
 #[inline(always)]
-pub fn philox(mut counter: [u32; 4], mut key: [u32; 2]) -> [u32; 4] {
+pub(crate) fn philox(mut counter: [u32; 4], mut key: [u32; 2]) -> [u32; 4] {
     for _ in 0..10 {
         let product0 = u64::from(counter[0]) * 0xd251_1f53;
         let product1 = u64::from(counter[2]) * 0xcd9e_8d57;
@@ -243,7 +243,7 @@ const SOBOL_DIRECTIONS: [[u32; 4]; 32] = {
 
 /// Points of the Sobol' sequence, dimension by dimension, as fractions of 2^32.
 #[inline(always)]
-pub fn sobol<const N: usize>(indices: [u32; N]) -> [[u32; N]; 4] {
+pub(crate) fn sobol<const N: usize>(indices: [u32; N]) -> [[u32; N]; 4] {
     let mut points = [[0; N]; 4];
     for (bit, directions) in SOBOL_DIRECTIONS.iter().enumerate() {
         // All ones where the bit is set: no branch that random bits would mislead.
@@ -260,7 +260,7 @@ pub fn sobol<const N: usize>(indices: [u32; N]) -> [[u32; N]; 4] {
 /// Owen's scrambling by a hash (Burley 2020, listing 3): each bit is flipped or not by the bits above
 /// it and the seed. Of an index, it shuffles every aligned block of 2^k among such blocks.
 #[inline(always)]
-pub fn owen_scramble(x: u32, seed: u32) -> u32 {
+pub(crate) fn owen_scramble(x: u32, seed: u32) -> u32 {
     let mut x = x.reverse_bits().wrapping_add(seed);
     for factor in [0x6c50_b47cu32, 0xb82f_1e52, 0xc7af_e638, 0x8d22_f6e6] {
         x ^= x.wrapping_mul(factor);
@@ -290,7 +290,7 @@ fn sobol_block<const N: usize>([samples, light_keys]: &[[u32; N]; 2], block: u32
 /// Opens the streams of some photons from their starts: the first states of rand48, or for Sobol' points their numbers
 /// among the light's photons of the run, and the light. The others need none.
 #[inline(always)]
-pub fn open_streams<const N: usize>(rng: Rng, key: &RandomKey, photons: &[u32; N], starts: [[u32; N]; 2]) -> [[u32; N]; 2] {
+pub(crate) fn open_streams<const N: usize>(rng: Rng, key: &RandomKey, photons: &[u32; N], starts: [[u32; N]; 2]) -> [[u32; N]; 2] {
     let run = mix32(key.seed.x.wrapping_add(mix32(key.seed.y)));
     match rng {
         Rng::Rand48 => starts,
@@ -334,13 +334,13 @@ fn draw<const N: usize, const DRAWS: usize>(
 
 /// Emission: disc radius, disc angle, cosine, azimuth.
 #[inline(always)]
-pub fn draw_emissions<const N: usize>(rng: Rng, key: &RandomKey, photons: &[u32; N], streams: &mut [[u32; N]; 2]) -> [[f32; N]; 4] {
+pub(crate) fn draw_emissions<const N: usize>(rng: Rng, key: &RandomKey, photons: &[u32; N], streams: &mut [[u32; N]; 2]) -> [[f32; N]; 4] {
     draw(rng, key, photons, (0, 0), streams)
 }
 
 /// Bounce: roulette, cosine, azimuth.
 #[inline(always)]
-pub fn draw_bounces<const N: usize>(
+pub(crate) fn draw_bounces<const N: usize>(
     rng: Rng,
     key: &RandomKey,
     photons: &[u32; N],
@@ -351,12 +351,12 @@ pub fn draw_bounces<const N: usize>(
 }
 
 /// [`open_streams`] of one photon.
-pub fn open_stream(rng: Rng, key: &RandomKey, photon: u32, start: UVec2) -> UVec2 {
+pub(crate) fn open_stream(rng: Rng, key: &RandomKey, photon: u32, start: UVec2) -> UVec2 {
     open_streams(rng, key, &[photon], start.to_array().map(|word| [word])).map(|[word]| word).into()
 }
 
 /// [`draw_emissions`] of one photon.
-pub fn draw_emission(rng: Rng, key: &RandomKey, photon: u32, stream: &mut UVec2) -> [f32; 4] {
+pub(crate) fn draw_emission(rng: Rng, key: &RandomKey, photon: u32, stream: &mut UVec2) -> [f32; 4] {
     let mut streams = stream.to_array().map(|word| [word]);
     let u = draw_emissions(rng, key, &[photon], &mut streams);
     *stream = streams.map(|[word]| word).into();
@@ -364,7 +364,7 @@ pub fn draw_emission(rng: Rng, key: &RandomKey, photon: u32, stream: &mut UVec2)
 }
 
 /// [`draw_bounces`] of one photon.
-pub fn draw_bounce(rng: Rng, key: &RandomKey, photon: u32, bounce: u32, stream: &mut UVec2) -> [f32; 3] {
+pub(crate) fn draw_bounce(rng: Rng, key: &RandomKey, photon: u32, bounce: u32, stream: &mut UVec2) -> [f32; 3] {
     let mut streams = stream.to_array().map(|word| [word]);
     let u = draw_bounces(rng, key, &[photon], bounce, &mut streams);
     *stream = streams.map(|[word]| word).into();

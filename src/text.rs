@@ -4,7 +4,7 @@ use std::fmt::Display;
 use std::io;
 
 /// `1 round`, `2 rounds`.
-pub fn counted(count: impl Display, noun: &str) -> String {
+pub(crate) fn counted(count: impl Display, noun: &str) -> String {
     let count = count.to_string();
     let plural = if count == "1" { "" } else { "s" };
     format!("{count} {noun}{plural}")
@@ -14,7 +14,7 @@ pub fn counted(count: impl Display, noun: &str) -> String {
 const MOST_ECHOED: usize = 120;
 
 /// A value as it was typed; of a long one the beginning and the end.
-pub fn echo(typed: impl Display) -> String {
+pub(crate) fn echo(typed: impl Display) -> String {
     const END: usize = 40;
     let typed = typed.to_string();
     let letters: Vec<char> = typed.chars().collect();
@@ -26,19 +26,19 @@ pub fn echo(typed: impl Display) -> String {
 }
 
 /// Text from a file, as it may be printed.
-pub fn one_line(text: &str) -> String {
+pub(crate) fn one_line(text: &str) -> String {
     echo(text.replace(|letter: char| letter.is_control(), " "))
 }
 
 /// A share, three significant digits.
-pub fn percent(share: f64) -> String {
+pub(crate) fn percent(share: f64) -> String {
     let percent = 100.0 * share;
     let decimals = if percent == 0.0 { 0 } else { (2 - percent.abs().log10().floor() as i32).clamp(0, 6) };
     format!("{percent:.*} %", decimals as usize)
 }
 
 /// A length that is small, in the unit that suits it.
-pub fn in_metres(metres: f64) -> String {
+pub(crate) fn in_metres(metres: f64) -> String {
     match metres {
         ..0.01 => format!("{:.2} mm", 1e3 * metres),
         _ => format!("{metres:.2} m"),
@@ -46,7 +46,7 @@ pub fn in_metres(metres: f64) -> String {
 }
 
 /// The first few of some names.
-pub fn some_of(names: impl ExactSizeIterator<Item = impl ToString>) -> String {
+pub(crate) fn some_of(names: impl ExactSizeIterator<Item = impl ToString>) -> String {
     const MOST: usize = 5;
     let more = names.len().saturating_sub(MOST);
     let first: Vec<String> = names.take(MOST).map(|name| name.to_string()).collect();
@@ -54,7 +54,7 @@ pub fn some_of(names: impl ExactSizeIterator<Item = impl ToString>) -> String {
 }
 
 /// Why the system refuses a file, or a name for one.
-pub fn refusal(error: &io::Error) -> String {
+pub(crate) fn refusal(error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::NotFound => "there is no such file".to_owned(),
         io::ErrorKind::AlreadyExists => "something of this name is there".to_owned(),
@@ -63,7 +63,7 @@ pub fn refusal(error: &io::Error) -> String {
 }
 
 /// A word as a shell takes it.
-pub fn quoted(word: String) -> String {
+pub(crate) fn quoted(word: String) -> String {
     let is_plain = |letter: char| letter.is_alphanumeric() || "_-./:,=+%@".contains(letter);
     if !word.is_empty() && word.chars().all(is_plain) { word } else { format!("'{}'", word.replace('\'', r"'\''")) }
 }

@@ -22,7 +22,7 @@ struct Seen {
 
 /// Whether some look-up does. Charts may touch where the surface goes on from one to the other: there a look-up finds what
 /// lies near it in space.
-pub fn bleeds(meshes: &[&Mesh], parts: &[Part], width: u32, height: u32) -> bool {
+pub(crate) fn bleeds(meshes: &[&Mesh], parts: &[Part], width: u32, height: u32) -> bool {
     let charts = charts(meshes, parts);
     // A single one, which is common, has nothing to bleed into.
     if charts.iter().flatten().all(|chart| *chart == 0) {

@@ -15,7 +15,7 @@ use crate::scene::{Material, Mesh, Scene, bounds_of};
 
 /// How a document shows the baked light.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub(crate) enum Kind {
     /// Black materials that shine with the radiance that leaves them.
     Radiance,
     /// The scene's materials with MOZ_lightmap.
@@ -30,7 +30,7 @@ const MAX_TANGENT_DIFFERENCE: f64 = 1e-5;
 
 /// The meshes of a scene: what both documents share.
 #[derive(Default)]
-pub struct Geometry {
+pub(crate) struct Geometry {
     /// Accessors and what they lead to.
     pub file: Writer,
     /// Attributes and indices, one a mesh.
@@ -42,7 +42,7 @@ pub struct Geometry {
 }
 
 impl Geometry {
-    pub fn new(scene: &Scene, layout: &Layout) -> Geometry {
+    pub(super) fn new(scene: &Scene, layout: &Layout) -> Geometry {
         let mut geometry = Geometry::default();
         for (mesh, lightmap) in scene.meshes.iter().zip(&layout.meshes) {
             geometry.add(lightmap.as_ref().map_or(mesh, |lightmap| &lightmap.mesh), lightmap.as_ref(), &scene.materials[mesh.material]);
@@ -132,7 +132,7 @@ fn texture_coordinates(mesh: &Mesh, lightmap: Option<&MeshLightmap>, material: &
 }
 
 /// Indices of the textures that a material of a mesh uses.
-pub fn textures_used(scene: &Scene) -> Vec<usize> {
+pub(crate) fn textures_used(scene: &Scene) -> Vec<usize> {
     let textures = scene.meshes.iter().flat_map(|mesh| scene.materials[mesh.material].textures());
     let used: BTreeSet<usize> = textures.map(|used| used.texture).collect();
     used.into_iter().collect()
@@ -148,7 +148,14 @@ fn black(material: &Material) -> Material {
 
 /// A document of the scene. `intensity` is by how much the texels of a mesh's linear lightmap are to be
 /// multiplied.
-pub fn document(scene: &Scene, layout: &Layout, geometry: &Geometry, names: &Names, kind: Kind, intensity: impl Fn(usize) -> f32) -> Value {
+pub(crate) fn document(
+    scene: &Scene,
+    layout: &Layout,
+    geometry: &Geometry,
+    names: &Names,
+    kind: Kind,
+    intensity: impl Fn(usize) -> f32,
+) -> Value {
     let mut document = Writer { json: geometry.file.json.clone(), ..Writer::default() };
     document.json["asset"] = json!({"version": "2.0", "generator": concat!("photonmill ", env!("CARGO_PKG_VERSION"))});
     let used = textures_used(scene);

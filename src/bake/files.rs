@@ -24,14 +24,14 @@ use crate::scene::material::TextureUse;
 use crate::scene::{Material, Scene};
 
 /// A file that was written, and what it is for.
-pub struct Written {
+pub(crate) struct Written {
     pub name: String,
     pub purpose: String,
 }
 
 /// Writes all files of a built-in scene's bake, or none. `exposure` multiplies radiance (and irradiance / pi) in every
 /// PNG and in the scenes; EXR files hold values untouched. `maps` are all of [`Layout::maps`].
-pub fn write(folder: &Folder, scene: &Scene, layout: &Layout, maps: &[Map], exposure: f32) -> Result<()> {
+pub(crate) fn write(folder: &Folder, scene: &Scene, layout: &Layout, maps: &[Map], exposure: f32) -> Result<()> {
     let names = Names::new(scene, layout);
     let geometry = Geometry::new(scene, layout);
     let intensities: HashMap<usize, f32> =
@@ -66,7 +66,7 @@ fn textures<'a>(scene: &'a Scene) -> impl Iterator<Item = (String, Vec<u8>)> + '
 }
 
 /// Names of the files of a built-in scene's bake.
-pub fn names(scene: &Scene, layout: &Layout) -> Vec<String> {
+pub(crate) fn names(scene: &Scene, layout: &Layout) -> Vec<String> {
     let names = Names::new(scene, layout);
     let pictures = (0..layout.objects.len()).flat_map(|object| ENDINGS.map(|ending| format!("{}{ending}", names.stem(object))));
     let textures = document::textures_used(scene).into_iter().map(texture_name);
@@ -75,7 +75,7 @@ pub fn names(scene: &Scene, layout: &Layout) -> Vec<String> {
 
 /// The user's file with lightmap coordinates, ready to be written with the light. What is wrong with the file is found here, before
 /// there is light.
-pub struct IntoFile<'a> {
+pub(crate) struct IntoFile<'a> {
     file: &'a File,
     scene: &'a Scene,
     layout: &'a Layout,
@@ -94,7 +94,7 @@ pub struct IntoFile<'a> {
 }
 
 impl<'a> IntoFile<'a> {
-    pub fn new(folder: &Folder, file: &'a File, scene: &'a Scene, layout: &'a Layout, pages: &'a Pages) -> Result<IntoFile<'a>> {
+    pub(crate) fn new(folder: &Folder, file: &'a File, scene: &'a Scene, layout: &'a Layout, pages: &'a Pages) -> Result<IntoFile<'a>> {
         let [name, stem] =
             [file.path.file_name(), file.path.file_stem()].map(|part| part.unwrap_or_default().to_string_lossy().into_owned());
         let target = folder.path().join(&name);
@@ -124,14 +124,14 @@ impl<'a> IntoFile<'a> {
     }
 
     /// Names of the files that may be written.
-    pub fn names(&self, has_preview: bool) -> Vec<String> {
+    pub(crate) fn names(&self, has_preview: bool) -> Vec<String> {
         let beside = self.beside.iter().map(|beside| &beside.name);
         let own = [&self.name, &self.buffer_name].into_iter().chain(has_preview.then_some(&self.preview_name));
         own.chain(beside).chain(&self.pictures).chain(&self.errors).cloned().collect()
     }
 
     /// Writes everything, or nothing. With `preview_exposure` also a copy for viewers that shows the radiance times that.
-    pub fn write(self, folder: &Folder, maps: &[Map], preview_exposure: Option<f32>) -> Result<Vec<Written>> {
+    pub(crate) fn write(self, folder: &Folder, maps: &[Map], preview_exposure: Option<f32>) -> Result<Vec<Written>> {
         let mut written = Vec::new();
         let mut say = |name: &str, purpose: String| written.push(Written { name: name.to_owned(), purpose });
         let mut files = Vec::new();
@@ -187,7 +187,7 @@ fn error_exr(size: (u32, u32), errors: &[Vec3], unseen: &[Vec3], source: ErrorSo
 }
 
 /// A copy of a scene that shows the baked light in any viewer, as one `.glb` file.
-pub fn preview(scene: &Scene, layout: &Layout, maps: &[Map], exposure: f32) -> Vec<u8> {
+pub(crate) fn preview(scene: &Scene, layout: &Layout, maps: &[Map], exposure: f32) -> Vec<u8> {
     let names = Names::new(scene, layout);
     let geometry = Geometry::new(scene, layout);
     let json = document::document(scene, layout, &geometry, &names, Kind::Radiance, |_| 1.0);

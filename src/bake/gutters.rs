@@ -6,7 +6,7 @@ const NONE: u32 = u32::MAX;
 
 /// For every texel, row by row, the index in `texels` (columns and rows) of the nearest one: exact Euclidean distances
 /// between centres, by the lower envelope of parabolas (Felzenszwalb and Huttenlocher 2012).
-pub fn nearest(width: u32, height: u32, texels: impl IntoIterator<Item = (u32, u32)>) -> Vec<u32> {
+pub(crate) fn nearest(width: u32, height: u32, texels: impl IntoIterator<Item = (u32, u32)>) -> Vec<u32> {
     let (columns, rows) = (width as usize, height as usize);
     let mut covered = vec![NONE; columns * rows];
     for (index, (x, y)) in texels.into_iter().enumerate() {

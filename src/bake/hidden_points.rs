@@ -33,14 +33,14 @@ struct Face {
 }
 
 /// All opaque triangles of a scene.
-pub struct Faces {
+pub(crate) struct Faces {
     faces: Vec<Face>,
     tree: BoxTree,
 }
 
 impl Faces {
     /// `meshes` say which backs are baked: those are looked at, and hide nothing.
-    pub fn new(scene: &Scene, meshes: &[Option<MeshLightmap>]) -> Faces {
+    pub(super) fn new(scene: &Scene, meshes: &[Option<MeshLightmap>]) -> Faces {
         let of_mesh = |number: usize| {
             let mesh = &scene.meshes[number];
             let material = &scene.materials[mesh.material];
@@ -90,7 +90,7 @@ impl Faces {
     }
 
     /// The texels of a map that are left, each with the points that count. `None` where all are as they were.
-    pub fn left(&self, number: usize, lightmap: &MeshLightmap) -> Option<Vec<CoveredTexel>> {
+    pub(super) fn left(&self, number: usize, lightmap: &MeshLightmap) -> Option<Vec<CoveredTexel>> {
         let looked: Vec<Option<Option<[SurfacePoint; PHASE_COUNT]>>> =
             lightmap.texels.par_iter().map(|texel| self.points_left(number, lightmap, texel)).collect();
         let is_changed = looked.iter().any(Option::is_some);

@@ -12,7 +12,7 @@ use crate::scene::geometry::Geometry;
 const USUAL_TEXELS: f64 = 65_536.0;
 
 /// Texels per metre; fails where there is nothing to bake in the scene of this name.
-pub fn usual_density(scene: &Scene, name: &str) -> Result<f64> {
+pub(crate) fn usual_density(scene: &Scene, name: &str) -> Result<f64> {
     let kinds = scene.lobe_kinds();
     let baked = scene.meshes.iter().filter(|mesh| kinds[mesh.material].matt);
     let area: f64 = baked.map(super::super::scene::mesh::Mesh::whole_area).sum();
@@ -26,7 +26,7 @@ pub fn usual_density(scene: &Scene, name: &str) -> Result<f64> {
 
 impl Layout {
     /// The points that each round of so many asks about: one of every texel, another one each time.
-    pub fn receivers(&self, rounds: u32, geometry: &Geometry) -> Vec<Vec<Receiver>> {
+    pub(crate) fn receivers(&self, rounds: u32, geometry: &Geometry) -> Vec<Vec<Receiver>> {
         let of_phase = |phase: usize| {
             let receiver = |sample: &super::TexelSample| Receiver {
                 position: geometry.to_local(sample.position),
@@ -40,7 +40,7 @@ impl Layout {
 }
 
 /// What a run found for every texel.
-pub fn estimates(lit: &RunResult) -> Vec<TexelEstimate> {
+pub(crate) fn estimates(lit: &RunResult) -> Vec<TexelEstimate> {
     let (errors, unseen) = (lit.film.stated_errors(), lit.film.unseen_bounds());
     let estimate = |texel: usize| TexelEstimate {
         irradiance: lit.film.mean(texel).as_vec3(),
@@ -51,7 +51,7 @@ pub fn estimates(lit: &RunResult) -> Vec<TexelEstimate> {
 }
 
 /// Stops that make the mean of white surfaces middle grey.
-pub fn usual_exposure(estimates: &[TexelEstimate]) -> f32 {
+pub(crate) fn usual_exposure(estimates: &[TexelEstimate]) -> f32 {
     let pixels = estimates.iter().map(|estimate| estimate.irradiance / std::f32::consts::PI).collect();
     ColourPicture { width: estimates.len() as u32, height: 1, pixels }.usual_exposure()
 }

@@ -56,22 +56,22 @@ mod hidden_points;
 mod lighting;
 mod names;
 mod objects;
-pub mod original;
+pub(crate) mod original;
 pub mod pages;
-pub mod part;
+pub(crate) mod part;
 mod raster;
 mod sides;
 mod texels;
-pub mod unwrap;
+pub(crate) mod unwrap;
 
 use std::collections::BTreeMap;
 
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
-pub use files::{IntoFile, Written, names, preview, write};
-pub use lighting::{estimates, usual_density, usual_exposure};
-pub use texels::{CoveredTexel, SurfacePoint};
+pub(crate) use files::{IntoFile, Written, names, preview, write};
+pub(crate) use lighting::{estimates, usual_density, usual_exposure};
+pub(crate) use texels::{CoveredTexel, SurfacePoint};
 
 use crate::engine::error::bound::ErrorSource;
 use crate::error::{Error, Result};
@@ -81,17 +81,17 @@ use crate::scene::{Mesh, Scene};
 use crate::text::some_of;
 
 /// Points in which each texel is looked at.
-pub const PHASE_COUNT: usize = 4;
+pub(crate) const PHASE_COUNT: usize = 4;
 /// Longest side of a map, texels.
 pub const MAX_SIDE: u32 = 4096;
 /// Shortest side of a map, texels.
-pub const MIN_SIDE: u32 = 1;
+pub(crate) const MIN_SIDE: u32 = 1;
 /// Texels of all maps together; a covered one takes about 100 bytes here and as much again as a result.
 const MAX_TEXELS: u64 = 1 << 26;
 
 /// Where the lightmaps of a scene lie on its surfaces.
 #[derive(Debug, Clone)]
-pub struct Layout {
+pub(crate) struct Layout {
     /// One a mesh of the scene; none where it is a mirror or a dielectric.
     pub meshes: Vec<Option<MeshLightmap>>,
     /// What has a map.
@@ -102,7 +102,7 @@ pub struct Layout {
 
 /// Meshes that share a map, without its light.
 #[derive(Debug, Clone)]
-pub struct Object {
+pub(crate) struct Object {
     pub name: String,
     /// Their indices in the scene.
     pub meshes: Vec<usize>,
@@ -122,7 +122,7 @@ pub struct Object {
 
 /// The part of a map that is of one mesh.
 #[derive(Debug, Clone)]
-pub struct MeshLightmap {
+pub(crate) struct MeshLightmap {
     /// The scene's mesh: the same triangles in the same order, vertices doubled along seams.
     pub mesh: Mesh,
     /// Lightmap coordinates from 0 to 1, one a vertex of `mesh`.
@@ -140,7 +140,7 @@ pub struct MeshLightmap {
 
 /// A point of a surface whose irradiance is wanted.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TexelSample {
+pub(crate) struct TexelSample {
     /// Metres, world.
     pub position: DVec3,
     /// Unit normal of the triangle's side that is baked.
@@ -151,7 +151,7 @@ pub struct TexelSample {
 
 /// What was found for one texel, W/m2.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct TexelEstimate {
+pub(crate) struct TexelEstimate {
     pub irradiance: Vec3,
     pub standard_error: Vec3,
     /// The most that light which was not met may add to any channel.
@@ -160,7 +160,7 @@ pub struct TexelEstimate {
 
 /// The lightmap of one object, row by row, gutters filled.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Map {
+pub(crate) struct Map {
     /// Index of the object in the layout.
     pub object: usize,
     pub width: u32,
@@ -177,13 +177,13 @@ pub struct Map {
 
 impl Layout {
     /// Unwraps what needs it and finds the covered texels.
-    pub fn new(scene: &Scene, texels_per_metre: f64) -> Result<Layout> {
+    pub(crate) fn new(scene: &Scene, texels_per_metre: f64) -> Result<Layout> {
         Layout::of_file(scene, None, texels_per_metre, MAX_SIDE)
     }
 
     /// The same for a scene from a file, which may have more sets of coordinates than a scene. No side of a map is longer than
     /// `max_side`.
-    pub fn of_file(scene: &Scene, file: Option<&File>, texels_per_metre: f64, max_side: u32) -> Result<Layout> {
+    pub(crate) fn of_file(scene: &Scene, file: Option<&File>, texels_per_metre: f64, max_side: u32) -> Result<Layout> {
         const OPTION: &str = "texels_per_metre";
         if !(texels_per_metre.is_finite() && texels_per_metre > 0.0) {
             return Err(Error::setting(OPTION, texels_per_metre, "must be above 0"));
@@ -208,28 +208,28 @@ impl Layout {
     }
 
     /// The maps in the order of the scene's meshes, with the meshes' indices.
-    pub fn lightmaps(&self) -> impl Iterator<Item = (usize, &MeshLightmap)> {
+    pub(crate) fn lightmaps(&self) -> impl Iterator<Item = (usize, &MeshLightmap)> {
         self.meshes.iter().enumerate().filter_map(|(mesh, lightmap)| lightmap.as_ref().map(|lightmap| (mesh, lightmap)))
     }
 
     /// Covered texels of all maps: the length of every phase.
-    pub fn texel_count(&self) -> usize {
+    pub(crate) fn texel_count(&self) -> usize {
         self.lightmaps().map(|(_, lightmap)| lightmap.texels.len()).sum()
     }
 
     /// One point of every covered texel: map after map, row by row. Phases are numbered from 0 to
     /// [`PHASE_COUNT`]; a texel with fewer points has some in several phases.
-    pub fn phase(&self, phase: usize) -> Vec<TexelSample> {
+    pub(crate) fn phase(&self, phase: usize) -> Vec<TexelSample> {
         self.lightmaps().flat_map(|(_, lightmap)| lightmap.texels.iter().map(move |texel| lightmap.sample(&texel.points[phase]))).collect()
     }
 
-    pub fn phases(&self) -> Vec<Vec<TexelSample>> {
+    pub(crate) fn phases(&self) -> Vec<Vec<TexelSample>> {
         (0..PHASE_COUNT).map(|phase| self.phase(phase)).collect()
     }
 
     /// Maps with filled gutters from what was found for the covered texels, in the order of
     /// [`Layout::phase`]; `source` is that of the errors.
-    pub fn maps(&self, results: &[TexelEstimate], source: ErrorSource) -> Vec<Map> {
+    pub(crate) fn maps(&self, results: &[TexelEstimate], source: ErrorSource) -> Vec<Map> {
         assert_eq!(results.len(), self.texel_count(), "one result a covered texel");
         let mut first = vec![0; self.meshes.len()];
         let mut count = 0;

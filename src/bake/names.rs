@@ -5,22 +5,22 @@ use std::collections::{HashMap, HashSet};
 use super::Layout;
 use crate::scene::Scene;
 
-pub const GEOMETRY: &str = "scene.bin";
-pub const RADIANCE_SCENE: &str = "scene.gltf";
-pub const LIGHTMAP_SCENE: &str = "scene_lightmap.gltf";
+pub(crate) const GEOMETRY: &str = "scene.bin";
+pub(crate) const RADIANCE_SCENE: &str = "scene.gltf";
+pub(crate) const LIGHTMAP_SCENE: &str = "scene_lightmap.gltf";
 
-pub const IRRADIANCE: &str = "_irradiance.exr";
-pub const ERROR: &str = "_error.exr";
-pub const PREVIEW: &str = ".png";
-pub const RADIANCE: &str = "_radiance.png";
-pub const LIGHTMAP: &str = "_lightmap.png";
-pub const ENDINGS: [&str; 5] = [IRRADIANCE, ERROR, PREVIEW, RADIANCE, LIGHTMAP];
+pub(crate) const IRRADIANCE: &str = "_irradiance.exr";
+pub(crate) const ERROR: &str = "_error.exr";
+pub(crate) const PREVIEW: &str = ".png";
+pub(crate) const RADIANCE: &str = "_radiance.png";
+pub(crate) const LIGHTMAP: &str = "_lightmap.png";
+pub(crate) const ENDINGS: [&str; 5] = [IRRADIANCE, ERROR, PREVIEW, RADIANCE, LIGHTMAP];
 
 /// Endings of the two files of a page.
-pub const PAGE_ENDINGS: [&str; 2] = [".exr", "_error.exr"];
+pub(crate) const PAGE_ENDINGS: [&str; 2] = [".exr", "_error.exr"];
 
 /// File names, each once even where case does not count.
-pub struct Names {
+pub(crate) struct Names {
     /// One an object.
     stems: Vec<String>,
     /// The object of each mesh that has a map.
@@ -29,7 +29,7 @@ pub struct Names {
 
 impl Names {
     /// Those of a built-in scene, one an object.
-    pub fn new(scene: &Scene, layout: &Layout) -> Names {
+    pub(super) fn new(scene: &Scene, layout: &Layout) -> Names {
         let mut taken: HashSet<String> = [GEOMETRY, RADIANCE_SCENE, LIGHTMAP_SCENE].map(str::to_owned).into();
         taken.extend((0..scene.textures.len()).map(texture_name));
         let stems = stems(layout.objects.iter().map(|object| object.name.as_str()), &ENDINGS, taken);
@@ -41,22 +41,22 @@ impl Names {
     }
 
     /// Of an object.
-    pub fn stem(&self, object: usize) -> &str {
+    pub(super) fn stem(&self, object: usize) -> &str {
         &self.stems[object]
     }
 
     /// Of a mesh that has a map.
-    pub fn radiance(&self, mesh: usize) -> String {
+    pub(super) fn radiance(&self, mesh: usize) -> String {
         format!("{}{RADIANCE}", self.stem(self.of_meshes[mesh]))
     }
 
-    pub fn lightmap(&self, mesh: usize) -> String {
+    pub(super) fn lightmap(&self, mesh: usize) -> String {
         format!("{}{LIGHTMAP}", self.stem(self.of_meshes[mesh]))
     }
 }
 
 /// Beginnings of file names, so that with each ending they are unlike all others and those taken, which are lower case.
-pub fn stems<'a>(wanted: impl Iterator<Item = &'a str>, endings: &[&str], mut taken: HashSet<String>) -> Vec<String> {
+pub(crate) fn stems<'a>(wanted: impl Iterator<Item = &'a str>, endings: &[&str], mut taken: HashSet<String>) -> Vec<String> {
     // Those of one name are told apart by numbers that go on, so that many of them cost no search.
     let mut counts = HashMap::new();
     let mut unlike = |wanted: &str| {
@@ -75,7 +75,7 @@ pub fn stems<'a>(wanted: impl Iterator<Item = &'a str>, endings: &[&str], mut ta
     wanted.map(&mut unlike).collect()
 }
 
-pub fn texture_name(texture: usize) -> String {
+pub(crate) fn texture_name(texture: usize) -> String {
     format!("texture_{texture}.png")
 }
 

@@ -13,7 +13,7 @@ use crate::scene::gltf::source::File;
 use crate::scene::{Mesh, Scene};
 
 /// An object with coordinates.
-pub struct Unwrapped {
+pub(crate) struct Unwrapped {
     pub name: String,
     pub meshes: Vec<usize>,
     pub charts: unwrap::Unwrapped,
@@ -26,7 +26,7 @@ const ALIKE: f64 = 1.1;
 const LARGEST: f64 = 4.0;
 
 /// Objects with their maps' coordinates, in the order of the scene.
-pub fn unwrap(scene: &Scene, file: Option<&File>, texels_per_metre: f64, max_side: u32) -> Result<Vec<Unwrapped>> {
+pub(crate) fn unwrap(scene: &Scene, file: Option<&File>, texels_per_metre: f64, max_side: u32) -> Result<Vec<Unwrapped>> {
     let objects = objects(scene);
     let parts = |object: usize| -> Vec<&Mesh> { objects[object].iter().map(|mesh| &scene.meshes[*mesh]).collect() };
     let refuse = |object: usize, reason: String| Error::Scene {
@@ -192,7 +192,7 @@ impl unwrap::Unwrapped {
 
 impl Unwrapped {
     /// With the texels that it covers.
-    pub fn with_texels(self, scene: &Scene) -> (Object, Vec<MeshLightmap>) {
+    pub(super) fn with_texels(self, scene: &Scene) -> (Object, Vec<MeshLightmap>) {
         let Unwrapped { name, meshes, charts, charts_of } = self;
         let unwrap::Unwrapped { parts, width, height, set, offset, scale, .. } = charts;
         let lightmap = |(part, mesh): (Part, &usize)| {

@@ -29,13 +29,13 @@ use crate::scene::mesh::Source;
 use crate::text::some_of;
 
 /// The member of a node's `extras` that says which lightmap it has.
-pub const KEY: &str = "photonmill_lightmap";
+pub(crate) const KEY: &str = "photonmill_lightmap";
 
 /// Primitives that use less of their vertices than that, as many may share one list, get a list of their own.
 const LEAST_USED: f64 = 0.5;
 
 /// A file with lightmap coordinates.
-pub struct Extended {
+pub(crate) struct Extended {
     pub json: Value,
     /// What is added to the binary part of a `.glb` file, or what a file beside it holds.
     pub bytes: Vec<u8>,
@@ -43,7 +43,14 @@ pub struct Extended {
 }
 
 /// Adds coordinates and what nodes say of their lightmaps. `pictures` and `errors` are files' names, one a page.
-pub fn extended(file: &File, scene: &Scene, layout: &Layout, pages: &Pages, pictures: &[String], errors: &[String]) -> Result<Extended> {
+pub(crate) fn extended(
+    file: &File,
+    scene: &Scene,
+    layout: &Layout,
+    pages: &Pages,
+    pictures: &[String],
+    errors: &[String],
+) -> Result<Extended> {
     let buffer = new_buffer(file);
     let own_part = file.binary.as_ref().filter(|_| file.is_binary && buffer == 0);
     let start = own_part.map_or(0, |binary| binary.len().next_multiple_of(4));
@@ -107,7 +114,7 @@ pub fn extended(file: &File, scene: &Scene, layout: &Layout, pages: &Pages, pict
 }
 
 /// Names and contents: the file, and before it the added buffer where that has no place in the file's binary part.
-pub fn files(file: &File, extended: &Extended, name: &str, buffer_name: &str) -> Vec<(String, Vec<u8>)> {
+pub(crate) fn files(file: &File, extended: &Extended, name: &str, buffer_name: &str) -> Vec<(String, Vec<u8>)> {
     let mut json = extended.json.clone();
     let mut binary = file.binary.clone().unwrap_or_default();
     let mut beside = None;

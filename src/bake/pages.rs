@@ -7,7 +7,7 @@ use super::unwrap::PADDING;
 use super::{Layout, MAX_SIDE, Map, Object};
 
 /// More objects than that share pages unless the user says otherwise.
-pub const MOST_PICTURES: usize = 8;
+pub(crate) const MOST_PICTURES: usize = 8;
 /// Smallest page, texels.
 pub const MIN_PAGE: u32 = 64;
 
@@ -24,7 +24,7 @@ pub enum Atlas {
 
 /// Which part of which page is whose map.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Pages {
+pub(crate) struct Pages {
     /// Width and height of each page, texels.
     pub sizes: Vec<[u32; 2]>,
     /// One an object.
@@ -34,7 +34,7 @@ pub struct Pages {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Place {
+pub(crate) struct Place {
     pub page: usize,
     /// The map's first texel.
     pub x: u32,
@@ -42,7 +42,7 @@ pub struct Place {
 }
 
 /// What the texels of a page hold.
-pub struct Picture {
+pub(crate) struct Picture {
     pub width: u32,
     pub height: u32,
     pub irradiance: Vec<Vec3>,
@@ -62,7 +62,7 @@ impl Atlas {
 }
 
 impl Pages {
-    pub fn new(layout: &Layout, atlas: Atlas) -> Pages {
+    pub(crate) fn new(layout: &Layout, atlas: Atlas) -> Pages {
         let objects = &layout.objects;
         match atlas {
             Atlas::Size(size) => Pages::packed(objects, size),
@@ -116,7 +116,7 @@ impl Pages {
     }
 
     /// What takes coordinates of an object's set to those of its page: offset + scale * uv.
-    pub fn transform(&self, layout: &Layout, object: usize) -> (DVec2, DVec2) {
+    pub(crate) fn transform(&self, layout: &Layout, object: usize) -> (DVec2, DVec2) {
         let Place { page, x, y } = self.places[object];
         let Object { width, height, offset, scale, .. } = layout.objects[object];
         let [page_width, page_height] = self.sizes[page].map(f64::from);
@@ -125,7 +125,7 @@ impl Pages {
     }
 
     /// The pages with the maps' values. What belongs to no map is black.
-    pub fn pictures(&self, maps: &[Map]) -> Vec<Picture> {
+    pub(crate) fn pictures(&self, maps: &[Map]) -> Vec<Picture> {
         let blank = |[width, height]: &[u32; 2]| {
             let black = vec![Vec3::ZERO; *width as usize * *height as usize];
             Picture { width: *width, height: *height, irradiance: black.clone(), error: black.clone(), unseen: black }

@@ -6,7 +6,7 @@ use crate::scene::Mesh;
 
 /// One mesh of an object with lightmap coordinates.
 #[derive(Debug, Clone)]
-pub struct Part {
+pub(crate) struct Part {
     /// The vertex that each vertex was before vertices were doubled along seams; empty where none was.
     pub vertices: Vec<u32>,
     /// The same triangles in the same order.
@@ -17,7 +17,7 @@ pub struct Part {
 
 impl Part {
     /// A mesh with vertices doubled.
-    pub fn of(&self, mesh: &Mesh) -> Mesh {
+    pub(crate) fn of(&self, mesh: &Mesh) -> Mesh {
         if self.vertices.is_empty() {
             return mesh.clone();
         }

@@ -6,14 +6,14 @@ use glam::{DVec2, DVec3};
 
 /// Point (column, row) of a lattice lies at ((column + 1/2) / columns, (row + 1/2) / rows).
 #[derive(Debug, Clone, Copy)]
-pub struct Lattice {
+pub(crate) struct Lattice {
     pub columns: u32,
     pub rows: u32,
 }
 
 /// A triangle in lattice units, its barycentric weights linear in x and y.
 #[derive(Debug, Clone, Copy)]
-pub struct Triangle {
+pub(crate) struct Triangle {
     along_x: DVec3,
     along_y: DVec3,
     at_origin: DVec3,
@@ -28,7 +28,7 @@ const EDGE: f64 = 1e-6;
 
 impl Lattice {
     /// `None` for a triangle that rounding leaves no area.
-    pub fn triangle(self, corners: [DVec2; 3]) -> Option<Triangle> {
+    pub(super) fn triangle(self, corners: [DVec2; 3]) -> Option<Triangle> {
         let [a, b, c] = corners.map(|corner| corner * DVec2::new(self.columns.into(), self.rows.into()) - 0.5);
         let doubled_area = (b - a).perp_dot(c - a);
         let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
@@ -54,12 +54,12 @@ impl Lattice {
 
 impl Triangle {
     /// Rows that may hold points of the triangle.
-    pub fn rows(&self) -> Range<u32> {
+    pub(super) fn rows(&self) -> Range<u32> {
         integers_within(self.low.y, self.high.y, self.lattice.rows)
     }
 
     /// Columns of the row's points within the triangle.
-    pub fn columns(&self, row: u32) -> Range<u32> {
+    pub(super) fn columns(&self, row: u32) -> Range<u32> {
         let (mut low, mut high) = (self.low.x, self.high.x);
         let at_row = self.along_y * f64::from(row) + self.at_origin;
         for corner in 0..3 {
@@ -78,12 +78,12 @@ impl Triangle {
     }
 
     /// Whether any point of the lattice lies within.
-    pub fn is_caught(&self) -> bool {
+    pub(super) fn is_caught(&self) -> bool {
         self.rows().any(|row| !self.columns(row).is_empty())
     }
 
     /// Barycentric weights of a point; they sum to one and none is negative.
-    pub fn weights(&self, column: u32, row: u32) -> DVec3 {
+    pub(super) fn weights(&self, column: u32, row: u32) -> DVec3 {
         let weights = (self.along_x * f64::from(column) + self.along_y * f64::from(row) + self.at_origin).max(DVec3::ZERO);
         weights / weights.element_sum()
     }

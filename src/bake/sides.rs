@@ -26,7 +26,7 @@ const MOST_PARTS: usize = 256;
 
 /// What was found of the sides of a mesh.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Sides {
+pub(crate) struct Sides {
     /// Triangles whose back is baked; empty where none is.
     pub turned: Vec<bool>,
     /// Whether a part of one-sided faces looks inwards, where no light comes.
@@ -41,7 +41,7 @@ struct Part {
 }
 
 /// The sides of some meshes of a scene, by their indices.
-pub fn of(scene: &Scene, meshes: &[usize]) -> HashMap<usize, Sides> {
+pub(crate) fn of(scene: &Scene, meshes: &[usize]) -> HashMap<usize, Sides> {
     let parts: Vec<Part> = meshes.iter().flat_map(|mesh| parts_in_question(scene, *mesh)).collect();
     let mut found: HashMap<usize, Sides> = HashMap::new();
     if parts.is_empty() {
@@ -143,7 +143,7 @@ fn connected(mesh: &Mesh) -> Vec<Vec<usize>> {
 
 /// Of each triangle 1 where it is of a closed part that faces outwards, -1 where of one that faces inwards, else 0. One that has a
 /// camera in its box may be a room.
-pub fn closed_parts(scene: &Scene, mesh: &Mesh) -> Vec<f64> {
+pub(crate) fn closed_parts(scene: &Scene, mesh: &Mesh) -> Vec<f64> {
     let mut closed = vec![0.0; mesh.triangles.len()];
     for triangles in connected(mesh) {
         let (low, high) = bounds_of(triangles.iter().flat_map(|triangle| mesh.corners(*triangle)));

@@ -12,14 +12,14 @@ use crate::scene::Mesh;
 
 /// A point of a mesh, by the weights of its triangle's second and third corner.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SurfacePoint {
+pub(crate) struct SurfacePoint {
     pub triangle: u32,
     pub weights: [f32; 2],
 }
 
 /// A texel that a triangle covers, and one point of it a phase.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CoveredTexel {
+pub(crate) struct CoveredTexel {
     pub x: u32,
     pub y: u32,
     pub points: [SurfacePoint; PHASE_COUNT],
@@ -41,7 +41,7 @@ const NONE: u32 = u32::MAX;
 /// Texels of the map that triangles cover, row by row. A texel is covered if one of its sub-positions
 /// lies in a triangle; a triangle so small that it holds none covers the texel of its centroid. So
 /// every triangle lies in some covered texel.
-pub fn covered(mesh: &Mesh, uvs: &[DVec2], width: u32, height: u32) -> Vec<CoveredTexel> {
+pub(crate) fn covered(mesh: &Mesh, uvs: &[DVec2], width: u32, height: u32) -> Vec<CoveredTexel> {
     let lattice = Lattice { columns: SUB * width, rows: SUB * height };
     let corners = |triangle: usize| mesh.triangles[triangle].map(|vertex| uvs[vertex as usize]);
     let triangles: Vec<Option<Triangle>> =
@@ -134,16 +134,16 @@ impl SurfacePoint {
     }
 
     /// Texture coordinates; zero where the mesh has none.
-    pub fn uv(&self, mesh: &Mesh, uv_set: usize) -> DVec2 {
+    pub(crate) fn uv(&self, mesh: &Mesh, uv_set: usize) -> DVec2 {
         if mesh.uvs[uv_set].is_empty() { DVec2::ZERO } else { self.mix(mesh, &mesh.uvs[uv_set]) }
     }
 
     /// What multiplies the material's base colour.
-    pub fn colour(&self, mesh: &Mesh) -> DVec3 {
+    pub(crate) fn colour(&self, mesh: &Mesh) -> DVec3 {
         if mesh.colours.is_empty() { DVec3::ONE } else { self.mix(mesh, &mesh.colours) }
     }
 
-    pub fn sample(&self, mesh: &Mesh) -> TexelSample {
+    pub(crate) fn sample(&self, mesh: &Mesh) -> TexelSample {
         let geometric_normal = mesh.normal(self.triangle as usize);
         let shading_normal = match mesh.normals.is_empty() {
             true => geometric_normal,

@@ -11,7 +11,7 @@ use crate::scene::{Mesh, bounds_of};
 
 /// The meshes of an object with lightmap coordinates that share one map.
 #[derive(Debug, Clone)]
-pub struct Unwrapped {
+pub(crate) struct Unwrapped {
     pub parts: Vec<Part>,
     /// Texels.
     pub width: u32,
@@ -28,7 +28,7 @@ pub struct Unwrapped {
 }
 
 /// Free texels around each chart; so charts are twice as far apart.
-pub const PADDING: u32 = 2;
+pub(crate) const PADDING: u32 = 2;
 /// A chart is split where one of its triangles gets more (or less) texels than its share by this
 /// factor.
 const MAX_DISTORTION: f32 = 2.0;
@@ -40,7 +40,12 @@ const CHART_TRIANGLES: usize = 1500;
 
 /// The first of the sets that can be used, else new charts. `sets`: numbers of sets, and coordinates for each mesh. Fails with
 /// what is wrong with the meshes.
-pub fn unwrap(meshes: &[&Mesh], sets: &[(usize, Vec<Vec<DVec2>>)], texels_per_metre: f64, max_side: u32) -> Result<Unwrapped, String> {
+pub(crate) fn unwrap(
+    meshes: &[&Mesh],
+    sets: &[(usize, Vec<Vec<DVec2>>)],
+    texels_per_metre: f64,
+    max_side: u32,
+) -> Result<Unwrapped, String> {
     let mut refused = None;
     for (set, uvs) in sets {
         match existing_set(meshes, *set, uvs, texels_per_metre, max_side) {

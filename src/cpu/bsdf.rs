@@ -7,7 +7,7 @@ use crate::records::Wall;
 use crate::settings::PhongDirection;
 
 /// max(cosine, 0)^shininess, with 1 for shininess 0 and nothing for a direction that points away.
-pub fn phong_lobe(cosine: f32, shininess: f32) -> f32 {
+pub(crate) fn phong_lobe(cosine: f32, shininess: f32) -> f32 {
     if cosine <= 0.0 {
         return 0.0;
     }
@@ -18,7 +18,7 @@ pub fn phong_lobe(cosine: f32, shininess: f32) -> f32 {
 }
 
 /// What a stored photon weighs at the eye: 1 on a Lambertian wall (shininess below 0).
-pub fn view_weight(wall: &Wall, position: Vec3, arriving: Vec3, reflected: Vec3, eye: Vec3, direction: PhongDirection) -> f32 {
+pub(crate) fn view_weight(wall: &Wall, position: Vec3, arriving: Vec3, reflected: Vec3, eye: Vec3, direction: PhongDirection) -> f32 {
     if wall.shininess < 0.0 {
         return 1.0;
     }

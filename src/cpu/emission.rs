@@ -8,7 +8,7 @@ use crate::settings::EmissionLaw;
 
 /// Position and direction of a photon; `u`: disc radius, disc angle, cosine, azimuth.
 #[inline(always)]
-pub fn emit_from_disc(light: &DiscLight, wall: &Wall, law: EmissionLaw, u: [f32; 4]) -> (Vec3, Vec3) {
+pub(crate) fn emit_from_disc(light: &DiscLight, wall: &Wall, law: EmissionLaw, u: [f32; 4]) -> (Vec3, Vec3) {
     let sin_cos = sin_cos_turns(u[1]);
     let distance_from_centre = light.radius * u[0].sqrt();
     let offset = (distance_from_centre * sin_cos.y, distance_from_centre * sin_cos.x);

@@ -10,12 +10,12 @@ use crate::records::Point;
 use crate::settings::Sums;
 
 /// Adds to `sums` what each point receives from a list of photons, stepping through all of it.
-pub fn gather_brute(plan: &RoomPlan, photons: &[Photon], sums: &mut [u64]) {
+pub(crate) fn gather_brute(plan: &RoomPlan, photons: &[Photon], sums: &mut [u64]) {
     gather(plan, sums, |_| std::iter::once(photons));
 }
 
 /// The same from the leaves of a kd-tree in reach of each point.
-pub fn gather_tree(plan: &RoomPlan, tree: &Tree, sums: &mut [u64]) {
+pub(crate) fn gather_tree(plan: &RoomPlan, tree: &Tree, sums: &mut [u64]) {
     let radius_squared = (plan.settings.radius * plan.settings.radius) as f32;
     gather(plan, sums, |point| {
         let mut walk = tree.walk(point);

@@ -2,7 +2,7 @@
 //! them; quotients and roots are rounded to nearest on a CPU anyway.
 
 /// 2^x to 2 units in the last place, 0 below 2^-125.
-pub fn exp2(x: f32) -> f32 {
+pub(crate) fn exp2(x: f32) -> f32 {
     if x <= -125.0 || x >= 128.0 {
         return if x < 0.0 { 0.0 } else { f32::INFINITY };
     }
@@ -14,7 +14,7 @@ pub fn exp2(x: f32) -> f32 {
 }
 
 /// log2(x) to 3 units in the last place, of a normal x above 0.
-pub fn log2(x: f32) -> f32 {
+pub(crate) fn log2(x: f32) -> f32 {
     const LEADING_BIT: u32 = 1 << 23;
     let exponent = (x.to_bits() >> 23) as i32 - 127;
     let mantissa = f32::from_bits((x.to_bits() & (LEADING_BIT - 1)) | 1.0f32.to_bits());
@@ -27,7 +27,7 @@ pub fn log2(x: f32) -> f32 {
 }
 
 /// Angle of (x, y) in [-pi, pi], to 3 units in the last place; 0 for the origin.
-pub fn angle_of(y: f32, x: f32) -> f32 {
+pub(crate) fn angle_of(y: f32, x: f32) -> f32 {
     use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
     let (small, large) = (x.abs().min(y.abs()), x.abs().max(y.abs()));
     if large < f32::MIN_POSITIVE {

@@ -3,13 +3,13 @@
 //! GLSL ones, operation by operation in f32, and judge them in tests. Two stages go their own way to the same
 //! bits: [`trace`] takes a block of photons from emission to their end, and [`splat`] needs no index.
 
-pub mod bsdf;
-pub mod emission;
-pub mod estimate;
-pub mod math;
-pub mod nearest;
-pub mod room;
-pub mod sampling;
-pub mod splat;
-pub mod trace;
-pub mod tree;
+pub(crate) mod bsdf;
+pub(crate) mod emission;
+pub(crate) mod estimate;
+pub(crate) mod math;
+pub(crate) mod nearest;
+pub(crate) mod room;
+pub(crate) mod sampling;
+pub(crate) mod splat;
+pub(crate) mod trace;
+pub(crate) mod tree;

@@ -15,7 +15,7 @@ use crate::scene::room::RoomScene;
 const LEAST_DISC: f32 = 1.0 / 1_048_576.0;
 
 /// Adds to `sums` what the `count` photons nearest to each point say that the disc of the full radius holds.
-pub fn gather(plan: &RoomPlan, scene: &RoomScene, tree: &Tree, count: u32, sums: &mut [u64]) {
+pub(crate) fn gather(plan: &RoomPlan, scene: &RoomScene, tree: &Tree, count: u32, sums: &mut [u64]) {
     let room = scene.room_record();
     let one_point = |(point, sums): (&Point, &mut [u64])| {
         sums.iter_mut().zip(of_point(plan, &room, tree, count as usize, point)).for_each(|(sum, amount)| *sum += amount);
@@ -80,7 +80,7 @@ fn quadrant_area(a: f32, b: f32) -> f32 {
 }
 
 /// Area on its wall of the disc around a point, in squares of the radius: pi where all of it is.
-pub fn covered_disc(point: &Point, radius: f32, room: &Room) -> f32 {
+pub(crate) fn covered_disc(point: &Point, radius: f32, room: &Room) -> f32 {
     let wall = point.wall as usize;
     let (s, t) = ((wall / 2 + 1) % 3, (wall / 2 + 2) % 3);
     let scale = 1.0 / radius;

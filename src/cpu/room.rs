@@ -5,14 +5,14 @@ use glam::{BVec3, Vec3};
 use crate::records::Room;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Hit {
+pub(crate) struct Hit {
     pub position: Vec3,
     pub wall: u32,
 }
 
 /// Without a branch or an index that depends on the path, so that loops over paths become vectors.
 #[inline(always)]
-pub fn intersect_room(room: &Room, position: Vec3, direction: Vec3, on_wall: u32) -> Hit {
+pub(crate) fn intersect_room(room: &Room, position: Vec3, direction: Vec3, on_wall: u32) -> Hit {
     let forward = direction.cmpgt(Vec3::ZERO);
     let planes = Vec3::select(forward, room.max_corner, room.min_corner);
     let [x, y, z] = [u32::from(forward.x), 2 + u32::from(forward.y), 4 + u32::from(forward.z)];
@@ -32,7 +32,7 @@ pub fn intersect_room(room: &Room, position: Vec3, direction: Vec3, on_wall: u32
 
 /// Tangent, bitangent and normal of a wall, into the room: the two axes after its own, and that.
 #[inline(always)]
-pub fn wall_frame(wall: u32) -> [Vec3; 3] {
+pub(crate) fn wall_frame(wall: u32) -> [Vec3; 3] {
     let is_own = [wall / 2 == 0, wall / 2 == 1, wall / 2 == 2].map(|own| if own { 1.0 } else { 0.0 });
     let [x, y, z] = is_own;
     let inward = if wall % 2 == 1 { -1.0 } else { 1.0 };

@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 
 /// (sin, cos) of `turns` full turns, turns in [0, 1).
 #[inline(always)]
-pub fn sin_cos_turns(turns: f32) -> Vec2 {
+pub(crate) fn sin_cos_turns(turns: f32) -> Vec2 {
     let quarter = (4.0 * turns).round_ties_even();
     let z = std::f32::consts::TAU * (turns - 0.25 * quarter);
     let z2 = z * z;
@@ -27,20 +27,20 @@ const LEAST: f32 = 1.0 / 33_554_432.0;
 
 /// pdf = cosine / pi.
 #[inline(always)]
-pub fn sample_cosine_hemisphere(u: f32, azimuth: f32) -> Vec3 {
+pub(crate) fn sample_cosine_hemisphere(u: f32, azimuth: f32) -> Vec3 {
     let u = u.max(LEAST);
     direction_at(u.sqrt(), 1.0 - u, azimuth)
 }
 
 /// pdf = 1 / (2 pi).
 #[inline(always)]
-pub fn sample_uniform_hemisphere(u: f32, azimuth: f32) -> Vec3 {
+pub(crate) fn sample_uniform_hemisphere(u: f32, azimuth: f32) -> Vec3 {
     let u = u.max(LEAST);
     direction_at(u, (1.0 - u) * (1.0 + u), azimuth)
 }
 
 /// From the frame of a wall (tangent, bitangent, normal) to world axes.
 #[inline(always)]
-pub fn to_world(local: Vec3, [tangent, bitangent, normal]: [Vec3; 3]) -> Vec3 {
+pub(crate) fn to_world(local: Vec3, [tangent, bitangent, normal]: [Vec3; 3]) -> Vec3 {
     local.x * tangent + local.y * bitangent + local.z * normal
 }

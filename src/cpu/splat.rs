@@ -18,7 +18,7 @@ use crate::records::Point;
 use crate::scene::room::face_axis;
 
 /// What photons add to the texels of all walls.
-pub struct Splats<'a> {
+pub(crate) struct Splats<'a> {
     plan: &'a RoomPlan,
     meshes: [Option<Mesh<'a>>; FACE_COUNT as usize],
     /// By how much the running sum of a row grows at each texel and behind the last: for each task that adds its own, so
@@ -59,7 +59,7 @@ struct Lattice {
 
 impl<'a> Splats<'a> {
     /// For as many tasks as the current pool has threads.
-    pub fn new(plan: &'a RoomPlan, vectors: Arch) -> Splats<'a> {
+    pub(crate) fn new(plan: &'a RoomPlan, vectors: Arch) -> Splats<'a> {
         let mesh = plan.settings.mesh as usize;
         let meshes = std::array::from_fn(|face| {
             let first = plan.points.iter().position(|point| point.wall as usize == face)?;
@@ -71,7 +71,7 @@ impl<'a> Splats<'a> {
     }
 
     /// Adds photons.
-    pub fn add(&mut self, blocks: &[Block]) {
+    pub(crate) fn add(&mut self, blocks: &[Block]) {
         let (plan, meshes, vectors, next_block) = (self.plan, &self.meshes, self.vectors, AtomicUsize::new(0));
         let add = |steps: &mut Vec<u64>| vectors.dispatch(AddPhotons { plan, meshes, blocks, next_block: &next_block, steps });
         if let [steps] = self.steps.as_mut_slice() {
@@ -82,7 +82,7 @@ impl<'a> Splats<'a> {
     }
 
     /// Adds to the film's sums what has come together, and forgets it.
-    pub fn flush(&mut self, sums: &mut [u64]) {
+    pub(crate) fn flush(&mut self, sums: &mut [u64]) {
         let channels = self.plan.channel_count as usize;
         let columns = self.plan.settings.mesh as usize;
         let row_length = (columns + 1) * channels;

@@ -25,7 +25,7 @@ use crate::rng::{self, Rng, words};
 use crate::scene::room::RoomScene;
 
 /// The scene and settings as the tracing functions read them.
-pub struct Tracer<'a> {
+pub(crate) struct Tracer<'a> {
     plan: &'a RoomPlan,
     room: Room,
     walls: [Wall; FACE_COUNT as usize],
@@ -47,7 +47,7 @@ const NO_WORDS: Column<u32> = [[0; LANES]; BLOCK / LANES];
 
 /// What became of some photons of one light.
 #[derive(Default)]
-pub struct Block {
+pub(crate) struct Block {
     /// By bounce, and by number within a bounce.
     pub photons: Vec<Photon>,
     /// Bounce by bounce.
@@ -75,12 +75,12 @@ struct Hits {
 }
 
 impl<'a> Tracer<'a> {
-    pub fn new(scene: &RoomScene, plan: &'a RoomPlan) -> Tracer<'a> {
+    pub(crate) fn new(scene: &RoomScene, plan: &'a RoomPlan) -> Tracer<'a> {
         Tracer::with_vectors(scene, plan, Arch::new())
     }
 
     /// For vectors of a given kind.
-    pub fn with_vectors(scene: &RoomScene, plan: &'a RoomPlan, vectors: Arch) -> Tracer<'a> {
+    pub(crate) fn with_vectors(scene: &RoomScene, plan: &'a RoomPlan, vectors: Arch) -> Tracer<'a> {
         let walls: [Wall; FACE_COUNT as usize] = scene.wall_records().try_into().expect("a room has six faces");
         Tracer {
             plan,
@@ -94,7 +94,7 @@ impl<'a> Tracer<'a> {
 
     /// Photons of a chunk, on the threads of the current pool. `blocks` are filled anew in their old memory: the same in
     /// the same order, whatever the threads.
-    pub fn trace(&self, round: u32, ranges: &[EmissionRange], blocks: &mut Vec<Block>) {
+    pub(crate) fn trace(&self, round: u32, ranges: &[EmissionRange], blocks: &mut Vec<Block>) {
         let key = self.plan.streams().key(round);
         let parts: Vec<EmissionRange> = ranges.iter().flat_map(parts).collect();
         blocks.resize_with(parts.len(), Block::default);
@@ -109,7 +109,7 @@ impl<'a> Tracer<'a> {
     }
 
     /// Paths of a chunk as they leave their lights.
-    pub fn emit(&self, round: u32, ranges: &[EmissionRange]) -> Vec<Path> {
+    pub(crate) fn emit(&self, round: u32, ranges: &[EmissionRange]) -> Vec<Path> {
         let key = self.plan.streams().key(round);
         let of_part = |range: EmissionRange| {
             let mut paths = Paths::none();

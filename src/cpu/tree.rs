@@ -11,7 +11,7 @@ const LEAF: usize = TREE_LEAF as usize;
 const WALLS: usize = FACE_COUNT as usize;
 
 /// Photons in the order of the leaves.
-pub struct Tree {
+pub(crate) struct Tree {
     /// First photon of each wall, and the number of all.
     wall_begins: [usize; WALLS + 1],
     planes: Vec<f32>,
@@ -28,7 +28,7 @@ fn plane_place(begin: usize, boundary: usize) -> usize {
 }
 
 impl Tree {
-    pub fn build(photons: &[Photon]) -> Tree {
+    pub(crate) fn build(photons: &[Photon]) -> Tree {
         let mut photons = photons.to_vec();
         photons.sort_by_key(|photon| photon.wall);
         let wall_begins: [usize; WALLS + 1] = std::array::from_fn(|wall| photons.partition_point(|photon| (photon.wall as usize) < wall));
@@ -42,7 +42,7 @@ impl Tree {
     }
 
     /// The leaves of a point's wall.
-    pub fn walk(&self, point: &Point) -> Walk<'_> {
+    pub(crate) fn walk(&self, point: &Point) -> Walk<'_> {
         let wall = point.wall as usize;
         let places = self.wall_begins[wall]..self.wall_begins[wall + 1];
         let end = places.len().div_ceil(LEAF);
@@ -69,7 +69,7 @@ fn split(photons: &mut [Photon], wall: usize, height: u32, begin: usize, planes:
 }
 
 /// The leaves that may hold a photon within a distance of a point, from left to right.
-pub struct Walk<'a> {
+pub(crate) struct Walk<'a> {
     tree: &'a Tree,
     point: Point,
     places: Range<usize>,
@@ -90,7 +90,7 @@ impl Walk<'_> {
     }
 
     /// Places of the photons of the next leaf.
-    pub fn next_leaf(&mut self, limit: f32) -> Option<Range<usize>> {
+    pub(crate) fn next_leaf(&mut self, limit: f32) -> Option<Range<usize>> {
         while self.leaf < self.end {
             if self.from_left {
                 self.height = self.leaf.trailing_zeros();

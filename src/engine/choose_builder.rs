@@ -18,7 +18,7 @@ use crate::timings::Spread;
 
 /// What the builders took.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Choice {
+pub(crate) struct Choice {
     /// Photons that each of them traced.
     pub photons: u32,
     /// Every builder that can run the settings, the fastest first.
@@ -27,7 +27,7 @@ pub struct Choice {
 
 /// What one builder took.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Candidate {
+pub(crate) struct Candidate {
     pub builder: Builder,
     /// Milliseconds to trace and index the photons, and to gather them by brute force where that steps through the
     /// builder's list; of the device's clock, or of the host's where the device has none.
@@ -43,7 +43,7 @@ fn most_photons(gpu: &Gpu) -> u32 {
 const TURNS: usize = 5;
 const LONG: Duration = Duration::from_secs(1);
 
-pub fn choose_builder(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings) -> Result<Choice> {
+pub(crate) fn choose_builder(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings) -> Result<Choice> {
     check_math(gpu, settings.math)?;
     let plans = plans(gpu, scene, settings)?;
     let mut times = vec![Vec::new(); plans.len()];

@@ -22,10 +22,10 @@ const MOST_SUM: u64 = 1 << 63;
 
 /// Sums of two parts do not fit into one, as those of a run do. What was to hold them holds nothing of use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct TooLarge;
+pub(crate) struct TooLarge;
 
 /// Adds others, place by place.
-pub fn add_all<T: Copy>(sums: &mut [T], others: &[T], add: impl Fn(T, T) -> Option<T>) -> Result<(), TooLarge> {
+pub(crate) fn add_all<T: Copy>(sums: &mut [T], others: &[T], add: impl Fn(T, T) -> Option<T>) -> Result<(), TooLarge> {
     sums.iter_mut().zip(others).try_for_each(|(sum, others)| {
         *sum = add(*sum, *others).ok_or(TooLarge)?;
         Ok(())
@@ -34,14 +34,14 @@ pub fn add_all<T: Copy>(sums: &mut [T], others: &[T], add: impl Fn(T, T) -> Opti
 
 /// What a block left at [`kept_count`] places.
 #[derive(Debug, Clone, PartialEq)]
-pub struct KeptBlock {
+pub(crate) struct KeptBlock {
     pub number: u32,
     pub values: Vec<f32>,
 }
 
 /// What the latest [`KEPT_BLOCKS`] blocks left, by their numbers: of blocks whose numbers differ by a multiple of that the higher one.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct LatestBlocks(Vec<KeptBlock>);
+pub(crate) struct LatestBlocks(Vec<KeptBlock>);
 
 impl BlockSums {
     /// Adds what a block of so many rounds left.
@@ -53,7 +53,7 @@ impl BlockSums {
     }
 
     /// Adds the blocks of another part of the same run.
-    pub fn merge(&mut self, other: &BlockSums) -> Result<(), TooLarge> {
+    pub(crate) fn merge(&mut self, other: &BlockSums) -> Result<(), TooLarge> {
         self.rounds = self.rounds.checked_add(other.rounds).ok_or(TooLarge)?;
         self.blocks = self.blocks.checked_add(other.blocks).ok_or(TooLarge)?;
         add_all(&mut self.sums, &other.sums, u64::checked_add)?;
@@ -88,7 +88,7 @@ impl BlockSums {
 }
 
 impl LatestBlocks {
-    pub fn push(&mut self, block: KeptBlock) {
+    pub(crate) fn push(&mut self, block: KeptBlock) {
         let slot = |number: u32| number % KEPT_BLOCKS;
         match self.0.iter().position(|kept| slot(kept.number) == slot(block.number)) {
             Some(place) if self.0[place].number > block.number => return,
@@ -99,17 +99,17 @@ impl LatestBlocks {
         self.0.insert(place, block);
     }
 
-    pub fn merge(&mut self, other: &LatestBlocks) {
+    pub(crate) fn merge(&mut self, other: &LatestBlocks) {
         other.iter().for_each(|block| self.push(block.clone()));
     }
 
-    pub fn iter(&self) -> impl Iterator<Item = &KeptBlock> {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &KeptBlock> {
         self.0.iter()
     }
 
     /// How far errors of places go together in a film of so many blocks: `value` makes what counts of a kept place of what is kept of
     /// it, from `size` numbers; `variances` are those of all places.
-    pub fn degrees_of_freedom<const N: usize>(
+    pub(crate) fn degrees_of_freedom<const N: usize>(
         &self,
         size: usize,
         places: usize,
@@ -127,17 +127,17 @@ impl LatestBlocks {
 }
 
 /// A value of a film as it is kept of a block. Twin of `float_of` in `glsl/film/latest_blocks.glsl`.
-pub fn kept_value(sum: u64) -> f32 {
+pub(crate) fn kept_value(sum: u64) -> f32 {
     (sum >> 32) as f32 * 4_294_967_296.0 + (sum as u32) as f32
 }
 
 /// Lower and upper 64 bits of each.
-pub fn halves(squares: &[u128]) -> Vec<u64> {
+pub(crate) fn halves(squares: &[u128]) -> Vec<u64> {
     squares.iter().flat_map(|square| [*square as u64, (*square >> 64) as u64]).collect()
 }
 
 /// A sum of squares from its lower and upper 64 bits.
-pub fn wide(low: u64, high: u64) -> u128 {
+pub(crate) fn wide(low: u64, high: u64) -> u128 {
     u128::from(low) | u128::from(high) << 64
 }
 

@@ -1,26 +1,27 @@
 //! The engine: from a plan to light. Both worlds, the paper's box ([`room`]) and scenes of triangles ([`scene`]), trace photons,
 //! index them, and estimate densities with the kernels of `glsl` (or, of the box, their twins in `cpu`); what stands beside them here is the same for both.
 
-pub mod choose_builder;
+pub(crate) mod choose_builder;
 pub mod error;
 pub mod film;
-pub mod nonfinite_values;
-pub mod planned;
-pub mod prefix_sum;
-pub mod replay;
-pub mod room;
+pub(crate) mod nonfinite_values;
+pub(crate) mod planned;
+pub(crate) mod prefix_sum;
+pub(crate) mod replay;
+pub(crate) mod room;
 pub mod run;
 pub mod scene;
-pub mod tallies;
-pub mod totals;
+pub(crate) mod tallies;
+pub(crate) mod totals;
 
-pub use run::watch::{Control, End, Progress};
+pub(crate) use run::watch::Control;
+pub use run::watch::{End, Progress};
 
 use crate::gpu::DeviceFacts;
 use crate::plan::Limits;
 
 /// What the plan may use of a device.
-pub fn limits(facts: &DeviceFacts) -> Limits {
+pub(crate) fn limits(facts: &DeviceFacts) -> Limits {
     Limits {
         buffer_bytes: facts.storage_buffer_range_bytes.min(facts.allocation_bytes),
         memory_bytes: facts.usable_memory_bytes,

@@ -9,7 +9,7 @@ use crate::plan::buffers::NONFINITE_KIND_WORDS;
 
 /// One nonfinite value, and the photon or pixel it belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct NonfiniteValue {
+pub(crate) struct NonfiniteValue {
     pub what: What,
     pub round: u32,
     /// Photon, pixel or receiver.
@@ -18,7 +18,7 @@ pub struct NonfiniteValue {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum What {
+pub(crate) enum What {
     /// A photon of the global map (or of the paper's one map), leaving its light or at a surface.
     Photon,
     CausticPhoton,
@@ -31,14 +31,14 @@ pub enum What {
 /// Their number, about 2^32 at most, and the first of them: photons first, because other nonfinite values may follow
 /// from those.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
-pub struct NonfiniteValues {
+pub(crate) struct NonfiniteValues {
     pub count: u32,
     pub first: Vec<NonfiniteValue>,
 }
 
 impl NonfiniteValues {
     /// What a run with `--paranoid` found; `None` without it.
-    pub fn found(commands: &mut Commands, buffer: &Buffer<u32>, paranoid: bool) -> Result<Option<NonfiniteValues>> {
+    pub(crate) fn found(commands: &mut Commands, buffer: &Buffer<u32>, paranoid: bool) -> Result<Option<NonfiniteValues>> {
         if !paranoid {
             return Ok(None);
         }
@@ -63,14 +63,14 @@ impl NonfiniteValues {
     }
 
     /// Of two devices that shared a run.
-    pub fn both(one: Option<NonfiniteValues>, other: Option<NonfiniteValues>) -> Option<NonfiniteValues> {
+    pub(crate) fn both(one: Option<NonfiniteValues>, other: Option<NonfiniteValues>) -> Option<NonfiniteValues> {
         let (Some(mut one), Some(other)) = (one, other) else { return None };
         one.count = one.count.saturating_add(other.count);
         one.first.extend(other.first);
         Some(one)
     }
 
-    pub fn add(&mut self, what: What, round: u32, item: u32) {
+    pub(crate) fn add(&mut self, what: What, round: u32, item: u32) {
         self.count = self.count.saturating_add(1);
         if self.first.len() < MAX_NONFINITE_VALUES as usize {
             self.first.push(NonfiniteValue { what, round, item });
@@ -78,7 +78,7 @@ impl NonfiniteValues {
     }
 
     /// One line of the report.
-    pub fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         let Some(first) = self.first.first() else {
             return "nonfinite values: none; `paranoid` checked all positions, directions, flux and radiance".to_owned();
         };

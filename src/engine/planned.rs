@@ -8,12 +8,12 @@ use crate::plan::buffers::{Declared, PlannedBuffer};
 
 /// Structs of buffers, each field with its type and how it is made of the constructor's arguments.
 macro_rules! buffers {
-    ($(#[$doc:meta])* pub struct $name:ident($($argument:ident: $given:ty),*) {
+    ($(#[$doc:meta])* pub(crate) struct $name:ident($($argument:ident: $given:ty),*) {
         $($(#[$note:meta])* $field:ident: $type:ty = $made:expr),* $(,)?
     }) => {
         $(#[$doc])*
-        pub struct $name {
-            $($(#[$note])* pub $field: $type),*
+        pub(crate) struct $name {
+            $($(#[$note])* pub(crate) $field: $type),*
         }
 
         impl $name {
@@ -27,7 +27,7 @@ macro_rules! buffers {
 pub(in crate::engine) use buffers;
 
 /// What a plan lists, and where it is to be.
-pub struct Planned<'a> {
+pub(crate) struct Planned<'a> {
     pub gpu: &'a Gpu,
     pub buffers: Vec<PlannedBuffer>,
 }
@@ -38,17 +38,17 @@ impl Planned<'_> {
     }
 
     /// All that are listed, in the plan's order.
-    pub fn all<T: Pod>(&self, declared: Declared<T>) -> Result<Vec<Buffer<T>>> {
+    pub(crate) fn all<T: Pod>(&self, declared: Declared<T>) -> Result<Vec<Buffer<T>>> {
         self.listed(declared).map(|planned| self.gpu.buffer(planned.name, planned.count, Memory::Device)).collect()
     }
 
     /// The only one that is listed.
-    pub fn one<T: Pod>(&self, declared: Declared<T>) -> Result<Buffer<T>> {
+    pub(crate) fn one<T: Pod>(&self, declared: Declared<T>) -> Result<Buffer<T>> {
         let [buffer] = self.several(declared)?;
         Ok(buffer)
     }
 
-    pub fn several<T: Pod, const N: usize>(&self, declared: Declared<T>) -> Result<[Buffer<T>; N]> {
+    pub(crate) fn several<T: Pod, const N: usize>(&self, declared: Declared<T>) -> Result<[Buffer<T>; N]> {
         let found = self.all(declared)?;
         Ok(found
             .try_into()
@@ -56,7 +56,7 @@ impl Planned<'_> {
     }
 
     /// As many as the content has parts, each with its own, of which the plan keeps all or nothing.
-    pub fn filled_parts<T: Pod, const N: usize>(
+    pub(crate) fn filled_parts<T: Pod, const N: usize>(
         &self,
         commands: &mut Commands,
         declared: Declared<T>,
@@ -73,19 +73,19 @@ impl Planned<'_> {
     }
 
     /// The only one that is listed, set to zero.
-    pub fn zeroed<T: Pod>(&self, commands: &mut Commands, declared: Declared<T>) -> Result<Buffer<T>> {
+    pub(crate) fn zeroed<T: Pod>(&self, commands: &mut Commands, declared: Declared<T>) -> Result<Buffer<T>> {
         let [buffer] = self.several_zeroed(commands, declared)?;
         Ok(buffer)
     }
 
-    pub fn several_zeroed<T: Pod, const N: usize>(&self, commands: &mut Commands, declared: Declared<T>) -> Result<[Buffer<T>; N]> {
+    pub(crate) fn several_zeroed<T: Pod, const N: usize>(&self, commands: &mut Commands, declared: Declared<T>) -> Result<[Buffer<T>; N]> {
         let buffers = self.several(declared)?;
         buffers.iter().for_each(|buffer| commands.clear(buffer));
         Ok(buffers)
     }
 
     /// The only one that is listed with its content, of which the plan keeps all or nothing.
-    pub fn filled<T: Pod>(&self, commands: &mut Commands, declared: Declared<T>, content: &[T]) -> Result<Buffer<T>> {
+    pub(crate) fn filled<T: Pod>(&self, commands: &mut Commands, declared: Declared<T>, content: &[T]) -> Result<Buffer<T>> {
         let [buffer] = self.filled_parts(commands, declared, [content])?;
         Ok(buffer)
     }

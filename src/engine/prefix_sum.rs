@@ -9,14 +9,14 @@ use crate::records::ScanPush;
 /// Turns `item_count` numbers into their exclusive prefix sums; `levels` have room for [`block_sum_counts`].
 ///
 /// [`block_sum_counts`]: crate::plan::buffers::block_sum_counts
-pub fn scan(commands: &mut Commands, items: &Buffer<u32>, levels: &[Buffer<u32>], item_count: u32, group_size: u32) -> Result<()> {
+pub(crate) fn scan(commands: &mut Commands, items: &Buffer<u32>, levels: &[Buffer<u32>], item_count: u32, group_size: u32) -> Result<()> {
     let threads = || Extent::Items(u64::from(item_count.div_ceil(SCAN_ITEMS)));
     scan_part(commands, items, levels, item_count, group_size, &threads)
 }
 
 /// The same of the first numbers alone, as many as `threads` read: sums before them do not depend on those behind,
 /// which are left in disorder.
-pub fn scan_part<'a>(
+pub(crate) fn scan_part<'a>(
     commands: &mut Commands,
     items: &Buffer<u32>,
     levels: &[Buffer<u32>],

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 
 /// Which photon.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct PhotonName {
+pub(crate) struct PhotonName {
     pub round: u32,
     pub photon: u32,
     /// Of the caustic map.
@@ -20,7 +20,7 @@ impl std::fmt::Display for PhotonName {
 
 /// One photon of a run by itself.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Replayed<Start, Vertex> {
+pub(crate) struct Replayed<Start, Vertex> {
     pub name: PhotonName,
     /// As it leaves its light.
     pub start: Start,
@@ -32,16 +32,16 @@ pub struct Replayed<Start, Vertex> {
 
 impl PhotonName {
     /// Refuses what `--replay` cannot trace.
-    pub fn refused(self, allowed: impl Into<String>) -> Error {
+    pub(crate) fn refused(self, allowed: impl Into<String>) -> Error {
         Error::setting("replay", self, allowed.into())
     }
 
-    pub fn check_round(self, rounds: u32) -> Result<()> {
+    pub(crate) fn check_round(self, rounds: u32) -> Result<()> {
         if self.round < rounds { Ok(()) } else { Err(self.refused(format!("the run has rounds 0 to {}", rounds - 1))) }
     }
 
     /// `map` says which of several has so many photons.
-    pub fn check_photon(self, photons: u32, map: &str) -> Result<()> {
+    pub(crate) fn check_photon(self, photons: u32, map: &str) -> Result<()> {
         if self.photon < photons { Ok(()) } else { Err(self.refused(format!("a round has photons 0 to {}{map}", photons - 1))) }
     }
 }

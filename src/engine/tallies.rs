@@ -7,12 +7,12 @@ use crate::gpu::{Buffer, Commands};
 use crate::records::Tally;
 
 /// Fates of the first bounces, copies added up.
-pub fn read(commands: &mut Commands, tallies: &Buffer<Tally>, bounces: u32) -> Result<Vec<Tally>> {
+pub(crate) fn read(commands: &mut Commands, tallies: &Buffer<Tally>, bounces: u32) -> Result<Vec<Tally>> {
     Ok(sums(&commands.read(tallies, (bounces * TALLY_COPIES) as usize)?))
 }
 
 /// Fates of bounces, the copies of each added up.
-pub fn sums(copies: &[Tally]) -> Vec<Tally> {
+pub(crate) fn sums(copies: &[Tally]) -> Vec<Tally> {
     copies.chunks_exact(TALLY_COPIES as usize).map(sum).collect()
 }
 

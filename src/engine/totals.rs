@@ -4,10 +4,10 @@ use crate::constants::{TALLY_COPIES, TOTAL_WORDS};
 use crate::ledger::Totals;
 
 /// Words of the buffer.
-pub const WORDS: u64 = TOTAL_WORDS as u64 * TALLY_COPIES as u64;
+pub(crate) const WORDS: u64 = TOTAL_WORDS as u64 * TALLY_COPIES as u64;
 
 /// What [`WORDS`] words of a buffer count, copies added up.
-pub fn sum(words: &[u32]) -> Totals {
+pub(crate) fn sum(words: &[u32]) -> Totals {
     let wide = |low: u32, high: u32| u64::from(low) | u64::from(high) << 32;
     let mut sum = Totals { stored: wide(words[14], words[15]), ..Totals::default() };
     let (mut cut, mut clamped) = ([0u64; 3], [0u64; 3]);

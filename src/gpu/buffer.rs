@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 
 /// Who touches a buffer's memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Memory {
+pub(crate) enum Memory {
     /// The device alone.
     Device,
     /// Written by the host, copied by the device.
@@ -26,7 +26,7 @@ pub enum Memory {
 
 /// Bytes of buffers: of those that are alive, and the most that were alive together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
-pub struct HeldMemory {
+pub(crate) struct HeldMemory {
     /// Of [`Memory::Device`].
     pub device_bytes: u64,
     pub peak_device_bytes: u64,
@@ -72,13 +72,13 @@ impl HeldMemory {
 ///     MapCount { map: counters, counters, cells, ranks }
 /// }
 /// ```
-pub struct Buffer<T> {
+pub(crate) struct Buffer<T> {
     any: AnyBuffer,
     element: PhantomData<T>,
 }
 
 /// A buffer whose elements do not matter: as commands see it.
-pub struct AnyBuffer {
+pub(crate) struct AnyBuffer {
     name: String,
     memory: Memory,
     size_bytes: u64,
@@ -103,7 +103,7 @@ pub(super) fn blocks_within(bytes: u64) -> AllocationSizes {
 impl Gpu {
     /// A buffer of `count` elements of `T`, and of one at least, as Vulkan has no empty ones. Its
     /// content is undefined.
-    pub fn buffer<T: Pod>(&self, name: &str, count: u64, memory: Memory) -> Result<Buffer<T>> {
+    pub(crate) fn buffer<T: Pod>(&self, name: &str, count: u64, memory: Memory) -> Result<Buffer<T>> {
         let size_bytes = count.max(1) * size_of::<T>() as u64;
         let largest = self.facts.storage_buffer_range_bytes.min(self.facts.allocation_bytes);
         assert!(size_bytes <= largest, "buffer {name}: {size_bytes} bytes, the plan must keep to {largest}");
@@ -154,7 +154,7 @@ impl Gpu {
     }
 
     /// What buffers take by the sizes that were asked for; an allocator rounds them up.
-    pub fn held_memory(&self) -> HeldMemory {
+    pub(crate) fn held_memory(&self) -> HeldMemory {
         *self.context.held()
     }
 
@@ -175,12 +175,12 @@ impl Gpu {
 }
 
 impl<T> Buffer<T> {
-    pub fn any(&self) -> &AnyBuffer {
+    pub(crate) fn any(&self) -> &AnyBuffer {
         &self.any
     }
 
     /// Elements that it has room for.
-    pub fn count(&self) -> u64 {
+    pub(crate) fn count(&self) -> u64 {
         self.any.size_bytes / size_of::<T>() as u64
     }
 

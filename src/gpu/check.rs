@@ -14,7 +14,7 @@ use crate::records::{CheckPush, MathResults, Samples, SamplingCase, Tally};
 
 /// What the check found beyond passing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct LoopCount {
+pub(crate) struct LoopCount {
     pub wanted: u32,
     pub done: u32,
 }
@@ -63,13 +63,13 @@ fn expected_entries() -> Vec<u32> {
 }
 
 /// How far a loop of `wanted` iterations really gets.
-pub fn loop_count(gpu: &Gpu, wanted: u32) -> Result<LoopCount> {
+pub(crate) fn loop_count(gpu: &Gpu, wanted: u32) -> Result<LoopCount> {
     let push = CheckPush { iteration_count: wanted, addend_low: 0, addend_high: 0, add_count: 0, photon_count: 0, stride: 0 };
     Ok(LoopCount { wanted, done: ask(gpu, &push)?.0[0] })
 }
 
 /// What the strict functions of `glsl/math/math.glsl` make of each pair on the device.
-pub fn math(gpu: &Gpu, operands: &[Vec2]) -> Result<Vec<MathResults>> {
+pub(crate) fn math(gpu: &Gpu, operands: &[Vec2]) -> Result<Vec<MathResults>> {
     let constants = Constants::new(GROUP_SIZE).set("STRICT_MATH", 1);
     let mut commands = Commands::new(gpu, constants, Instant::now())?;
     let inputs = commands.uploaded("operands", operands)?;
@@ -79,7 +79,7 @@ pub fn math(gpu: &Gpu, operands: &[Vec2]) -> Result<Vec<MathResults>> {
 }
 
 /// What the functions that sample make of each case on the device, under `constants` by name.
-pub fn sampling(gpu: &Gpu, constants: &[(&'static str, u32)], cases: &[SamplingCase]) -> Result<Vec<Samples>> {
+pub(crate) fn sampling(gpu: &Gpu, constants: &[(&'static str, u32)], cases: &[SamplingCase]) -> Result<Vec<Samples>> {
     let constants = constants.iter().fold(Constants::new(GROUP_SIZE), |constants, (name, value)| constants.set(name, *value));
     let mut commands = Commands::new(gpu, constants, Instant::now())?;
     let inputs = commands.uploaded("sampling cases", cases)?;
@@ -90,7 +90,7 @@ pub fn sampling(gpu: &Gpu, constants: &[(&'static str, u32)], cases: &[SamplingC
 
 /// Fails unless conversions of integers, sums, products, and the quotients and roots made from them are rounded to
 /// nearest, each by itself: on that rests all of `--math strict`, and Vulkan leaves the direction to the device.
-pub fn strict_math(gpu: &Gpu) -> Result<()> {
+pub(crate) fn strict_math(gpu: &Gpu) -> Result<()> {
     let operands: Vec<Vec2> = (0..STRICT_SAMPLES).map(sample).collect();
     let results = math(gpu, &operands)?;
     let wrong = operands.iter().zip(&results).find_map(|(operand, result)| {

@@ -8,9 +8,9 @@ use crate::error::Result;
 use crate::records::MeasurePush;
 
 /// Work after which a card runs at its clock.
-pub const WARM_UP: Duration = Duration::from_millis(300);
+pub(crate) const WARM_UP: Duration = Duration::from_millis(300);
 /// What is done of it in any case.
-pub const LEAST_WARM_UP: Duration = Duration::from_millis(30);
+pub(crate) const LEAST_WARM_UP: Duration = Duration::from_millis(30);
 
 /// How long a card has idled and not worked since, at most [`WARM_UP`].
 #[derive(Debug, Clone, Copy)]
@@ -47,7 +47,7 @@ pub(super) fn prepare(gpu: &Gpu) -> Result<()> {
 
 /// Keeps a card busy for a while, so that what follows at once runs at the clock of work. Does nothing on a software device,
 /// which has no clock of its own.
-pub fn warm_up(gpu: &Gpu, time: Duration) -> Result<()> {
+pub(crate) fn warm_up(gpu: &Gpu, time: Duration) -> Result<()> {
     if gpu.facts().kind == "cpu" {
         return Ok(());
     }

@@ -9,9 +9,9 @@ mod transfer;
 use std::time::{Duration, Instant};
 
 use ash::vk;
-pub use dispatch::Extent;
+pub(crate) use dispatch::Extent;
 pub(crate) use dispatch::dispatch_by_sums;
-pub use submission::Interrupt;
+pub(crate) use submission::Interrupt;
 
 use super::clock::{self, LEAST_WARM_UP};
 use super::descriptor_sets::DescriptorSets;
@@ -29,7 +29,7 @@ struct OpenScope {
 }
 
 /// Commands being recorded, and the timings of those that ran.
-pub struct Commands<'gpu> {
+pub(crate) struct Commands<'gpu> {
     gpu: &'gpu Gpu,
     constants: Constants,
     started: Instant,
@@ -73,7 +73,7 @@ pub(super) fn command_buffer(gpu: &Gpu) -> Result<(vk::CommandPool, vk::CommandB
 
 impl<'gpu> Commands<'gpu> {
     /// `started` is the zero of all times.
-    pub fn new(gpu: &'gpu Gpu, constants: Constants, started: Instant) -> Result<Commands<'gpu>> {
+    pub(crate) fn new(gpu: &'gpu Gpu, constants: Constants, started: Instant) -> Result<Commands<'gpu>> {
         let timestamps = Timestamps::new(gpu)?;
         let (pool, command_buffer, fence) = command_buffer(gpu)?;
         let mut commands = Commands {
@@ -113,7 +113,7 @@ impl<'gpu> Commands<'gpu> {
     }
 
     /// Records `body` under a name inside the scopes that are open, and times it on the device.
-    pub fn scope<T>(&mut self, name: &str, body: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
+    pub(crate) fn scope<T>(&mut self, name: &str, body: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
         let path = match self.open_scopes.last() {
             Some(outer) => format!("{}/{name}", outer.name),
             None => name.to_owned(),
@@ -143,12 +143,12 @@ impl<'gpu> Commands<'gpu> {
     }
 
     /// Timestamps left in this submission; a scope takes two.
-    pub fn timestamps_left(&self) -> u32 {
+    pub(crate) fn timestamps_left(&self) -> u32 {
         self.timestamps.left()
     }
 
     /// Notes what is handled by what was just recorded: photons and bytes by all scopes that are open, stored photons by the innermost.
-    pub fn count(&mut self, handled: Handled) {
+    pub(crate) fn count(&mut self, handled: Handled) {
         for scope in &mut self.open_scopes {
             scope.handled.photons += handled.photons;
             scope.handled.bytes += handled.bytes;
@@ -163,7 +163,7 @@ impl<'gpu> Commands<'gpu> {
     }
 
     /// Counts work of any unit that was recorded in the innermost scope.
-    pub fn add_work(&mut self, amount: u64) {
+    pub(crate) fn add_work(&mut self, amount: u64) {
         self.work += amount;
         let scope = self.innermost_scope().to_owned();
         self.pace.add_work(scope, amount);
@@ -171,26 +171,26 @@ impl<'gpu> Commands<'gpu> {
 
     /// Work that a dispatch of the innermost scope should do at most, where a plan allows so much between two submissions. It decides
     /// how work is split, which changes no result.
-    pub fn paced(&self, work_per_submission: u64) -> u64 {
+    pub(crate) fn paced(&self, work_per_submission: u64) -> u64 {
         self.pace.fits(self.innermost_scope(), work_per_submission)
     }
 
     /// Whether what is recorded should run before more is recorded in the innermost scope.
-    pub fn is_due(&self, work_per_submission: u64) -> bool {
+    pub(crate) fn is_due(&self, work_per_submission: u64) -> bool {
         self.pace.is_due(self.innermost_scope(), work_per_submission) || self.is_full(work_per_submission)
     }
 
     /// Whether what is recorded amounts to a submission.
-    pub fn is_full(&self, work_per_submission: u64) -> bool {
+    pub(crate) fn is_full(&self, work_per_submission: u64) -> bool {
         self.work >= work_per_submission || self.pace.is_long()
     }
 
-    pub fn timings(&mut self) -> &mut Timings {
+    pub(crate) fn timings(&mut self) -> &mut Timings {
         &mut self.timings
     }
 
     /// Ends the recording; `whole` names the row that spans all of it on the host's clock.
-    pub fn finish(mut self, whole: &str) -> Timings {
+    pub(crate) fn finish(mut self, whole: &str) -> Timings {
         let mut timings = std::mem::take(&mut self.timings);
         timings.add(Span::of_host(whole, Duration::ZERO, self.started.elapsed()));
         timings
@@ -199,7 +199,7 @@ impl<'gpu> Commands<'gpu> {
     /// Where the device was opened for it, keeps a card busy for as long as it idled: while the host makes buffers, its clock
     /// falls, but not its memory's, which favours passes that wait for memory. The zero of all times moves by as much, so that
     /// it counts in none.
-    pub fn warm_up(&mut self) -> Result<()> {
+    pub(crate) fn warm_up(&mut self) -> Result<()> {
         if self.gpu.options.warm_up {
             let began = Instant::now();
             clock::warm_up(self.gpu, self.gpu.idleness.get().at(began).max(LEAST_WARM_UP))?;
@@ -209,29 +209,29 @@ impl<'gpu> Commands<'gpu> {
     }
 
     /// Makes the pipelines of these kernels.
-    pub fn prepare(&self, modules: &[Module]) -> Result<()> {
+    pub(crate) fn prepare(&self, modules: &[Module]) -> Result<()> {
         self.gpu.prepare(modules, &self.constants)
     }
 
     /// Pipelines made so far.
-    pub fn pipelines(&self) -> usize {
+    pub(crate) fn pipelines(&self) -> usize {
         self.gpu.work().pipelines - self.pipelines_before
     }
 
-    pub fn gpu(&self) -> &'gpu Gpu {
+    pub(crate) fn gpu(&self) -> &'gpu Gpu {
         self.gpu
     }
 
-    pub fn facts(&self) -> &DeviceFacts {
+    pub(crate) fn facts(&self) -> &DeviceFacts {
         &self.gpu.facts
     }
 
     /// Dispatches recorded so far.
-    pub fn dispatch_count(&self) -> u64 {
+    pub(crate) fn dispatch_count(&self) -> u64 {
         self.dispatch_count
     }
 
-    pub fn submission_count(&self) -> u64 {
+    pub(crate) fn submission_count(&self) -> u64 {
         self.submission_count
     }
 }

@@ -40,7 +40,7 @@ pub struct DeviceFacts {
     pub timestamp_period_ns: f32,
     pub int64_atomics: bool,
     /// What brings the lanes of a subgroup together again after they went different ways.
-    pub reconvergence: Reconvergence,
+    pub(crate) reconvergence: Reconvergence,
     /// Lanes vote right in a loop in which they go different ways, as the start-up check found; false before it.
     #[serde(skip)]
     pub votes_in_loops: bool,
@@ -58,7 +58,7 @@ pub struct DeviceFacts {
 /// What a device promises about lanes that went different ways.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Reconvergence {
+pub(crate) enum Reconvergence {
     /// VK_KHR_shader_maximal_reconvergence: they come together as the source reads.
     Maximal,
     /// VK_KHR_shader_subgroup_uniform_control_flow: they do where all of them went in together.

@@ -20,7 +20,7 @@ use crate::records::Field;
 pub(super) const PUSH_BYTES: u32 = 128;
 
 /// A kernel with its buffers filled in; `build.rs` writes one implementor a kernel.
-pub trait Kernel {
+pub(crate) trait Kernel {
     /// Record behind the push constants; `()` if there are none.
     type Push: Pod;
     const MODULE: Module;
@@ -34,7 +34,7 @@ pub trait Kernel {
 
 /// A compiled kernel and what reflection found in it.
 #[derive(Debug, Clone, Copy)]
-pub struct Module {
+pub(crate) struct Module {
     pub name: &'static str,
     pub spirv: &'static [u8],
     pub push_bytes: u32,
@@ -49,7 +49,7 @@ pub struct Module {
 }
 
 #[derive(Debug, Clone, Copy)]
-pub struct Binding {
+pub(crate) struct Binding {
     pub name: &'static str,
     pub binding: u32,
     pub reads: bool,
@@ -58,7 +58,7 @@ pub struct Binding {
 
 /// A struct as a kernel sees it; compared with its Rust twin by `tests/engine/layout.rs`.
 #[derive(Debug, Clone, Copy)]
-pub struct ReflectedStruct {
+pub(crate) struct ReflectedStruct {
     pub name: &'static str,
     /// Distance between neighbours, where the struct lies in an array.
     pub stride_bytes: Option<usize>,
@@ -68,17 +68,17 @@ pub struct ReflectedStruct {
 /// Values of specialization constants, by name, and the work-group size. A kernel takes those that
 /// it declares.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub struct Constants {
+pub(crate) struct Constants {
     pub group_size: u32,
     values: BTreeMap<&'static str, u32>,
 }
 
 impl Constants {
-    pub fn new(group_size: u32) -> Constants {
+    pub(crate) fn new(group_size: u32) -> Constants {
         Constants { group_size, values: BTreeMap::new() }
     }
 
-    pub fn set(mut self, name: &'static str, value: u32) -> Constants {
+    pub(crate) fn set(mut self, name: &'static str, value: u32) -> Constants {
         self.values.insert(name, value);
         self
     }
@@ -186,7 +186,7 @@ impl Gpu {
     }
 
     /// Makes the pipelines of these kernels now, as many at a time as there are cores, so that no run pays for them later.
-    pub fn prepare(&self, modules: &[Module], constants: &Constants) -> Result<()> {
+    pub(crate) fn prepare(&self, modules: &[Module], constants: &Constants) -> Result<()> {
         let mut missing: Vec<(PipelineKey, [u8; 32], Pipeline, Vec<u32>)> = Vec::new();
         for module in modules {
             let key = PipelineKey::new(module, constants);

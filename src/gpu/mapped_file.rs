@@ -7,11 +7,11 @@ use memmap2::Mmap;
 
 /// The bytes of a file.
 #[derive(Debug)]
-pub struct MappedFile(Mmap);
+pub(crate) struct MappedFile(Mmap);
 
 impl MappedFile {
     /// Nobody may change the file in place while it is mapped: one that is cut off then ends the program.
-    pub fn new(file: &File) -> std::io::Result<MappedFile> {
+    pub(crate) fn new(file: &File) -> std::io::Result<MappedFile> {
         // SAFETY: files of photonmill are written under another name and renamed, never changed in place.
         unsafe { Mmap::map(file) }.map(MappedFile)
     }

@@ -1,24 +1,24 @@
 //! The Vulkan compute engine: one device, one queue, buffers, kernels, commands and timestamps. It
 //! knows nothing of photons.
 
-pub mod buffer;
-pub mod check;
-pub mod clock;
-pub mod commands;
+pub(crate) mod buffer;
+pub(crate) mod check;
+pub(crate) mod clock;
+pub(crate) mod commands;
 mod descriptor_sets;
 pub mod device;
 mod faults;
-pub mod kernel;
+pub(crate) mod kernel;
 mod labels;
 mod mapped_file;
 mod pace;
 mod platform;
 mod reconvergence;
 mod specialize;
-pub mod timestamps;
+pub(crate) mod timestamps;
 mod validation;
 #[cfg(feature = "window")]
-pub mod window;
+pub(crate) mod window;
 #[cfg(not(feature = "window"))]
 #[path = "no_window.rs"]
 mod window;
@@ -30,12 +30,13 @@ use std::time::Instant;
 use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
-pub use buffer::{AnyBuffer, Buffer, HeldMemory, Memory};
+pub(crate) use buffer::{AnyBuffer, Buffer, HeldMemory, Memory};
 pub(crate) use commands::dispatch_by_sums;
-pub use commands::{Commands, Extent, Interrupt};
-pub use device::{DeviceFacts, Reconvergence};
-pub use kernel::{Constants, Kernel, Module};
-pub use mapped_file::MappedFile;
+pub(crate) use commands::{Commands, Extent, Interrupt};
+pub use device::DeviceFacts;
+pub(crate) use device::Reconvergence;
+pub(crate) use kernel::{Constants, Kernel, Module};
+pub(crate) use mapped_file::MappedFile;
 
 use crate::error::{Error, Result};
 use clock::Idleness;
@@ -45,7 +46,8 @@ use validation::Messages;
 use window::{Surface, Window};
 
 /// The kernels that `build.rs` found, one struct each.
-pub mod kernels {
+#[allow(dead_code, reason = "tests alone use some")]
+pub(crate) mod kernels {
     use super::buffer::{AnyBuffer, Buffer};
     use super::kernel::{Binding, Kernel, Module, ReflectedStruct};
     use crate::records::Field;
@@ -78,7 +80,7 @@ pub struct Options {
 
 /// What a device has been asked to do so far, by counts, which no clock disturbs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Work {
+pub(crate) struct Work {
     pub pipelines: usize,
     pub dispatches: u64,
     /// Of dispatches whose size the host knows.
@@ -264,7 +266,7 @@ impl Gpu {
         &self.facts
     }
 
-    pub fn work(&self) -> Work {
+    pub(crate) fn work(&self) -> Work {
         self.work.get()
     }
 

@@ -8,7 +8,7 @@ use ash::vk;
 use super::DeviceFacts;
 use crate::error::Result;
 
-pub enum Window {}
+pub(crate) enum Window {}
 
 pub(super) enum Surface {}
 

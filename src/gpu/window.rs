@@ -8,7 +8,7 @@ use ash::{khr, vk};
 use egui::{ClippedPrimitive, TexturesDelta};
 use egui_ash_renderer::{DynamicRendering, Options as PainterOptions, RenderMode, Renderer, allocator::DefaultAllocator};
 use winit::raw_window_handle::{HasDisplayHandle, HasWindowHandle, RawDisplayHandle};
-pub use winit::window::Window;
+pub(crate) use winit::window::Window;
 
 use super::commands::command_buffer;
 use super::{Buffer, Context, DeviceFacts, Gpu, call};
@@ -83,14 +83,14 @@ impl Surface {
 type Painter = Renderer<DefaultAllocator>;
 
 /// What is drawn over a picture.
-pub struct Overlay {
+pub(crate) struct Overlay {
     pub textures: TexturesDelta,
     pub primitives: Vec<ClippedPrimitive>,
     pub pixels_per_point: f32,
 }
 
 /// Images of the window in turn.
-pub struct Presenter<'gpu> {
+pub(crate) struct Presenter<'gpu> {
     gpu: &'gpu Gpu,
     functions: khr::swapchain::Device,
     swapchain: vk::SwapchainKHR,
@@ -110,7 +110,7 @@ pub struct Presenter<'gpu> {
 
 impl<'gpu> Presenter<'gpu> {
     /// Of a device that was opened with a window.
-    pub fn new(gpu: &'gpu Gpu) -> Result<Presenter<'gpu>> {
+    pub(crate) fn new(gpu: &'gpu Gpu) -> Result<Presenter<'gpu>> {
         let context = gpu.context.clone();
         let surface = context.surface.as_ref().expect("the device was opened with a window");
         // SAFETY: device and surface are alive.
@@ -156,12 +156,12 @@ impl<'gpu> Presenter<'gpu> {
     }
 
     /// Whether its pixels have blue first.
-    pub fn blue_first(&self) -> bool {
+    pub(crate) fn blue_first(&self) -> bool {
         self.format.format == vk::Format::B8G8R8A8_UNORM
     }
 
     /// Pixels of the window as it is now; none while it is minimised.
-    pub fn size(&self) -> Result<[u32; 2]> {
+    pub(crate) fn size(&self) -> Result<[u32; 2]> {
         let surface = self.context.surface.as_ref().expect("there is a window");
         // SAFETY: device and surface are alive.
         let capabilities = call("vkGetPhysicalDeviceSurfaceCapabilitiesKHR", || unsafe {
@@ -175,7 +175,7 @@ impl<'gpu> Presenter<'gpu> {
 
     /// Shows pixels, so many as the window has, row by row from the top, and an overlay. They are written by then. `false`: the window has
     /// another size by now.
-    pub fn present(&mut self, pixels: &Buffer<u32>, [width, height]: [u32; 2], mut overlay: Overlay) -> Result<bool> {
+    pub(crate) fn present(&mut self, pixels: &Buffer<u32>, [width, height]: [u32; 2], mut overlay: Overlay) -> Result<bool> {
         // egui wants to be sure that nobody forgets them.
         let (set, free) = (std::mem::take(&mut overlay.textures.set), std::mem::take(&mut overlay.textures.free));
         let mut painter = self.painter.take().expect("there is a painter");

@@ -20,7 +20,7 @@ use crate::text::percent;
 
 /// What each picture may take.
 #[derive(Debug, Clone)]
-pub struct Request {
+pub(crate) struct Request {
     /// Pixels along the width.
     pub width: u32,
     /// In percent.
@@ -34,7 +34,7 @@ pub struct Request {
 const EXHIBITS: &str = include_str!("gallery.txt");
 
 /// Runs every command, and writes the page. False if it was interrupted; the page has what was done by then.
-pub fn make(folder: &Folder, request: &Request, cancelled: &AtomicBool, tell: &mut dyn FnMut(&str)) -> Result<bool> {
+pub(crate) fn make(folder: &Folder, request: &Request, cancelled: &AtomicBool, tell: &mut dyn FnMut(&str)) -> Result<bool> {
     let path = folder.path();
     std::fs::create_dir_all(path).map_err(|error| Error::Output {
         option: "-o",

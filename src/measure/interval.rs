@@ -5,14 +5,14 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use super::line_fit::LineFit;
 
 /// Confidence level of every interval here.
-pub const CONFIDENCE: f64 = 0.95;
-pub const CONFIDENCE_IN_WORDS: &str = "95 %";
+pub(crate) const CONFIDENCE: f64 = 0.95;
+pub(crate) const CONFIDENCE_IN_WORDS: &str = "95 %";
 /// With fewer values the interval is unbounded: two values say next to nothing about their spread.
-pub const LEAST_VALUES: usize = 3;
+pub(crate) const LEAST_VALUES: usize = 3;
 
 /// A number and the interval that contains its true value with [`CONFIDENCE`].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Interval {
+pub(crate) struct Interval {
     pub value: f64,
     pub low: f64,
     pub high: f64,
@@ -20,7 +20,7 @@ pub struct Interval {
 
 /// Whether an interval decides a claim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Decision {
+pub(crate) enum Decision {
     Yes,
     No,
     Undecided,
@@ -32,20 +32,20 @@ impl Interval {
     }
 
     /// The mean of independent values, by Student's t; of a single one nothing is known.
-    pub fn of_mean(values: &[f64], confidence: f64) -> Interval {
+    pub(crate) fn of_mean(values: &[f64], confidence: f64) -> Interval {
         Moments::of(values, 2).interval(confidence)
     }
 
     /// The same of values above 0 whose logarithm is more nearly normal than they, as squared errors are: the interval
     /// reaches further up than down.
-    pub fn of_squares(values: &[f64]) -> Interval {
+    pub(crate) fn of_squares(values: &[f64]) -> Interval {
         let plain = Interval::of_mean(values, CONFIDENCE);
         let half = (plain.high - plain.value) / plain.value.max(f64::MIN_POSITIVE);
         Interval { value: plain.value, low: plain.value * (-half).exp(), high: plain.value * half.exp() }
     }
 
     /// The geometric mean of positive values, by Student's t on their logarithms.
-    pub fn of_geometric_mean(values: &[f64]) -> Interval {
+    pub(crate) fn of_geometric_mean(values: &[f64]) -> Interval {
         Moments::of_logarithms(values).interval(CONFIDENCE).map(f64::exp)
     }
 
@@ -54,7 +54,7 @@ impl Interval {
     /// 1947. The two may differ in spread and in number. A ratio of times needs logarithms because the geometric mean does
     /// not depend on which of the two is the reference: P. J. Fleming and J. J. Wallace, How not to lie with statistics,
     /// Communications of the ACM 29, 1986.
-    pub fn of_ratio(over: &[f64], under: &[f64]) -> Interval {
+    pub(crate) fn of_ratio(over: &[f64], under: &[f64]) -> Interval {
         let [over, under] = [over, under].map(Moments::of_logarithms);
         let variance_of_mean = over.variance_of_mean + under.variance_of_mean;
         let share = |part: &Moments| part.variance_of_mean.powi(2) / part.freedom;
@@ -65,7 +65,7 @@ impl Interval {
     }
 
     /// The slope of a line through this many points, by Student's t on its standard error.
-    pub fn of_slope(fit: &LineFit, points: usize) -> Interval {
+    pub(crate) fn of_slope(fit: &LineFit, points: usize) -> Interval {
         if points < LEAST_VALUES {
             return Interval::around(fit.slope, f64::INFINITY);
         }
@@ -74,21 +74,21 @@ impl Interval {
 
     /// The mean of independent values that all lie in [0, 1], whatever their distribution: W. Hoeffding, Probability
     /// inequalities for sums of bounded random variables, Journal of the American Statistical Association 58, 1963.
-    pub fn of_share(mean: f64, values: f64) -> Interval {
+    pub(crate) fn of_share(mean: f64, values: f64) -> Interval {
         let half_width = ((2.0 / (1.0 - CONFIDENCE)).ln() / (2.0 * values)).sqrt();
         Interval { value: mean, low: (mean - half_width).max(0.0), high: (mean + half_width).min(1.0) }
     }
 
-    pub fn map(self, f: impl Fn(f64) -> f64) -> Interval {
+    pub(crate) fn map(self, f: impl Fn(f64) -> f64) -> Interval {
         Interval { value: f(self.value), low: f(self.low), high: f(self.high) }
     }
 
-    pub fn is_bounded(&self) -> bool {
+    pub(crate) fn is_bounded(&self) -> bool {
         self.high.is_finite()
     }
 
     /// Whether the true value is above a limit.
-    pub fn above(&self, limit: f64) -> Decision {
+    pub(crate) fn above(&self, limit: f64) -> Decision {
         match (self.low > limit, self.high < limit) {
             (true, _) => Decision::Yes,
             (_, true) => Decision::No,
@@ -96,12 +96,12 @@ impl Interval {
         }
     }
 
-    pub fn below(&self, limit: f64) -> Decision {
+    pub(crate) fn below(&self, limit: f64) -> Decision {
         self.above(limit).opposite()
     }
 
     /// Whether the true value is from `low` to `high`.
-    pub fn within(&self, low: f64, high: f64) -> Decision {
+    pub(crate) fn within(&self, low: f64, high: f64) -> Decision {
         match (self.above(low), self.below(high)) {
             (Decision::Yes, Decision::Yes) => Decision::Yes,
             (Decision::No, _) | (_, Decision::No) => Decision::No,
@@ -111,7 +111,7 @@ impl Interval {
 }
 
 impl Decision {
-    pub fn words(self) -> &'static str {
+    pub(crate) fn words(self) -> &'static str {
         match self {
             Decision::Yes => "holds",
             Decision::No => "does not hold",

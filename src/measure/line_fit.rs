@@ -1,7 +1,7 @@
 //! A straight line through points by least squares.
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LineFit {
+pub(crate) struct LineFit {
     pub slope: f64,
     pub intercept: f64,
     /// Standard error of the slope; not a number for two points, which any line fits.
@@ -10,7 +10,7 @@ pub struct LineFit {
 
 impl LineFit {
     /// `None` without two points of different x.
-    pub fn of(points: &[(f64, f64)]) -> Option<LineFit> {
+    pub(crate) fn of(points: &[(f64, f64)]) -> Option<LineFit> {
         let count = points.len() as f64;
         let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), point| (x + point.0 / count, y + point.1 / count));
         let sum = |of: &dyn Fn(f64, f64) -> f64| points.iter().map(|point| of(point.0 - x, point.1 - y)).sum::<f64>();
@@ -21,11 +21,11 @@ impl LineFit {
     }
 
     /// Through the logarithms of points above 0: the slope is the exponent of a power law.
-    pub fn of_logarithms(points: &[(f64, f64)]) -> Option<LineFit> {
+    pub(crate) fn of_logarithms(points: &[(f64, f64)]) -> Option<LineFit> {
         LineFit::of(&points.iter().map(|(x, y)| (x.ln(), y.ln())).collect::<Vec<_>>())
     }
 
-    pub fn at(&self, x: f64) -> f64 {
+    pub(crate) fn at(&self, x: f64) -> f64 {
         self.intercept + self.slope * x
     }
 }

@@ -1,9 +1,9 @@
 //! What photonmill costs: benchmarks, builders compared, accuracy against time, pictures to show, and the paper's tables.
 
-pub mod bench;
-pub mod compaction;
-pub mod gallery;
-pub mod interval;
-pub mod line_fit;
-pub mod paper;
+pub(crate) mod bench;
+pub(crate) mod compaction;
+pub(crate) mod gallery;
+pub(crate) mod interval;
+pub(crate) mod line_fit;
+pub(crate) mod paper;
 pub mod study;

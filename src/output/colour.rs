@@ -67,7 +67,7 @@ impl Tone {
 
 /// Row by row from the top, linear scene-referred values.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ColourPicture {
+pub(crate) struct ColourPicture {
     pub width: u32,
     pub height: u32,
     pub pixels: Vec<Vec3>,
@@ -75,7 +75,7 @@ pub struct ColourPicture {
 
 impl ColourPicture {
     /// `stops` doubles the brightness of a PNG so many times, before the tone curve; an EXR holds the values untouched.
-    pub fn encode(&self, format: Format, stops: f32, tone: Tone, metadata: Option<&Metadata>) -> Vec<u8> {
+    pub(crate) fn encode(&self, format: Format, stops: f32, tone: Tone, metadata: Option<&Metadata>) -> Vec<u8> {
         match format {
             Format::Exr => {
                 exr_file::encode((self.width, self.height), channels("", ["R", "G", "B"], self.pixels.iter().copied()), metadata)
@@ -89,7 +89,7 @@ impl ColourPicture {
 
     /// Stops that bring the mean luminance of what is not brighter than ten times the median to a
     /// middle grey of 0.18.
-    pub fn usual_exposure(&self) -> f32 {
+    pub(crate) fn usual_exposure(&self) -> f32 {
         let mut luminances: Vec<f32> = self.pixels.iter().map(|pixel| luminance(*pixel)).filter(|luminance| *luminance > 0.0).collect();
         if luminances.is_empty() {
             return 0.0;
@@ -104,12 +104,12 @@ impl ColourPicture {
 }
 
 /// Three 32-bit float channels, values untouched, row by row.
-pub fn exr(width: u32, height: u32, values: &[Vec3]) -> Vec<u8> {
+pub(crate) fn exr(width: u32, height: u32, values: &[Vec3]) -> Vec<u8> {
     exr_file::encode((width, height), channels("", ["R", "G", "B"], values.iter().copied()), None)
 }
 
 /// A texture, with its own codes where it has some; without alpha where that is 1.
-pub fn texture_png(texture: &Texture) -> Vec<u8> {
+pub(crate) fn texture_png(texture: &Texture) -> Vec<u8> {
     let (width, height) = (texture.width, texture.height);
     match &texture.texels {
         Texels::Srgb(codes) | Texels::Linear(codes) if codes.iter().any(|code| code[3] < 255) => {
@@ -124,19 +124,19 @@ pub fn texture_png(texture: &Texture) -> Vec<u8> {
 }
 
 /// Linear values as 8-bit sRGB, clamped to 0 to 1.
-pub fn png(width: u32, height: u32, values: impl Iterator<Item = Vec3>) -> Vec<u8> {
+pub(crate) fn png(width: u32, height: u32, values: impl Iterator<Item = Vec3>) -> Vec<u8> {
     let codes = srgb_codes(values);
     eight_bits(width, height, ColorType::Rgb, &codes, None)
 }
 
 /// Linear values as they are in 8 bits, clamped to 0 to 1.
-pub fn linear_png(width: u32, height: u32, values: impl Iterator<Item = Vec3>) -> Vec<u8> {
+pub(crate) fn linear_png(width: u32, height: u32, values: impl Iterator<Item = Vec3>) -> Vec<u8> {
     let codes: Vec<u8> = values.flat_map(|value| value.to_array().map(|channel| (channel.clamp(0.0, 1.0) * 255.0).round() as u8)).collect();
     eight_bits(width, height, ColorType::Rgb, &codes, None)
 }
 
 /// Codes as they are.
-pub fn png_of_codes(width: u32, height: u32, codes: &[[u8; 3]]) -> Vec<u8> {
+pub(crate) fn png_of_codes(width: u32, height: u32, codes: &[[u8; 3]]) -> Vec<u8> {
     eight_bits(width, height, ColorType::Rgb, codes.as_flattened(), None)
 }
 
@@ -175,7 +175,7 @@ fn write_png(
 }
 
 /// The codes of a PNG of 8 bits.
-pub fn png_codes(content: &[u8]) -> std::result::Result<Vec<u8>, String> {
+pub(crate) fn png_codes(content: &[u8]) -> std::result::Result<Vec<u8>, String> {
     let unreadable = |error: png::DecodingError| format!("cannot be read as PNG ({error})");
     let mut reader = png::Decoder::new(Cursor::new(content)).read_info().map_err(unreadable)?;
     let size = reader.output_buffer_size().ok_or("is too large to be read")?;
@@ -186,12 +186,12 @@ pub fn png_codes(content: &[u8]) -> std::result::Result<Vec<u8>, String> {
 }
 
 /// Relative luminance of linear sRGB.
-pub fn luminance(colour: Vec3) -> f32 {
+pub(crate) fn luminance(colour: Vec3) -> f32 {
     colour.dot(Vec3::new(0.2126, 0.7152, 0.0722))
 }
 
 /// The sRGB transfer function (IEC 61966-2-1), from linear to 8-bit code.
-pub fn srgb_code(linear: f32) -> u8 {
+pub(crate) fn srgb_code(linear: f32) -> u8 {
     let linear = linear.clamp(0.0, 1.0);
     let encoded = if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
     (encoded * 255.0).round() as u8

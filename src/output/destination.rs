@@ -16,7 +16,7 @@ use crate::text;
 
 /// A file that will be written.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Destination {
+pub(crate) struct Destination {
     option: &'static str,
     /// As the user named it.
     path: PathBuf,
@@ -28,7 +28,7 @@ pub struct Folder(Destination);
 
 impl Destination {
     /// Fails now if `path` could not be written later. `option` is named in errors.
-    pub fn open(option: &'static str, path: &Path) -> Result<Destination> {
+    pub(crate) fn open(option: &'static str, path: &Path) -> Result<Destination> {
         let destination = Destination { option, path: path.to_owned() };
         if destination.is_standard_output() {
             return Ok(destination);
@@ -52,7 +52,7 @@ impl Destination {
     }
 
     /// The same of a file that is replaced as a whole, piece by piece or again and again: a pipe or a device cannot be.
-    pub fn open_file(option: &'static str, path: &Path) -> Result<Destination> {
+    pub(crate) fn open_file(option: &'static str, path: &Path) -> Result<Destination> {
         let destination = Destination::open(option, path)?;
         let target = destination.target();
         let is_file = !destination.is_standard_output() && (!target.exists() || target.is_file());
@@ -60,22 +60,22 @@ impl Destination {
     }
 
     /// Begins a file that is written piece by piece, and appears once it is whole.
-    pub fn stage(&self) -> Result<Staged> {
+    pub(crate) fn stage(&self) -> Result<Staged> {
         let file = temporary_in(parent(&self.target())).map_err(|error| self.refuse(refusal(&error)))?;
         *STAGED.lock().unwrap_or_else(PoisonError::into_inner) = Some(file.path().to_owned());
         Ok(Staged { destination: self.clone(), file })
     }
 
     /// Why it could not be written.
-    pub fn failed(&self, error: &std::io::Error) -> Error {
+    pub(crate) fn failed(&self, error: &std::io::Error) -> Error {
         self.refuse(refusal(error))
     }
 
-    pub fn is_standard_output(&self) -> bool {
+    pub(crate) fn is_standard_output(&self) -> bool {
         self.path == Path::new("-")
     }
 
-    pub fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
@@ -136,18 +136,18 @@ impl Folder {
     }
 
     /// The folder itself, which no file may be.
-    pub fn itself(&self) -> Destination {
+    pub(crate) fn itself(&self) -> Destination {
         self.0.clone()
     }
 
     /// A file in the folder.
-    pub fn file(&self, name: &str) -> Destination {
+    pub(crate) fn file(&self, name: &str) -> Destination {
         Destination { option: self.0.option, path: self.0.path.join(name) }
     }
 }
 
 /// Refuses two outputs in one file.
-pub fn check_distinct(destinations: &[Destination]) -> Result<()> {
+pub(crate) fn check_distinct(destinations: &[Destination]) -> Result<()> {
     let mut seen: HashMap<PathBuf, &Destination> = HashMap::new();
     for destination in destinations {
         if let Some(first) = seen.insert(destination.file(), destination) {
@@ -163,7 +163,7 @@ pub fn check_distinct(destinations: &[Destination]) -> Result<()> {
 }
 
 /// Refuses an output in a file that is read.
-pub fn check_not_read<'a>(destinations: &[Destination], inputs: impl IntoIterator<Item = &'a Path>) -> Result<()> {
+pub(crate) fn check_not_read<'a>(destinations: &[Destination], inputs: impl IntoIterator<Item = &'a Path>) -> Result<()> {
     let inputs: Vec<PathBuf> = inputs.into_iter().filter_map(|input| std::fs::canonicalize(input).ok()).collect();
     match destinations.iter().find(|destination| !destination.is_standard_output() && inputs.contains(&destination.file())) {
         Some(destination) => Err(destination.refuse("it is also read")),
@@ -173,7 +173,7 @@ pub fn check_not_read<'a>(destinations: &[Destination], inputs: impl IntoIterato
 
 /// Writes a file that must survive whatever happens next: under another name first, and on the disk before it takes the place of the
 /// one before it.
-pub fn write_synced(destination: &Destination, content: &[u8]) -> Result<()> {
+pub(crate) fn write_synced(destination: &Destination, content: &[u8]) -> Result<()> {
     let mut staged = destination.stage()?;
     staged.file().write_all(content).map_err(|error| destination.failed(&error))?;
     // Written again and again: what cannot be written now may be later.
@@ -181,7 +181,7 @@ pub fn write_synced(destination: &Destination, content: &[u8]) -> Result<()> {
 }
 
 /// A file under another name.
-pub struct Staged {
+pub(crate) struct Staged {
     destination: Destination,
     file: NamedTempFile,
 }
@@ -190,19 +190,19 @@ pub struct Staged {
 static STAGED: Mutex<Option<PathBuf>> = Mutex::new(None);
 
 /// Removes what is half-written, before the program ends at once.
-pub fn remove_staged() {
+pub(crate) fn remove_staged() {
     if let Some(path) = STAGED.lock().unwrap_or_else(PoisonError::into_inner).take() {
         let _ = std::fs::remove_file(path);
     }
 }
 
 impl Staged {
-    pub fn file(&mut self) -> &mut File {
+    pub(crate) fn file(&mut self) -> &mut File {
         self.file.as_file_mut()
     }
 
     /// On the disk, and then by its own name; where its folder is gone, in another.
-    pub fn finish(self) -> Result<()> {
+    pub(crate) fn finish(self) -> Result<()> {
         self.end(true)
     }
 
@@ -249,7 +249,7 @@ fn elsewhere(destination: &Destination, mut file: NamedTempFile) -> std::io::Res
 
 /// Writes every file, or none: all are there under temporary names before the first gets its own. If one cannot be
 /// written, all go to a new folder elsewhere, which the error names.
-pub fn write_all(files: impl IntoIterator<Item = (Destination, Vec<u8>)>) -> Result<()> {
+pub(crate) fn write_all(files: impl IntoIterator<Item = (Destination, Vec<u8>)>) -> Result<()> {
     let cache = directories::BaseDirs::new().map(|folders| folders.cache_dir().to_owned());
     write_or_save(files, &[Some(std::env::temp_dir()), cache].into_iter().flatten().collect::<Vec<_>>())
 }

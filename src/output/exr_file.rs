@@ -12,13 +12,13 @@ use crate::scene::linear_picture::check_layers;
 const MOST_PIXELS: u64 = 1 << 28;
 
 /// Values of all pixels, row by row from the top; `name` is R, or that of a layer before it: `albedo.R`.
-pub struct Channel {
+pub(crate) struct Channel {
     pub name: String,
     pub values: Vec<f32>,
 }
 
 /// Three channels of a layer; `names` are theirs, the layer's before a dot.
-pub fn channels(layer: &str, names: [&str; 3], values: impl Iterator<Item = glam::Vec3>) -> Vec<Channel> {
+pub(crate) fn channels(layer: &str, names: [&str; 3], values: impl Iterator<Item = glam::Vec3>) -> Vec<Channel> {
     let name = |channel: &str| if layer.is_empty() { channel.to_owned() } else { format!("{layer}.{channel}") };
     let mut channels = names.map(|channel| Channel { name: name(channel), values: Vec::with_capacity(values.size_hint().0) });
     for value in values {
@@ -28,15 +28,15 @@ pub fn channels(layer: &str, names: [&str; 3], values: impl Iterator<Item = glam
 }
 
 /// Attribute of a file of standard errors.
-pub const FREEDOM: &str = "degreesOfFreedom";
+pub(crate) const FREEDOM: &str = "degreesOfFreedom";
 
 /// The file.
-pub fn encode(size: (u32, u32), channels: Vec<Channel>, metadata: Option<&Metadata>) -> Vec<u8> {
+pub(crate) fn encode(size: (u32, u32), channels: Vec<Channel>, metadata: Option<&Metadata>) -> Vec<u8> {
     encode_with(size, channels, |attributes| metadata.into_iter().for_each(|metadata| metadata.set(attributes)))
 }
 
 /// A file of standard errors, which says from how many degrees of freedom they are, and what intervals follow.
-pub fn encode_errors(size: (u32, u32), channels: Vec<Channel>, source: ErrorSource) -> Vec<u8> {
+pub(crate) fn encode_errors(size: (u32, u32), channels: Vec<Channel>, source: ErrorSource) -> Vec<u8> {
     encode_with(size, channels, |attributes| {
         attributes.comments = Some(Text::from_slice_unchecked(source.in_words().as_bytes()));
         attributes.other.insert(FREEDOM.into(), AttributeValue::I32(source.degrees_of_freedom as i32));
@@ -56,7 +56,7 @@ fn encode_with((width, height): (u32, u32), channels: Vec<Channel>, set: impl Fn
 }
 
 /// From how many degrees of freedom a file says that its standard errors are; `None` where it does not say, or is no OpenEXR file.
-pub fn freedom(content: &[u8]) -> Option<u32> {
+pub(crate) fn freedom(content: &[u8]) -> Option<u32> {
     let meta = MetaData::read_from_buffered(Cursor::new(content), false).ok()?;
     match meta.headers.first()?.own_attributes.other.get(&Text::from(FREEDOM))? {
         AttributeValue::I32(freedom) => u32::try_from(*freedom).ok(),
@@ -65,7 +65,7 @@ pub fn freedom(content: &[u8]) -> Option<u32> {
 }
 
 /// Size and channels of a file of 32-bit floats in one part.
-pub fn decode(content: &[u8]) -> std::result::Result<((u32, u32), Vec<Channel>), String> {
+pub(crate) fn decode(content: &[u8]) -> std::result::Result<((u32, u32), Vec<Channel>), String> {
     check_layers(content, MOST_PIXELS)?;
     let image = read()
         .no_deep_data()

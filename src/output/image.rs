@@ -13,7 +13,7 @@ use crate::scene::room::{RoomScene, face_axis};
 
 /// A grey picture, row by row from the top.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Picture {
+pub(crate) struct Picture {
     pub width: usize,
     pub height: usize,
     pub values: Vec<f64>,
@@ -70,7 +70,7 @@ const VIEW_PIXELS: usize = 3 * WALL_PIXELS / 2;
 const RAYS: usize = 3;
 
 /// The unfolded walls on the left, four views on the right.
-pub fn overview(scene: &RoomScene, walls: &[WallEstimate]) -> Picture {
+pub(crate) fn overview(scene: &RoomScene, walls: &[WallEstimate]) -> Picture {
     let mut picture = Picture::black(3 * WALL_PIXELS + 2 * VIEW_PIXELS, 3 * WALL_PIXELS);
     picture.paste(&unfolded(scene, walls), 0, 0);
     for (place, eye) in VIEWS.iter().enumerate() {
@@ -81,12 +81,12 @@ pub fn overview(scene: &RoomScene, walls: &[WallEstimate]) -> Picture {
 }
 
 /// The box from one of [`VIEWS`].
-pub fn view(scene: &RoomScene, walls: &[WallEstimate], number: usize, pixels: usize) -> Picture {
+pub(crate) fn view(scene: &RoomScene, walls: &[WallEstimate], number: usize, pixels: usize) -> Picture {
     view_of_values(scene, &illumination(walls), number, pixels)
 }
 
 /// The same with values of any kind, of the texels of each face.
-pub fn view_of_values(scene: &RoomScene, walls: &[(usize, &[f64])], number: usize, pixels: usize) -> Picture {
+pub(crate) fn view_of_values(scene: &RoomScene, walls: &[(usize, &[f64])], number: usize, pixels: usize) -> Picture {
     perspective(scene, walls, VIEWS[number].1, pixels)
 }
 
@@ -95,7 +95,7 @@ fn illumination(walls: &[WallEstimate]) -> Vec<(usize, &[f64])> {
 }
 
 /// The walls folded out around the back wall, as one looks in through the opening.
-pub fn unfolded(scene: &RoomScene, walls: &[WallEstimate]) -> Picture {
+pub(crate) fn unfolded(scene: &RoomScene, walls: &[WallEstimate]) -> Picture {
     let (min, max) = (scene.min_corner, scene.max_corner);
     let side = WALL_PIXELS;
     let mut picture = Picture::black(3 * side, 3 * side);
@@ -127,7 +127,7 @@ fn mix(a: f64, b: f64, t: f64) -> f64 {
 }
 
 /// Eyes and where they are: in half widths of the box from its centre, all in front of the opening.
-pub const VIEWS: [(&str, [f64; 3]); 4] = [
+pub(crate) const VIEWS: [(&str, [f64; 3]); 4] = [
     ("from the front", [0.0, 0.0, 4.2]),
     ("from the upper right", [1.7, 1.2, 4.2]),
     ("from the upper left", [-1.7, 1.2, 4.2]),
@@ -182,12 +182,12 @@ fn perspective(scene: &RoomScene, walls: &[(usize, &[f64])], eye: [f64; 3], pixe
 }
 
 impl Picture {
-    pub fn black(width: usize, height: usize) -> Picture {
+    pub(crate) fn black(width: usize, height: usize) -> Picture {
         Picture { width, height, values: vec![0.0; width * height] }
     }
 
     /// Copies another picture in, its upper left corner at (column, row).
-    pub fn paste(&mut self, other: &Picture, column: usize, row: usize) {
+    pub(crate) fn paste(&mut self, other: &Picture, column: usize, row: usize) {
         for j in 0..other.height {
             let to = (row + j) * self.width + column;
             self.values[to..to + other.width].copy_from_slice(&other.values[j * other.width..(j + 1) * other.width]);
@@ -195,7 +195,7 @@ impl Picture {
     }
 
     /// The file's bytes.
-    pub fn encode(&self, format: Format, metadata: Option<&Metadata>) -> Vec<u8> {
+    pub(crate) fn encode(&self, format: Format, metadata: Option<&Metadata>) -> Vec<u8> {
         let (width, height) = (self.width as u32, self.height as u32);
         match format {
             Format::Png => {

@@ -14,7 +14,7 @@ use crate::scene::room::RoomScene;
 /// Physical quantities of a wall's texel, both in W/m2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Quantity {
+pub(crate) enum Quantity {
     Irradiance,
     Radiosity,
 }
@@ -41,7 +41,7 @@ struct WallLayout<'a> {
 }
 
 /// Files of a lightmap, before there is any content.
-pub fn destinations(folder: &Folder, scene: &RoomScene) -> Vec<Destination> {
+pub(crate) fn destinations(folder: &Folder, scene: &RoomScene) -> Vec<Destination> {
     let walls = scene.walls().flat_map(|(_, wall)| names(wall.name)).map(|name| folder.file(&name));
     walls.chain([folder.file(LAYOUT)]).collect()
 }
@@ -60,7 +60,7 @@ fn names(wall: &str) -> [String; 2] {
 }
 
 /// `<wall>.exr` and `<wall>-error.exr` for every wall, and `layout.json`.
-pub fn files(
+pub(crate) fn files(
     folder: &Folder,
     quantity: Quantity,
     scene: &RoomScene,

@@ -28,7 +28,7 @@ struct Report<'a> {
     errors: Errors<'a>,
 }
 
-pub fn json(run: &SavedRun, film: &SceneFilm, missing: &[String]) -> Vec<u8> {
+pub(crate) fn json(run: &SavedRun, film: &SceneFilm, missing: &[String]) -> Vec<u8> {
     let confidence = film.plan.confidence;
     let error = film.error(confidence).stated();
     let report = Report {
@@ -46,7 +46,7 @@ pub fn json(run: &SavedRun, film: &SceneFilm, missing: &[String]) -> Vec<u8> {
 }
 
 /// `film` where its errors can be told without the scene.
-pub fn text(run: &SavedRun, files: usize, film: Option<&SceneFilm>) -> String {
+pub(crate) fn text(run: &SavedRun, files: usize, film: Option<&SceneFilm>) -> String {
     let SavedRun { identity, wanted, .. } = run;
     let (blocks, files) = (counted(run.done.count(), "block"), counted(files as u64, "file"));
     let mut text = format!("{}: {blocks} from {files}, of {wanted} that the run was to have\n", identity.scene);

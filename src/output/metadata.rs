@@ -15,14 +15,14 @@ use crate::plan::work_division::Division;
 use crate::settings::tile_samples::TileSamples;
 
 /// Keyword of a PNG's text, and name of an EXR's attribute, that hold all of it as JSON.
-pub const KEY: &str = "photonmill";
+pub(crate) const KEY: &str = "photonmill";
 /// No picture of this program has more of it.
 const MOST_BYTES: usize = 1 << 24;
 
 /// Nothing in it depends on when, where or on how many devices of a kind the run was made: equal results are equal files.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Metadata {
+pub(crate) struct Metadata {
     /// The program's version.
     pub photonmill: String,
     /// Devices and their drivers.
@@ -54,7 +54,7 @@ pub struct Metadata {
 /// What `photonmill repeat` takes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Repeat {
+pub(crate) enum Repeat {
     /// `command` is the subcommand; `arguments` are those that decide the picture, as they were typed; `division` is what each round did,
     /// as a pilot may have chosen it, and `tiles` have more samples.
     With { command: String, arguments: Vec<String>, division: Division, tiles: Option<TileSamples> },
@@ -63,7 +63,7 @@ pub enum Repeat {
 }
 
 /// Of the devices of a run, each kind once.
-pub fn devices<'a>(facts: impl Iterator<Item = &'a DeviceFacts>) -> Vec<String> {
+pub(crate) fn devices<'a>(facts: impl Iterator<Item = &'a DeviceFacts>) -> Vec<String> {
     let mut names: Vec<String> = facts.map(|facts| format!("{}, {}", facts.name, facts.driver)).collect();
     names.sort();
     names.dedup();
@@ -75,7 +75,7 @@ fn known(value: f64) -> Option<f64> {
 }
 
 /// Noise, and its bound, where they are known.
-pub fn errors(error: &FilmError, confidence: f64) -> [Option<f64>; 2] {
+pub(crate) fn errors(error: &FilmError, confidence: f64) -> [Option<f64>; 2] {
     [known(error.noise), known(error.noise).and_then(|_| known(error.bound(confidence)))]
 }
 
@@ -132,7 +132,7 @@ impl Metadata {
     }
 
     /// Of the content of a .png or .exr; fails with why there is none.
-    pub fn read(content: &[u8]) -> Result<Metadata, String> {
+    pub(crate) fn read(content: &[u8]) -> Result<Metadata, String> {
         let absent = || "holds nothing of how it was made: either photonmill did not write it, or another program has saved it since";
         let json = if content.starts_with(b"\x89PNG") { png_text(content)? } else { exr_attribute(content)? }.ok_or_else(absent)?;
         if json.len() > MOST_BYTES {

@@ -7,7 +7,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use super::svg::Chart;
 
 /// A whole page.
-pub fn page(title: &str, content: &Markup) -> String {
+pub(crate) fn page(title: &str, content: &Markup) -> String {
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -25,7 +25,7 @@ pub fn page(title: &str, content: &Markup) -> String {
 }
 
 /// A chart with what it shows; nothing where nothing was drawn.
-pub fn chart(drawn: Option<Chart>, caption: &str) -> Markup {
+pub(crate) fn chart(drawn: Option<Chart>, caption: &str) -> Markup {
     html! {
         @if let Some(drawn) = drawn {
             figure {
@@ -40,26 +40,26 @@ pub fn chart(drawn: Option<Chart>, caption: &str) -> Markup {
 }
 
 /// Why times of a software device are no times of a GPU, and what `more` follows from it.
-pub fn software_notice(more: &str) -> Markup {
+pub(crate) fn software_notice(more: &str) -> Markup {
     html! {
         p.notice { strong { "This device is software." } " It runs Vulkan on the CPU, so 'GPU' times on this page are CPU times." (more) }
     }
 }
 
 /// A picture within the page, of a `kind` such as 'png'.
-pub fn picture(kind: &str, file: &[u8], (width, height): (u32, u32), alt: &str) -> Markup {
+pub(crate) fn picture(kind: &str, file: &[u8], (width, height): (u32, u32), alt: &str) -> Markup {
     html! { img src={ "data:image/" (kind) ";base64," (STANDARD.encode(file)) } width=(width) height=(height) alt=(alt); }
 }
 
 /// A table that scrolls by itself where the page is narrow.
-pub fn table(head: &Markup, body: &Markup) -> Markup {
+pub(crate) fn table(head: &Markup, body: &Markup) -> Markup {
     html! {
         div.scroll { table { thead { (head) } tbody { (body) } } }
     }
 }
 
 /// Commands that repeat measurements, folded.
-pub fn commands<'a>(commands: impl Iterator<Item = &'a String>) -> Markup {
+pub(crate) fn commands<'a>(commands: impl Iterator<Item = &'a String>) -> Markup {
     html! {
         details { summary { "Commands" } @for command in commands { p { code { (command) } } } }
     }

@@ -52,7 +52,7 @@ fn maps(header: &Header) -> Vec<Map<'_>> {
     header.maps.iter().zip(header.ledgers()).map(|(map, ledger)| with(map)(of_map((map, ledger)))).collect()
 }
 
-pub fn json(header: &Header) -> Vec<u8> {
+pub(crate) fn json(header: &Header) -> Vec<u8> {
     let Header { format, program, device, scene, scene_hash, triangles, settings, unit_metres, centre, rounds, record, .. } = header;
     let summary = Summary {
         format: *format,
@@ -73,7 +73,7 @@ pub fn json(header: &Header) -> Vec<u8> {
     json
 }
 
-pub fn text(header: &Header) -> String {
+pub(crate) fn text(header: &Header) -> String {
     let Header { program, device, scene, triangles, settings, rounds, .. } = header;
     let maps = maps(header);
     let mebibytes = maps.iter().map(|map| map.bytes).sum::<u64>() as f64 / f64::from(1 << 20);
@@ -111,7 +111,13 @@ const PROPERTIES: [(&str, &str); 17] = [
 ];
 
 /// Writes photons of the first rounds of some maps, and says how many.
-pub fn write_ply(map: &MapFile, rounds: u32, names: &[&str], file: &mut File, unwritten: &dyn Fn(std::io::Error) -> Error) -> Result<u64> {
+pub(crate) fn write_ply(
+    map: &MapFile,
+    rounds: u32,
+    names: &[&str],
+    file: &mut File,
+    unwritten: &dyn Fn(std::io::Error) -> Error,
+) -> Result<u64> {
     let header = &map.header;
     let numbers: Vec<usize> = (0..header.maps.len()).filter(|number| names.contains(&header.maps[*number].name.as_str())).collect();
     let all = || (0..rounds).flat_map(|round| numbers.iter().map(move |number| (round, *number)));

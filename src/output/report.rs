@@ -220,7 +220,7 @@ pub(super) fn errors(error: &FilmError, lost: f64, (measure, confidence): (Measu
 }
 
 /// Shares of the parts of the light, the largest first.
-pub fn shares(of_parts: [f64; PART_COUNT as usize]) -> String {
+pub(crate) fn shares(of_parts: [f64; PART_COUNT as usize]) -> String {
     let names = ["direct light", "light over mirrors and glass", "caustics", "indirect light"];
     let mut parts: Vec<(f64, &str)> = of_parts.into_iter().zip(names).filter(|(share, _)| *share >= 0.005).collect();
     parts.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -303,7 +303,7 @@ fn timing_table(timings: &Timings, device: Option<&DeviceFacts>) -> String {
 }
 
 /// What ends a run, as it was understood: for the line that announces the plan.
-pub fn goals(stop: &Stop) -> String {
+pub(crate) fn goals(stop: &Stop) -> String {
     let mut goals = Vec::new();
     // Rounded to twelve digits, as 0.05 / 100 * 100 is not quite 0.05.
     let percent = |share: f64| format!("{} %", (share * 1e14).round() / 1e12);
@@ -314,7 +314,7 @@ pub fn goals(stop: &Stop) -> String {
 }
 
 /// Rounds that a run does, or may do at most.
-pub fn up_to(stop: &Stop, rounds: u32) -> String {
+pub(crate) fn up_to(stop: &Stop, rounds: u32) -> String {
     format!("{}{}", if stop.is_set() { "up to " } else { "" }, counted(rounds, "round"))
 }
 

@@ -58,7 +58,7 @@ struct WallReport {
 }
 
 /// The run as JSON.
-pub fn json(outcome: &RunResult, walls: &[WallEstimate], error: &FilmError) -> Vec<u8> {
+pub(crate) fn json(outcome: &RunResult, walls: &[WallEstimate], error: &FilmError) -> Vec<u8> {
     let plan = &outcome.plan;
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     let driver = host_driver(outcome);
@@ -100,7 +100,7 @@ fn host_driver(outcome: &RunResult) -> String {
 }
 
 /// What the film tells of its error. Of a box without light nothing is known.
-pub fn error(outcome: &RunResult, scene: &RoomScene) -> FilmError {
+pub(crate) fn error(outcome: &RunResult, scene: &RoomScene) -> FilmError {
     let RunResult { plan, film, .. } = outcome;
     // W of a photon of relative flux 1.
     let watts = plan.flux_unit / film.emitted.max(1) as f64;
@@ -110,7 +110,7 @@ pub fn error(outcome: &RunResult, scene: &RoomScene) -> FilmError {
 }
 
 /// The run in words: device, settings, ledger, errors and timing table.
-pub fn text(outcome: &RunResult, error: &FilmError) -> String {
+pub(crate) fn text(outcome: &RunResult, error: &FilmError) -> String {
     let settings = &outcome.plan.settings;
     let mut text = outcome.device.as_ref().map_or_else(|| format!("CPU, {}", host_driver(outcome)), DeviceFacts::label) + "\n";
     outcome.more_devices.iter().for_each(|facts| writeln!(text, "{}", facts.label()).unwrap());

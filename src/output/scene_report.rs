@@ -25,7 +25,7 @@ use crate::timings::Timings;
 
 /// A row of the plan: what was decided, and after a run what it cost and gave.
 #[derive(Serialize)]
-pub struct EffectRow<'a> {
+pub(crate) struct EffectRow<'a> {
     #[serde(flatten)]
     decision: &'a EffectDecision,
     /// GPU time of the passes that exist for this effect, ms; `None` where it shares its passes with
@@ -36,7 +36,7 @@ pub struct EffectRow<'a> {
 }
 
 /// The rows of a plan, with what a run measured.
-pub fn rows<'a>(plan: &'a ScenePlan, run: Option<(&Timings, &[u64])>) -> Vec<EffectRow<'a>> {
+pub(crate) fn rows<'a>(plan: &'a ScenePlan, run: Option<(&Timings, &[u64])>) -> Vec<EffectRow<'a>> {
     let pass = |name: &str| run.and_then(|(timings, _)| timings.row(name)).and_then(|row| row.gpu_ms);
     let share = |part: usize| {
         run.and_then(|(_, totals)| {
@@ -56,7 +56,7 @@ pub fn rows<'a>(plan: &'a ScenePlan, run: Option<(&Timings, &[u64])>) -> Vec<Eff
 }
 
 /// What a pilot has chosen and why, and what errors will take, in a line.
-pub fn pilot(pilot: &Pilot, stop: &Stop, point: &str) -> String {
+pub(crate) fn pilot(pilot: &Pilot, stop: &Stop, point: &str) -> String {
     let Pilot { before, chosen, rounds, .. } = pilot;
     let maps = [
         (rounds.variance.global, chosen.photons, "global", chosen.neighbours),
@@ -77,7 +77,7 @@ pub fn pilot(pilot: &Pilot, stop: &Stop, point: &str) -> String {
 }
 
 /// What each kind of work is expected to take and to leave in the picture, as a table.
-pub fn pilot_table(pilot: &Pilot, stop: &Stop, point: &str) -> String {
+pub(crate) fn pilot_table(pilot: &Pilot, stop: &Stop, point: &str) -> String {
     let Pilot { chosen, rounds, tiles, .. } = pilot;
     let expected = rounds.expected(*chosen, stop);
     let parts = rounds.parts(*chosen, f64::from(expected));
@@ -140,7 +140,7 @@ fn seconds(seconds: f64) -> String {
 }
 
 /// The plan as a table.
-pub fn plan_table(plan: &ScenePlan, run: Option<(&Timings, &[u64])>) -> String {
+pub(crate) fn plan_table(plan: &ScenePlan, run: Option<(&Timings, &[u64])>) -> String {
     let mut text = String::new();
     let rows = rows(plan, run);
     write!(text, "{:<20} {:<8} {:>10} {:>12}", "effect", "", "photons", "bytes").unwrap();
@@ -170,13 +170,13 @@ pub fn plan_table(plan: &ScenePlan, run: Option<(&Timings, &[u64])>) -> String {
 }
 
 /// One line on effects that the scene needs and the user left out.
-pub fn missing(plan: &ScenePlan) -> Option<String> {
+pub(crate) fn missing(plan: &ScenePlan) -> Option<String> {
     let names: Vec<&str> = plan.missing().iter().map(|effect| effect.name()).collect();
     (!names.is_empty()).then(|| format!("left out, though the scene has it: {}; the result lacks that light", names.join(", ")))
 }
 
 /// What will be traced, before it is; `unit` is the geometry's in metres.
-pub fn plan_line(plan: &ScenePlan, scene: &str, unit: f64, point: &str, is_of_file: bool) -> String {
+pub(crate) fn plan_line(plan: &ScenePlan, scene: &str, unit: f64, point: &str, is_of_file: bool) -> String {
     let what = match plan.sensor {
         Sensor::Picture { width, height } => format!("{width} x {height} pixels"),
         Sensor::Receivers { count } => counted(count, point),
@@ -200,7 +200,7 @@ fn photons_of(plan: &ScenePlan) -> String {
 }
 
 /// One line on a radius by a trial round that is wider than what many points lie in.
-pub fn radius_warning(plan: &ScenePlan, geometry: &Geometry, point: &str) -> Option<String> {
+pub(crate) fn radius_warning(plan: &ScenePlan, geometry: &Geometry, point: &str) -> Option<String> {
     let trial = plan.trial.as_ref().filter(|_| plan.radius_is_too_wide())?;
     let widest = plan.maps().filter(|map| map.radius_from == RadiusFrom::Trial).max_by(|a, b| a.radius.total_cmp(&b.radius))?;
     let remedy = match widest.caustic_only {
@@ -281,7 +281,7 @@ fn plan_report<'a>(plan: &'a ScenePlan, run: Option<(&Timings, &[u64])>) -> Plan
 }
 
 /// A plan as JSON.
-pub fn plan_json(plan: &ScenePlan) -> Vec<u8> {
+pub(crate) fn plan_json(plan: &ScenePlan) -> Vec<u8> {
     serde_json::to_vec_pretty(&plan_report(plan, None)).expect("a plan is plain data")
 }
 

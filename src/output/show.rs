@@ -54,13 +54,13 @@ pub struct Surface {
 }
 
 /// What each pixel of a picture sees first.
-pub fn surfaces(scene: &Scene, camera: &Camera, size: (u32, u32)) -> Vec<Surface> {
+pub(crate) fn surfaces(scene: &Scene, camera: &Camera, size: (u32, u32)) -> Vec<Surface> {
     let surface = |seen: FirstSurface| Surface { albedo: seen.albedo.as_vec3(), normal: seen.normal.as_vec3(), depth: seen.depth as f32 };
     first_surfaces(scene, camera, size).into_iter().map(surface).collect()
 }
 
 /// What a file's values are.
-pub fn units(format: Format, stops: f32, tone: Tone) -> String {
+pub(crate) fn units(format: Format, stops: f32, tone: Tone) -> String {
     let tone = match tone {
         Tone::Neutral => "Khronos PBR Neutral",
         Tone::Linear => "linear",
@@ -73,7 +73,7 @@ pub fn units(format: Format, stops: f32, tone: Tone) -> String {
 
 /// How a film is shown.
 #[derive(Clone)]
-pub struct Show {
+pub(crate) struct Show {
     pub size: (u32, u32),
     /// In stops; `None`: what makes the mean middle grey.
     pub exposure: Option<f32>,
@@ -86,30 +86,30 @@ pub struct Show {
 
 impl Show {
     /// Whether an EXR has layers of what is seen first.
-    pub fn shows_surfaces(&self) -> bool {
+    pub(crate) fn shows_surfaces(&self) -> bool {
         self.layers.iter().any(|layer| layer.is_of_surface())
     }
 
     /// The picture alone, as one is shown while the run goes on.
-    pub fn so_far(&self, film: &SceneFilm, format: Format) -> Vec<u8> {
+    pub(crate) fn so_far(&self, film: &SceneFilm, format: Format) -> Vec<u8> {
         let image = self.image(film);
         image.encode(format, self.stops(&image), self.tone, None)
     }
 
     /// A PNG, and its exposure in stops; what its file says of it follows from these.
-    pub fn png(&self, film: &SceneFilm, metadata: impl FnOnce(f32) -> Metadata) -> (Vec<u8>, f32) {
+    pub(crate) fn png(&self, film: &SceneFilm, metadata: impl FnOnce(f32) -> Metadata) -> (Vec<u8>, f32) {
         let image = self.image(film);
         let stops = self.stops(&image);
         (image.encode(Format::Png, stops, self.tone, Some(&metadata(stops))), stops)
     }
 
     /// An EXR.
-    pub fn exr(&self, film: &SceneFilm, surfaces: &[Surface], metadata: Option<&Metadata>) -> Vec<u8> {
+    pub(crate) fn exr(&self, film: &SceneFilm, surfaces: &[Surface], metadata: Option<&Metadata>) -> Vec<u8> {
         exr_file::encode(self.size, self.channels(film, surfaces), metadata)
     }
 
     /// The light, and the layers that are asked for: parts where the film has them, and what is seen first where `surfaces` are given.
-    pub fn channels(&self, film: &SceneFilm, surfaces: &[Surface]) -> Vec<Channel> {
+    pub(crate) fn channels(&self, film: &SceneFilm, surfaces: &[Surface]) -> Vec<Channel> {
         let light = channels("", RGB, (0..film.pixels()).map(|pixel| self.radiance(film, pixel)));
         light.into_iter().chain(self.layers.iter().flat_map(|layer| self.layer(*layer, film, surfaces))).collect()
     }
@@ -147,7 +147,7 @@ impl Show {
     }
 
     /// Standard errors, infinite where they are not known, and what may be unseen in a layer of its own.
-    pub fn errors(&self, film: &SceneFilm) -> Vec<u8> {
+    pub(crate) fn errors(&self, film: &SceneFilm) -> Vec<u8> {
         let errors = channels("", RGB, (0..film.pixels()).map(film.stated_errors()).map(DVec3::as_vec3));
         let all = errors.into_iter().chain(self.layer(Layer::Unseen, film, &[])).collect();
         exr_file::encode_errors(self.size, all, film.error_source())

@@ -8,11 +8,11 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 /// Lines of the scale; the page gives them its own colour.
-pub const SCALE: RGBColor = RGBColor(0x99, 0x99, 0x98);
+pub(crate) const SCALE: RGBColor = RGBColor(0x99, 0x99, 0x98);
 
 /// Colours that the colour-blind tell apart (Okabe and Ito 2008); the first, grey, is for what the others are compared with. The style sheet
 /// has brighter ones for dark pages.
-pub const COLOURS: [RGBColor; 7] = [
+pub(crate) const COLOURS: [RGBColor; 7] = [
     RGBColor(0x80, 0x80, 0x80),
     RGBColor(0xd5, 0x5e, 0x00),
     RGBColor(0x00, 0x72, 0xb2),
@@ -23,31 +23,31 @@ pub const COLOURS: [RGBColor; 7] = [
 ];
 
 /// Size of letters.
-pub const TEXT: u32 = 16;
+pub(crate) const TEXT: u32 = 16;
 
-pub type Drawn<T> = Result<T, DrawingAreaErrorKind<std::io::Error>>;
+pub(crate) type Drawn<T> = Result<T, DrawingAreaErrorKind<std::io::Error>>;
 
 /// A chart for wide pages, and one for narrow ones where it is not the same.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Chart {
+pub(crate) struct Chart {
     pub wide: String,
     pub narrow: Option<String>,
 }
 
 impl Chart {
     /// Of a chart that scrolls where the page is narrow.
-    pub fn of_one_size(wide: String) -> Chart {
+    pub(crate) fn of_one_size(wide: String) -> Chart {
         Chart { wide, narrow: None }
     }
 
     /// As a file of its own.
-    pub fn as_file(&self) -> Vec<u8> {
+    pub(crate) fn as_file(&self) -> Vec<u8> {
         self.wide.replacen("<svg ", "<svg xmlns=\"http://www.w3.org/2000/svg\" style=\"background:#fff\" ", 1).into_bytes()
     }
 }
 
 /// A logarithmic axis.
-pub struct Axis {
+pub(crate) struct Axis {
     pub name: &'static str,
     pub range: Range<f64>,
     pub label: fn(f64) -> String,
@@ -55,7 +55,7 @@ pub struct Axis {
 
 /// Points of one colour.
 #[derive(Clone)]
-pub struct Series {
+pub(crate) struct Series {
     pub label: String,
     pub colour: RGBColor,
     pub points: Vec<(f64, f64)>,
@@ -68,11 +68,11 @@ pub struct Series {
 
 impl Series {
     /// A line through dots, in one of [`COLOURS`].
-    pub fn line(label: impl Into<String>, colour: usize, points: Vec<(f64, f64)>) -> Series {
+    pub(crate) fn line(label: impl Into<String>, colour: usize, points: Vec<(f64, f64)>) -> Series {
         Series { line: points.clone(), ..Series::dots(label, colour, points) }
     }
 
-    pub fn dots(label: impl Into<String>, colour: usize, points: Vec<(f64, f64)>) -> Series {
+    pub(crate) fn dots(label: impl Into<String>, colour: usize, points: Vec<(f64, f64)>) -> Series {
         let colour = COLOURS[colour % COLOURS.len()];
         Series { label: label.into(), colour, points, dot: 4, line: Vec::new(), band: Vec::new() }
     }
@@ -92,7 +92,7 @@ const WIDE: Layout = Layout { width: 900, height: 460, labels: 230, ticks: 10 };
 const NARROW: Layout = Layout { width: 400, height: 340, labels: 0, ticks: 5 };
 
 /// All series over two logarithmic axes. What lies above or below the axes is drawn at their ends.
-pub fn log_log(x: &Axis, y: &Axis, series: &[Series]) -> Chart {
+pub(crate) fn log_log(x: &Axis, y: &Axis, series: &[Series]) -> Chart {
     Chart { wide: draw(x, y, series, &WIDE), narrow: Some(draw(x, y, series, &NARROW)) }
 }
 
@@ -220,27 +220,27 @@ fn power(exponent: i32) -> f64 {
 }
 
 /// Whole decades around all values.
-pub fn decades(values: impl Iterator<Item = f64>) -> Range<f64> {
+pub(crate) fn decades(values: impl Iterator<Item = f64>) -> Range<f64> {
     let (low, high) = extremes(values);
     let low = low.log10().floor();
     10f64.powf(low)..10f64.powf(high.log10().ceil().max(low + 1.0))
 }
 
 /// A little wider than all values, and wide enough to have a mark or two.
-pub fn around(values: impl Iterator<Item = f64>) -> Range<f64> {
+pub(crate) fn around(values: impl Iterator<Item = f64>) -> Range<f64> {
     let (low, high) = extremes(values);
     let wider = (3.0 * low / high).max(1.0).sqrt();
     low / 1.3 / wider..high * 1.3 * wider
 }
 
 /// The least and the largest of values above 0.
-pub fn extremes(values: impl Iterator<Item = f64>) -> (f64, f64) {
+pub(crate) fn extremes(values: impl Iterator<Item = f64>) -> (f64, f64) {
     values.fold((f64::INFINITY, 0.0f64), |(low, high), value| (low.min(value), high.max(value)))
 }
 
 /// Draws, and makes the SVG fit for being part of a page: it scales with its box, and names no
 /// address.
-pub fn svg(size: (u32, u32), draw: impl FnOnce(&DrawingArea<SVGBackend, Shift>) -> Drawn<()>) -> String {
+pub(crate) fn svg(size: (u32, u32), draw: impl FnOnce(&DrawingArea<SVGBackend, Shift>) -> Drawn<()>) -> String {
     let mut text = String::new();
     {
         let area = SVGBackend::with_string(&mut text, size).into_drawing_area();

@@ -14,7 +14,7 @@ use crate::engine::run::watch::Later;
 use crate::error::{Error, Result};
 
 /// Where tev listens unless it is started with another `--hostname`.
-pub const PORT: u16 = 14_158;
+pub(crate) const PORT: u16 = 14_158;
 const OPTION: &str = "display";
 /// Until a machine that does not answer counts as absent, and a viewer that takes nothing as gone.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -23,7 +23,7 @@ const MOST_VALUES: usize = 1 << 22;
 
 /// Where a viewer listens.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Address {
+pub(crate) struct Address {
     /// As it was typed.
     pub typed: String,
     pub host: String,
@@ -34,7 +34,7 @@ pub struct Address {
 type Picture = Later<Vec<Channel>>;
 
 /// A viewer that shows one picture.
-pub struct Viewer {
+pub(crate) struct Viewer {
     typed: String,
     /// And who sends; `None` once it has gone.
     sender: Option<(SyncSender<Picture>, JoinHandle<io::Result<()>>)>,
@@ -42,7 +42,7 @@ pub struct Viewer {
 
 impl Viewer {
     /// For a picture of this name and size. Fails where nobody listens.
-    pub fn connect(address: &Address, name: String, size: (u32, u32)) -> Result<Viewer> {
+    pub(crate) fn connect(address: &Address, name: String, size: (u32, u32)) -> Result<Viewer> {
         let Address { typed, host, port } = address;
         let absent = |why: String| {
             Error::setting(
@@ -69,7 +69,7 @@ impl Viewer {
     }
 
     /// Sends the picture, unless another is still on its way. Fails once, when the viewer has gone.
-    pub fn show(&mut self, picture: Picture) -> Result<()> {
+    pub(crate) fn show(&mut self, picture: Picture) -> Result<()> {
         match &self.sender {
             Some((sender, thread)) if !thread.is_finished() => {
                 // Not taken: busy, or just gone, which the next call tells.
@@ -81,7 +81,7 @@ impl Viewer {
     }
 
     /// Sends the last picture, and waits until it is there. Fails where the viewer has gone and no call before has told so.
-    pub fn finish(mut self, picture: Vec<Channel>) -> Result<()> {
+    pub(crate) fn finish(mut self, picture: Vec<Channel>) -> Result<()> {
         if let Some((sender, _)) = &self.sender {
             // Not taken where the viewer has gone.
             let _ = sender.send(Box::new(|| picture));

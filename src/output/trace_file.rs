@@ -23,7 +23,7 @@ fn arguments(span: &Span) -> Value {
     arguments
 }
 
-pub fn chrome_trace(timings: &Timings, device: &str) -> Vec<u8> {
+pub(crate) fn chrome_trace(timings: &Timings, device: &str) -> Vec<u8> {
     let track = |clock: Clock| match clock {
         Clock::Wall => 0,
         Clock::Gpu => 1,

@@ -1,32 +1,32 @@
 //! Numbers as people read them.
 
 /// The name of an enum's value.
-pub fn lower_case(value: impl std::fmt::Debug) -> String {
+pub(crate) fn lower_case(value: impl std::fmt::Debug) -> String {
     format!("{value:?}").to_lowercase()
 }
 
 /// Three significant digits, thousands grouped by a narrow space.
-pub fn number(value: f64) -> String {
+pub(crate) fn number(value: f64) -> String {
     significant(value, 3)
 }
 
 /// A whole number, thousands grouped by a narrow space.
-pub fn count(value: u64) -> String {
+pub(crate) fn count(value: u64) -> String {
     grouped(&value.to_string())
 }
 
 /// Two significant digits and a multiplication sign.
-pub fn times(ratio: f64) -> String {
+pub(crate) fn times(ratio: f64) -> String {
     significant(ratio, 2) + "\u{a0}×"
 }
 
 /// Milliseconds, as seconds from one on.
-pub fn duration(ms: f64) -> String {
+pub(crate) fn duration(ms: f64) -> String {
     time(ms, 3)
 }
 
 /// A duration of one significant digit, for scales.
-pub fn tick(ms: f64) -> String {
+pub(crate) fn tick(ms: f64) -> String {
     time(ms, 1)
 }
 
@@ -36,7 +36,7 @@ fn time(ms: f64, digits: i32) -> String {
 }
 
 /// 'a', 'a and b', 'a, b and c'.
-pub fn list(items: &[String]) -> String {
+pub(crate) fn list(items: &[String]) -> String {
     match items {
         [] => String::new(),
         [only] => only.clone(),

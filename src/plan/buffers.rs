@@ -25,7 +25,7 @@ use crate::settings::scene::Effect;
 
 /// A buffer that a run will have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct PlannedBuffer {
+pub(crate) struct PlannedBuffer {
     /// Several that are alike have the same.
     pub name: &'static str,
     /// What it holds, and so what it is for.
@@ -37,14 +37,14 @@ pub struct PlannedBuffer {
 
 impl PlannedBuffer {
     /// Vulkan has no empty buffers, so there is one element at least.
-    pub fn bytes(&self) -> u64 {
+    pub(crate) fn bytes(&self) -> u64 {
         self.count.max(1) * self.element_bytes
     }
 }
 
 /// A buffer by its name and the type of its elements: declared once below, listed by a plan with its length, and made by the engine.
 #[derive(Debug)]
-pub struct Declared<T> {
+pub(crate) struct Declared<T> {
     pub name: &'static str,
     element: PhantomData<T>,
 }
@@ -70,7 +70,7 @@ macro_rules! declare {
 }
 
 /// Buffers of the paper's box.
-pub mod room {
+pub(crate) mod room {
     use super::*;
 
     declare! {
@@ -117,7 +117,7 @@ pub mod room {
 }
 
 /// Buffers of a scene.
-pub mod scene {
+pub(crate) mod scene {
     use super::*;
 
     declare! {
@@ -186,14 +186,14 @@ pub mod scene {
     }
 }
 
-pub fn bytes_of(buffers: &[PlannedBuffer]) -> u64 {
+pub(crate) fn bytes_of(buffers: &[PlannedBuffer]) -> u64 {
     buffers.iter().map(PlannedBuffer::bytes).sum()
 }
 
 /// Words of a kind of nonfinite values: how many there were, and three for each of the first ones.
-pub const NONFINITE_KIND_WORDS: usize = 1 + 3 * MAX_NONFINITE_VALUES as usize;
+pub(crate) const NONFINITE_KIND_WORDS: usize = 1 + 3 * MAX_NONFINITE_VALUES as usize;
 
-pub const NONFINITE_VALUES: Declared<u32> = Declared { name: "nonfinite values", element: PhantomData };
+pub(crate) const NONFINITE_VALUES: Declared<u32> = Declared { name: "nonfinite values", element: PhantomData };
 
 fn nonfinite_values() -> PlannedBuffer {
     let kinds = NONFINITE_ESTIMATE as u64 + 1;
@@ -202,13 +202,13 @@ fn nonfinite_values() -> PlannedBuffer {
 
 /// Words that kernels count clamped values, lost camera paths, samples of surfaces and what these
 /// cost in (`glsl/world/scene/film_units.glsl`).
-pub const ANOMALY_WORDS: usize = 14;
+pub(crate) const ANOMALY_WORDS: usize = 14;
 
 /// Values of a place that are kept of a block: three channels of each part of light.
-pub const PART_VALUES: u64 = 3 * PART_COUNT as u64;
+pub(crate) const PART_VALUES: u64 = 3 * PART_COUNT as u64;
 
 /// Sums of each level of a prefix sum over `items`: sums of blocks of the level below, down to one block.
-pub fn block_sum_counts(items: u64, group_size: u32) -> Vec<u64> {
+pub(crate) fn block_sum_counts(items: u64, group_size: u32) -> Vec<u64> {
     let block = u64::from(group_size * SCAN_ITEMS);
     let up = |count: &u64| (*count > 1).then(|| count.div_ceil(block));
     std::iter::successors(Some(items.div_ceil(block).max(1)), up).collect()
@@ -220,13 +220,13 @@ fn block_sums(declared: Declared<u32>, items: u64, group_size: u32) -> impl Iter
 }
 
 /// Work groups of the largest chunk's paths.
-pub fn group_count(plan: &RoomPlan) -> u32 {
+pub(crate) fn group_count(plan: &RoomPlan) -> u32 {
     plan.path_capacity.div_ceil(plan.settings.group_size)
 }
 
 /// Survivors of each work group of so many paths in a scene, with those before them: of the paths that go on and of the photons
 /// that are stored, each with a sum behind.
-pub fn survivor_count(plan: &ScenePlan, paths: u32) -> u32 {
+pub(crate) fn survivor_count(plan: &ScenePlan, paths: u32) -> u32 {
     2 * (paths.div_ceil(plan.settings.group_size) + 1)
 }
 
@@ -241,7 +241,7 @@ fn searches_at_once(plan: &RoomPlan, nearest: u32) -> u64 {
 
 impl RoomPlan {
     /// Every buffer of a run.
-    pub fn buffers(&self) -> Vec<PlannedBuffer> {
+    pub(crate) fn buffers(&self) -> Vec<PlannedBuffer> {
         let bounces = u64::from(self.settings.bounces);
         let group_size = self.settings.group_size;
         let (paths, photons) = (u64::from(self.path_array_length()), u64::from(self.photon_capacity));
@@ -323,7 +323,7 @@ impl RoomPlan {
     }
 
     /// Bytes of all of them.
-    pub fn bytes(&self) -> u64 {
+    pub(crate) fn bytes(&self) -> u64 {
         bytes_of(&self.buffers())
     }
 }
@@ -346,7 +346,7 @@ impl ScenePlan {
     }
 
     /// Every buffer of a run, with one set of receivers where points are asked.
-    pub fn buffers(&self, geometry: &Geometry) -> Vec<PlannedBuffer> {
+    pub(crate) fn buffers(&self, geometry: &Geometry) -> Vec<PlannedBuffer> {
         [self.scene_buffers(geometry), self.sensor_buffers(), self.photon_buffers(), self.count_buffers()].concat()
     }
 

@@ -13,7 +13,7 @@ use crate::settings::{Builder, Gather, RoomSettings, Sums};
 
 /// What a device allows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct Limits {
+pub(crate) struct Limits {
     /// Largest buffer, bytes.
     pub buffer_bytes: u64,
     /// Memory for all buffers together, bytes.
@@ -36,7 +36,7 @@ pub struct Limits {
 
 impl Limits {
     /// Limits of the CPU builder, which splits to keep its arrays small and to hear Ctrl-C.
-    pub fn of_host() -> Limits {
+    pub(crate) fn of_host() -> Limits {
         Limits {
             buffer_bytes: 1 << 29,
             memory_bytes: 1 << 31,
@@ -51,13 +51,13 @@ impl Limits {
     }
 
     /// Refuses a builder that the device cannot run.
-    pub fn check_builder(&self, builder: Builder) -> Result<()> {
+    pub(crate) fn check_builder(&self, builder: Builder) -> Result<()> {
         let why = "needs the lanes of a subgroup to vote together in a loop, which this device's start-up check found wrong; choose another builder, or auto";
         require(builder != Builder::Persistent || self.votes_in_loops, "variant", builder.name(), why)
     }
 
     /// What a device of a kind is good for; its buffers are as the host's, until the device is asked.
-    pub fn of_kind(kind: &str) -> Limits {
+    pub(crate) fn of_kind(kind: &str) -> Limits {
         // Pair tests a tenth of a second: a slow device of its kind does 2^36 (discrete), 2^33 (integrated) or 2^28 (CPU; lavapipe
         // on two cores) a second. Half of the invocations that a large GPU holds at a time keep a device busy.
         let (pair_tests_per_submission, busy_invocations) = match kind {
@@ -92,7 +92,7 @@ const RANK_BYTES: u64 = 4;
 
 /// Expected work of a chunk.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Work {
+pub(crate) struct Work {
     points: f64,
     /// Photons that a point tests for each photon emitted.
     tests_per_photon: f64,
@@ -104,7 +104,7 @@ pub struct Work {
 }
 
 impl Work {
-    pub fn new(scene: &RoomScene, settings: &RoomSettings, point_count: usize) -> Work {
+    pub(crate) fn new(scene: &RoomScene, settings: &RoomSettings, point_count: usize) -> Work {
         // A photon is stored albedo + albedo^2 + ... times at most, and never more than `bounces`.
         let albedo = scene.walls().map(|(_, wall)| f64::from(wall.albedo)).fold(0.0, f64::max);
         let stored = (albedo / (1.0 - albedo)).min(f64::from(settings.bounces));
@@ -130,17 +130,17 @@ impl Work {
     }
 
     /// Pair tests of one point for a chunk.
-    pub fn tests_per_point(&self, photons: u32) -> u64 {
+    pub(crate) fn tests_per_point(&self, photons: u32) -> u64 {
         (self.tests_per_photon * f64::from(photons)).min(self.most_tests).ceil() as u64
     }
 
     /// A pass of building the kd-tree over a chunk's photons, as pair tests.
-    pub fn tree_pass(&self, photons: u32) -> u64 {
+    pub(crate) fn tree_pass(&self, photons: u32) -> u64 {
         (self.entries_per_photon * PAIR_TESTS_PER_TREE_PASS * f64::from(photons)) as u64
     }
 
     /// Flights of a chunk, as pair tests.
-    pub fn tracing(&self, photons: u32) -> u64 {
+    pub(crate) fn tracing(&self, photons: u32) -> u64 {
         (self.flights_per_photon * PAIR_TESTS_PER_FLIGHT * f64::from(photons)) as u64
     }
 }
@@ -187,7 +187,7 @@ const LANES: u32 = 16;
 
 /// How photons are dealt to invocations that keep them to their end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct Persistence {
+pub(crate) struct Persistence {
     /// Invocations that keep the device busy.
     pub busy_invocations: u32,
     /// Most photons of one, one after the other.
@@ -196,7 +196,7 @@ pub struct Persistence {
 
 impl Persistence {
     /// Of photons that take so many loop iterations to begin and for each of their bounces.
-    pub fn new(loops_to_begin: u32, loops_per_bounce: u32, bounces: u32, limits: &Limits) -> Persistence {
+    pub(crate) fn new(loops_to_begin: u32, loops_per_bounce: u32, bounces: u32, limits: &Limits) -> Persistence {
         let loops = LANES * loops_to_begin + loops_per_bounce * bounces;
         Persistence {
             busy_invocations: limits.busy_invocations,
@@ -205,7 +205,7 @@ impl Persistence {
     }
 
     /// Invocations for the photons of a dispatch.
-    pub fn invocations(&self, photons: u32) -> u32 {
+    pub(crate) fn invocations(&self, photons: u32) -> u32 {
         photons.div_ceil((photons / self.busy_invocations).clamp(1, self.most_photons))
     }
 }
@@ -221,7 +221,7 @@ pub(super) fn loops_to_begin(rng: Rng) -> u32 {
 ///
 /// The photon map has room for `bounces` photons of each path, the most that can be stored, so it
 /// can never be full: a round that does not fit is split here, and nothing is dropped there.
-pub fn chunk_photons(settings: &RoomSettings, limits: &Limits, work: &Work) -> Result<u32> {
+pub(crate) fn chunk_photons(settings: &RoomSettings, limits: &Limits, work: &Work) -> Result<u32> {
     let bounces = u64::from(settings.bounces);
     let path = size_of::<StoredPath>() as u64;
     let by_buffer = (limits.buffer_bytes / path).min(limits.buffer_bytes / (PHOTON_BYTES * bounces));

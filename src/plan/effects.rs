@@ -41,7 +41,7 @@ struct Cost {
 
 /// What a run measures of one effect.
 #[derive(Clone, Copy)]
-pub struct Measured {
+pub(crate) struct Measured {
     /// The pass that exists for it.
     pub pass: Option<&'static str>,
     /// Its part of the light, among those that a film tells apart.
@@ -391,7 +391,7 @@ pub(super) fn constants(keeps: &dyn Fn(Effect) -> bool) -> Vec<(&'static str, u3
     Effect::ALL.into_iter().filter_map(|effect| Some((row(effect).constant?, u32::from(keeps(effect))))).collect()
 }
 
-pub fn measured(effect: Effect) -> Option<Measured> {
+pub(crate) fn measured(effect: Effect) -> Option<Measured> {
     row(effect).measured
 }
 

@@ -13,7 +13,7 @@ use crate::text::counted;
 
 /// One effect, kept or dropped, with the evidence.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct EffectDecision {
+pub(crate) struct EffectDecision {
     pub effect: Effect,
     pub kept: bool,
     /// What the scene and the request say, whatever was forced.

@@ -7,7 +7,7 @@ use crate::settings::tile_samples::{TILE, TileSamples};
 
 /// Samples beyond those of all pixels, as the kernels read them (`glsl/world/scene/extra_samples.glsl`).
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct ExtraSamples {
+pub(crate) struct ExtraSamples {
     /// Of each pixel the first one and how many; the most samples of a pixel, and nothing; then the pixel of each, tile by tile. Empty where
     /// all have the same.
     pub table: Arc<Vec<u32>>,
@@ -18,7 +18,7 @@ pub struct ExtraSamples {
 
 impl ExtraSamples {
     /// Refuses more of them than a buffer holds, before they are listed.
-    pub fn new(tiles: Option<&TileSamples>, samples: u32, (width, height): (u32, u32), buffer_bytes: u64) -> Result<ExtraSamples> {
+    pub(crate) fn new(tiles: Option<&TileSamples>, samples: u32, (width, height): (u32, u32), buffer_bytes: u64) -> Result<ExtraSamples> {
         let Some(tiles) = tiles else { return Ok(ExtraSamples { most: samples, ..ExtraSamples::default() }) };
         let most = samples << tiles.most();
         let starts = |end: u32| (0..end).step_by(TILE as usize);

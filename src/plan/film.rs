@@ -6,7 +6,7 @@ use crate::settings::stop::{CONFIDENCES, Measure};
 
 /// What tells the bias of a scene's radii.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum BiasPlan {
+pub(crate) enum BiasPlan {
     /// There is none, as no light comes from a photon map.
     NoMap,
     /// Nothing: radii are as small as they may be, and still wider than what many points lie in.
@@ -19,7 +19,7 @@ pub enum BiasPlan {
 
 /// Light that points which lie on no surface cannot get, as no photon is counted there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum LostOffSurfaces {
+pub(crate) enum LostOffSurfaces {
     /// There is none.
     Nothing,
     /// What lamps send over mirrors and glass.
@@ -30,7 +30,7 @@ pub enum LostOffSurfaces {
 
 /// Of a scene's film, which holds it, so that a film can be read without the scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct FilmPlan {
+pub(crate) struct FilmPlan {
     /// Film units in 1 W/m2/sr or W/m2, a power of two, and the most units that one round may add to a pixel.
     pub scale: f64,
     pub limit: f64,
@@ -60,7 +60,7 @@ pub struct FilmPlan {
 
 impl FilmPlan {
     /// Whether it is what a file may hold: numbers that a plan may have.
-    pub fn is_sound(&self) -> bool {
+    pub(crate) fn is_sound(&self) -> bool {
         let FilmPlan { scale, limit, point_limit, rounds_per_block, samples, roundings_per_round, rare_radiance, .. } = *self;
         let is_positive = |value: f64| value.is_finite() && value > 0.0;
         [scale, limit, point_limit].into_iter().all(is_positive)

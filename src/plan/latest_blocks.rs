@@ -9,19 +9,19 @@ fn kept_step(places: usize) -> usize {
 }
 
 /// Places that are kept.
-pub fn kept_count(places: usize) -> usize {
+pub(crate) fn kept_count(places: usize) -> usize {
     places.div_ceil(kept_step(places))
 }
 
 /// The place with this number among them, one of every so many at random; `None` beyond the film's end.
-pub fn kept_place(number: usize, places: usize) -> Option<usize> {
+pub(crate) fn kept_place(number: usize, places: usize) -> Option<usize> {
     let step = kept_step(places);
     let place = number * step + mix32(number as u32) as usize % step;
     (place < places).then_some(place)
 }
 
 /// Values of a channel that are kept of a run.
-pub fn kept_values(places: usize) -> usize {
+pub(crate) fn kept_values(places: usize) -> usize {
     kept_count(places) * KEPT_BLOCKS as usize
 }
 

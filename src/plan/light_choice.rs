@@ -41,7 +41,7 @@ const WORTH: f64 = 0.02;
 const NORMAL_STEP: f32 = 1.0 / 16.0;
 
 #[derive(Debug, Clone, PartialEq)]
-pub struct LightChoice {
+pub(crate) struct LightChoice {
     pub nodes: Vec<LightNode>,
     pub clusters: u32,
     pub regions: Vec<LightRegion>,
@@ -90,13 +90,13 @@ struct Cut {
 
 impl LightChoice {
     /// By power and number alone, everywhere.
-    pub fn by_power(geometry: &Geometry, tree: LightTree) -> LightChoice {
+    pub(crate) fn by_power(geometry: &Geometry, tree: LightTree) -> LightChoice {
         LightChoice::learned(geometry, tree, (&[], &[]), (&[], &[]), 1)
     }
 
     /// From what each cluster did at points, point after point: at those that are asked about, by so many rays, and at places that
     /// light these, which photons alone follow.
-    pub fn learned(
+    pub(crate) fn learned(
         geometry: &Geometry,
         tree: LightTree,
         asked: (&[Receiver], &[f32]),
@@ -126,7 +126,7 @@ impl LightChoice {
     }
 
     /// Shares as kernels have them: behind the number of clusters.
-    pub fn words(&self) -> Vec<f32> {
+    pub(crate) fn words(&self) -> Vec<f32> {
         [&[f32::from_bits(self.clusters)], self.shares.as_slice()].concat()
     }
 

@@ -1,26 +1,26 @@
 //! What a run will do, decided before any Vulkan call: of the paper's box in [`room`], of a scene in [`scene`], made in [`planning`].
 //! Every buffer is listed in [`buffers`], the radius is in [`radius`].
 
-pub mod buffers;
-pub mod capacity;
-pub mod differences;
-pub mod effects;
-pub mod evidence;
-pub mod extra_samples;
-pub mod film;
-pub mod latest_blocks;
-pub mod light_choice;
+pub(crate) mod buffers;
+pub(crate) mod capacity;
+pub(crate) mod differences;
+pub(crate) mod effects;
+pub(crate) mod evidence;
+pub(crate) mod extra_samples;
+pub(crate) mod film;
+pub(crate) mod latest_blocks;
+pub(crate) mod light_choice;
 mod maps;
-pub mod planning;
-pub mod radius;
-pub mod room;
-pub mod room_effects;
-pub mod scene;
-pub mod sensor;
-pub mod traffic;
-pub mod work_cost;
-pub mod work_division;
+pub(crate) mod planning;
+pub(crate) mod radius;
+pub(crate) mod room;
+pub(crate) mod room_effects;
+pub(crate) mod scene;
+pub(crate) mod sensor;
+pub(crate) mod traffic;
+pub(crate) mod work_cost;
+pub(crate) mod work_division;
 
-pub use capacity::{Limits, Persistence, Work};
-pub use room::{EmissionRange, Grid, RoomPlan, photons_of};
-pub use room_effects::Decision;
+pub(crate) use capacity::{Limits, Persistence, Work};
+pub(crate) use room::{EmissionRange, Grid, RoomPlan, photons_of};
+pub(crate) use room_effects::Decision;

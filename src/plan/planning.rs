@@ -32,12 +32,12 @@ const LEAST_CHUNK: u32 = 1 << 10;
 
 impl ScenePlan {
     /// With radii by the scene's area where none are given.
-    pub fn new(scene: &Scene, geometry: &Geometry, settings: &SceneSettings, sensor: Sensor, limits: &Limits) -> Result<ScenePlan> {
+    pub(crate) fn new(scene: &Scene, geometry: &Geometry, settings: &SceneSettings, sensor: Sensor, limits: &Limits) -> Result<ScenePlan> {
         ScenePlan::with_trial(scene, geometry, settings, sensor, limits, None)
     }
 
     /// With the radii of a trial round where none are given.
-    pub fn with_trial(
+    pub(crate) fn with_trial(
         scene: &Scene,
         geometry: &Geometry,
         settings: &SceneSettings,

@@ -19,7 +19,7 @@ use crate::settings::scene::{CAUSTIC_NEIGHBOURS, NEIGHBOURS};
 /// Where the radius of a map's first round comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum RadiusFrom {
+pub(crate) enum RadiusFrom {
     /// `--radius`, `--caustic-radius`.
     User,
     /// Photons of a trial round around the points that are asked about (`engine::scene::trial`).
@@ -30,7 +30,7 @@ pub enum RadiusFrom {
 
 /// What a trial round found.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct Trial {
+pub(crate) struct Trial {
     /// Radii of the first round at the median point, normalised; `None` where the map has none, or its radius is given.
     pub global_radius: Option<f64>,
     pub caustic_radius: Option<f64>,
@@ -59,25 +59,25 @@ pub struct Trial {
 
 /// The radius that leaves the wanted photons at the median point, and the widest that reaches round few corners, normalised.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct TrialRadius {
+pub(crate) struct TrialRadius {
     pub wanted: f64,
     pub widest: f64,
 }
 
 impl TrialRadius {
-    pub fn radius(self) -> f64 {
+    pub(crate) fn radius(self) -> f64 {
         self.wanted.min(self.widest).clamp(RADIUS_RANGE.0, MAX_DEFAULT_RADIUS)
     }
 
     /// The same of a round whose photons lie so many times as far apart.
-    pub fn scaled(self, times: f64) -> TrialRadius {
+    pub(crate) fn scaled(self, times: f64) -> TrialRadius {
         TrialRadius { wanted: self.wanted * times, ..self }
     }
 }
 
 impl Trial {
     /// The same for a run whose photons of each map lie so many times as far apart, and whose radii are not given.
-    pub fn scaled(&self, times: [f64; 2]) -> Trial {
+    pub(crate) fn scaled(&self, times: [f64; 2]) -> Trial {
         let reach = [self.reach[0].scaled(times[0]), self.reach[1].scaled(times[1])];
         let radius = |of_run: Option<f64>, map: usize| of_run.map(|_| reach[map].radius());
         Trial { global_radius: radius(self.global_radius, 0), caustic_radius: radius(self.caustic_radius, 1), reach, ..self.clone() }
@@ -86,7 +86,7 @@ impl Trial {
 
 /// Photons of a trial, no more than a loop of a kernel may take.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct TrialPhotons {
+pub(crate) struct TrialPhotons {
     pub kept: Arc<Vec<MapPhoton>>,
     /// How many of all were kept.
     pub share: f64,
@@ -94,7 +94,7 @@ pub struct TrialPhotons {
 
 impl TrialPhotons {
     /// Those whose positions have the least hashes: the same ones whatever order they come in.
-    pub fn some_of(mut photons: Vec<MapPhoton>) -> TrialPhotons {
+    pub(crate) fn some_of(mut photons: Vec<MapPhoton>) -> TrialPhotons {
         let all = photons.len();
         let hash = |photon: &MapPhoton| {
             let [x, y, z] = photon.position.to_array().map(f32::to_bits);
@@ -107,11 +107,11 @@ impl TrialPhotons {
 }
 
 /// Radii relative to the scene's normalised extent: from f32's resolution of positions up to all of it.
-pub const RADIUS_RANGE: (f64, f64) = (1.0 / (1 << LEAST_RADIUS_BITS) as f64, 2.0);
+pub(crate) const RADIUS_RANGE: (f64, f64) = (1.0 / (1 << LEAST_RADIUS_BITS) as f64, 2.0);
 /// How often the median point's radius may double where photons are rare, as long as it does not exceed that by the scene's area.
 const MOST_DOUBLINGS: u32 = 3;
 /// Largest radius that is taken by default, relative to the scene's normalised extent.
-pub const MAX_DEFAULT_RADIUS: f64 = 0.125;
+pub(crate) const MAX_DEFAULT_RADIUS: f64 = 0.125;
 /// Photons within the first radius of the global map that goes by the area, on average, with so many neighbours.
 const PHOTONS_PER_ESTIMATE: f64 = 60.0;
 /// A caustic's photons lie closer: its radius over that of as many photons spread over everything.
@@ -130,7 +130,7 @@ pub(super) struct FirstRadius {
 
 /// Radii that differ from point to point: each class has half the radius of the one before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct Classes {
+pub(crate) struct Classes {
     pub count: u32,
     /// That of the median point.
     pub usual: u32,
@@ -145,7 +145,7 @@ impl Classes {
     }
 
     /// How much larger the radius of class 0 is than the usual one.
-    pub fn widest(self) -> f64 {
+    pub(crate) fn widest(self) -> f64 {
         f64::from(1 << self.usual)
     }
 }
@@ -188,17 +188,17 @@ fn share(caustic_only: bool) -> f64 {
 }
 
 /// Neighbours over the usual ones.
-pub fn over_usual(neighbours: u32, caustic_only: bool) -> f64 {
+pub(crate) fn over_usual(neighbours: u32, caustic_only: bool) -> f64 {
     f64::from(neighbours) / f64::from(if caustic_only { CAUSTIC_NEIGHBOURS } else { NEIGHBOURS })
 }
 
 /// Radius, normalised, in which so many photons from lamps leave `PHOTONS_PER_ESTIMATE` on average: each lands about twice.
-pub fn usual_radius(geometry: &Geometry, photons: f64) -> f64 {
+pub(crate) fn usual_radius(geometry: &Geometry, photons: f64) -> f64 {
     (PHOTONS_PER_ESTIMATE * geometry.area / (PI * 2.0 * photons)).sqrt()
 }
 
 /// Radius of a map's first round, normalised, where nothing but the scene's area is known.
-pub fn area_radius(geometry: &Geometry, photons: u32, neighbours: u32, caustic_only: bool) -> f64 {
+pub(crate) fn area_radius(geometry: &Geometry, photons: u32, neighbours: u32, caustic_only: bool) -> f64 {
     (usual_radius(geometry, f64::from(photons) / over_usual(neighbours, caustic_only)) * share(caustic_only))
         .clamp(RADIUS_RANGE.0, MAX_DEFAULT_RADIUS)
 }
@@ -208,7 +208,7 @@ const EXACT_ROUNDS: u32 = 32;
 
 /// The squared radius of a round, relative to the first one's: r_(i+1)^2 = r_i^2 (i + alpha) / (i + 1) with i from 1 (Knaus and
 /// Zwicker 2011, equation 15), whose product is Gamma(n + 1 + alpha) / (Gamma(1 + alpha) (n + 1)!).
-pub fn squared_radius(alpha: f64, round: u32) -> f64 {
+pub(crate) fn squared_radius(alpha: f64, round: u32) -> f64 {
     if alpha == 1.0 || round == 0 {
         return 1.0;
     }
@@ -221,13 +221,13 @@ pub fn squared_radius(alpha: f64, round: u32) -> f64 {
 }
 
 /// The radius of a round, where the first one's is `first`, normalised; never below what positions resolve.
-pub fn of_round(first: f64, alpha: f64, round: u32) -> f64 {
+pub(crate) fn of_round(first: f64, alpha: f64, round: u32) -> f64 {
     (first * squared_radius(alpha, round).sqrt()).max(RADIUS_RANGE.0)
 }
 
 /// Mean over rounds of the squared radius, relative to the first one's: r_(i+1)^2 = r_i^2 (i + alpha) / (i + 1)
 /// (Knaus and Zwicker 2011).
-pub fn mean_squared_radius(alpha: f64, rounds: u32) -> f64 {
+pub(crate) fn mean_squared_radius(alpha: f64, rounds: u32) -> f64 {
     if alpha == 1.0 || rounds <= 1 {
         return 1.0;
     }

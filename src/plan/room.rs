@@ -17,7 +17,7 @@ use crate::settings::{Builder, Gather, MAX_NEAREST_SUMMED, MOST_ROUNDS, RoomSett
 
 /// A run of photons of one light inside a chunk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct EmissionRange {
+pub(crate) struct EmissionRange {
     pub light: u32,
     /// Number within the round.
     pub first_photon: u32,
@@ -26,7 +26,7 @@ pub struct EmissionRange {
 
 impl EmissionRange {
     /// The same photons in runs of at most so many.
-    pub fn parts(self, most: u32) -> impl Iterator<Item = EmissionRange> {
+    pub(crate) fn parts(self, most: u32) -> impl Iterator<Item = EmissionRange> {
         let EmissionRange { light, first_photon, count } = self;
         (0..count).step_by(most.max(1) as usize).map(move |first| EmissionRange {
             light,
@@ -37,7 +37,7 @@ impl EmissionRange {
 }
 
 #[derive(Debug, Clone, PartialEq)]
-pub struct RoomPlan {
+pub(crate) struct RoomPlan {
     pub settings: RoomSettings,
     pub decisions: Vec<Decision>,
     /// Sums a point keeps: flux, and where it differs from the paper's illumination, that too.
@@ -79,7 +79,7 @@ pub struct RoomPlan {
 
 /// The uniform grid that sorts photons.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Grid {
+pub(crate) struct Grid {
     pub origin: [f32; 3],
     pub cells_per_metre: f32,
     pub cell_count: [u32; 3],
@@ -100,11 +100,11 @@ impl Grid {
         }
     }
 
-    pub fn cells(&self) -> u32 {
+    pub(crate) fn cells(&self) -> u32 {
         self.cell_count.iter().product()
     }
 
-    pub fn index_push(&self, photon_capacity: u32) -> IndexPush {
+    pub(crate) fn index_push(&self, photon_capacity: u32) -> IndexPush {
         IndexPush { origin: self.origin.into(), cells_per_metre: self.cells_per_metre, cell_count: self.cell_count.into(), photon_capacity }
     }
 }
@@ -119,7 +119,7 @@ const EVENTS_OF_SCALE: u64 = 1 << 40;
 const MIN_FIXED_POINT: f64 = 512.0;
 
 impl RoomPlan {
-    pub fn new(scene: &RoomScene, settings: &RoomSettings, limits: &Limits) -> Result<RoomPlan> {
+    pub(crate) fn new(scene: &RoomScene, settings: &RoomSettings, limits: &Limits) -> Result<RoomPlan> {
         settings.validate()?;
         limits.check_builder(settings.builder)?;
         let light_photons = deal(settings.photons, &scene.lights.iter().map(|light| light.power).collect::<Vec<_>>());
@@ -189,7 +189,7 @@ impl RoomPlan {
 
     /// The photons of one chunk: of each light the same share, so that whatever has run so far is
     /// a fair sample of all lights.
-    pub fn chunk(&self, chunk: u32) -> Vec<EmissionRange> {
+    pub(crate) fn chunk(&self, chunk: u32) -> Vec<EmissionRange> {
         let chunks = u64::from(self.chunks_per_round);
         let mut first_of_light = 0;
         let mut ranges = Vec::new();
@@ -205,12 +205,12 @@ impl RoomPlan {
     }
 
     /// Every chunk of a round.
-    pub fn chunks(&self) -> impl Iterator<Item = Vec<EmissionRange>> {
+    pub(crate) fn chunks(&self) -> impl Iterator<Item = Vec<EmissionRange>> {
         (0..self.chunks_per_round).map(|chunk| self.chunk(chunk))
     }
 
     /// The range of one photon of a round.
-    pub fn range_of(&self, photon: u32) -> EmissionRange {
+    pub(crate) fn range_of(&self, photon: u32) -> EmissionRange {
         let mut first_of_next = 0;
         let light = self.light_photons.iter().position(|count| {
             first_of_next += count;
@@ -220,13 +220,13 @@ impl RoomPlan {
     }
 
     /// Number of a range's first photon among its light's photons of the run, mod 2^32.
-    pub fn first_sample(&self, round: u32, range: &EmissionRange) -> u32 {
+    pub(crate) fn first_sample(&self, round: u32, range: &EmissionRange) -> u32 {
         let light = range.light as usize;
         let first_of_light: u32 = self.light_photons[..light].iter().sum();
         round.wrapping_mul(self.light_photons[light]).wrapping_add(range.first_photon.wrapping_sub(first_of_light))
     }
 
-    pub fn streams(&self) -> Streams {
+    pub(crate) fn streams(&self) -> Streams {
         Streams {
             rng: self.settings.rng,
             seed: self.settings.seed,
@@ -236,57 +236,57 @@ impl RoomPlan {
     }
 
     /// Whether rounds are told apart, so that their spread tells the error: floats go on over all rounds.
-    pub fn keeps_squares(&self) -> bool {
+    pub(crate) fn keeps_squares(&self) -> bool {
         (self.settings.rounds > 1 || self.is_kept) && self.settings.sums == Sums::Integer
     }
 
     /// Photons that one dispatch traces from their light to their end, in a fraction of a second.
-    pub fn photons_per_dispatch(&self) -> u32 {
+    pub(crate) fn photons_per_dispatch(&self) -> u32 {
         let photons = self.pair_tests_per_submission / self.work.tracing(1).max(1);
         photons.clamp(1, u64::from(u32::MAX)) as u32
     }
 
     /// Paths that one bounce hands to the next; where each photon has an invocation to its end, the one that a replay starts.
-    pub fn path_array_length(&self) -> u32 {
+    pub(crate) fn path_array_length(&self) -> u32 {
         if self.settings.builder == Builder::Persistent { 1 } else { self.path_capacity }
     }
 
     /// Length of the photon map, paths entering each bounce, and what is counted in turn.
-    pub fn counter_array_length(&self) -> u64 {
+    pub(crate) fn counter_array_length(&self) -> u64 {
         let in_turn = if self.counters > 1 { self.counters * COUNTER_STRIDE } else { 0 };
         u64::from(self.settings.bounces) + 2 + u64::from(in_turn)
     }
 
     /// Entries of the photon map that say which photon they are.
-    pub fn origin_array_length(&self) -> u32 {
+    pub(crate) fn origin_array_length(&self) -> u32 {
         if self.keeps_origins { self.photon_capacity } else { 0 }
     }
 
-    pub fn has_slots(&self) -> bool {
+    pub(crate) fn has_slots(&self) -> bool {
         self.settings.builder == Builder::Naive
     }
 
     /// Fixed-point units in 1.
-    pub fn film_scale(&self) -> f64 {
+    pub(crate) fn film_scale(&self) -> f64 {
         (1u64 << self.film_shift) as f64
     }
 
     /// Bytes of the photon map.
-    pub fn photon_map_bytes(&self) -> u64 {
+    pub(crate) fn photon_map_bytes(&self) -> u64 {
         u64::from(self.photon_capacity) * size_of::<StoredPhoton>() as u64
     }
 
-    pub fn gathers_by_grid(&self) -> bool {
+    pub(crate) fn gathers_by_grid(&self) -> bool {
         self.settings.gather == Gather::Grid
     }
 
-    pub fn gathers_by_tree(&self) -> bool {
+    pub(crate) fn gathers_by_tree(&self) -> bool {
         self.settings.gather == Gather::KdTree
     }
 }
 
 /// Photons of a list of ranges.
-pub fn photons_of(ranges: &[EmissionRange]) -> u32 {
+pub(crate) fn photons_of(ranges: &[EmissionRange]) -> u32 {
     ranges.iter().map(|range| range.count).sum()
 }
 

@@ -6,13 +6,13 @@ use crate::scene::room::RoomScene;
 use crate::settings::RoomSettings;
 
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Decision {
+pub(crate) struct Decision {
     pub effect: &'static str,
     pub kept: bool,
     pub reason: String,
 }
 
-pub fn decide(scene: &RoomScene, settings: &RoomSettings, equal_flux: bool) -> Vec<Decision> {
+pub(crate) fn decide(scene: &RoomScene, settings: &RoomSettings, equal_flux: bool) -> Vec<Decision> {
     let glossy: Vec<&str> = scene.walls().filter(|(_, wall)| wall.shininess.is_some()).map(|(_, wall)| wall.name).collect();
     let reflects = scene.walls().any(|(_, wall)| wall.albedo > 0.0);
     vec![

@@ -19,7 +19,7 @@ use crate::settings::scene::{Effect, Part, SceneSettings};
 
 /// A photon map of each round.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct MapPlan {
+pub(crate) struct MapPlan {
     pub name: &'static str,
     pub domain: u32,
     /// Photons of a round.
@@ -67,28 +67,28 @@ pub struct MapPlan {
 
 impl MapPlan {
     /// Candidates of a point among the photons of a chunk, roughly.
-    pub fn tests_per_point(&self) -> u64 {
+    pub(crate) fn tests_per_point(&self) -> u64 {
         let of_chunk = self.expected * f64::from(self.chunk_photons) / f64::from(self.photons.max(1));
         TESTS_PER_POINT.max((TESTS_PER_PHOTON * of_chunk) as u64)
     }
 
     /// Words of the counters: length of the map, then of the lists of a segment.
-    pub fn counter_count(&self) -> u64 {
+    pub(crate) fn counter_count(&self) -> u64 {
         2 + u64::from(self.segment_bounces.min(SEGMENT_BOUNCES))
     }
 
     /// W of a photon of relative flux 1, over the square of the scene's unit.
-    pub fn photon_flux(&self, geometry: &Geometry) -> f64 {
+    pub(crate) fn photon_flux(&self, geometry: &Geometry) -> f64 {
         self.photon_flux_of(geometry, self.photons)
     }
 
     /// The same in a round of so many photons.
-    pub fn photon_flux_of(&self, geometry: &Geometry, photons: u32) -> f64 {
+    pub(crate) fn photon_flux_of(&self, geometry: &Geometry, photons: u32) -> f64 {
         geometry.flux_unit * self.flux_scale / (f64::from(photons.max(1)) * self.flux_gain)
     }
 
     /// (first photon, count) of each chunk.
-    pub fn chunks(&self) -> impl Iterator<Item = (u32, u32)> + use<> {
+    pub(crate) fn chunks(&self) -> impl Iterator<Item = (u32, u32)> + use<> {
         let (photons, step) = (self.photons, self.chunk_photons);
         (0..photons.div_ceil(step)).map(move |chunk| (chunk * step, step.min(photons - chunk * step)))
     }
@@ -97,31 +97,31 @@ impl MapPlan {
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScenePlan {
     pub settings: SceneSettings,
-    pub sensor: Sensor,
+    pub(crate) sensor: Sensor,
     /// What found the radii that nobody has given; `None` where nothing was tried.
-    pub trial: Option<Trial>,
-    pub decisions: Vec<EffectDecision>,
+    pub(crate) trial: Option<Trial>,
+    pub(crate) decisions: Vec<EffectDecision>,
     /// Specialization constants of all kernels.
     pub constants: Vec<(&'static str, u32)>,
-    pub global: Option<MapPlan>,
-    pub caustic: Option<MapPlan>,
+    pub(crate) global: Option<MapPlan>,
+    pub(crate) caustic: Option<MapPlan>,
     /// Mask of `SURFACE_...` whose caustics are wanted.
     pub caustic_surfaces: u32,
     /// What photons of the caustic map are aimed at.
-    pub targets: Vec<CausticTarget>,
+    pub(crate) targets: Vec<CausticTarget>,
     /// Visible points that one camera path may have.
     pub points_per_path: u32,
     /// Those of tiles with more samples than all pixels have.
-    pub extra_samples: ExtraSamples,
+    pub(crate) extra_samples: ExtraSamples,
     /// Sets of sums a visible point has, one an arrival.
     pub arrival_sets: u32,
     /// Mask of the arrivals that some map holds.
     pub arrivals: u32,
     /// Surfaces that one dispatch follows a camera path over.
     pub chain_steps: u32,
-    pub film: FilmPlan,
+    pub(crate) film: FilmPlan,
     /// The light that counts: of a pilot that looks at one kind alone.
-    pub light_of: LightOf,
+    pub(crate) light_of: LightOf,
     /// Width of a pixel's filter over the distance between pixels, which are spread where it is less than 1.
     pub footprint: f64,
     /// Rays or pair tests after which commands are handed to the device.
@@ -134,7 +134,7 @@ pub struct ScenePlan {
 
 /// Light of a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LightOf {
+pub(crate) enum LightOf {
     All,
     /// That paths find, and that of one of the two maps.
     Paths,
@@ -143,21 +143,21 @@ pub enum LightOf {
 }
 
 impl LightOf {
-    pub fn has_paths(self) -> bool {
+    pub(crate) fn has_paths(self) -> bool {
         matches!(self, LightOf::All | LightOf::Paths)
     }
 
-    pub fn has_map(self, caustic_only: bool) -> bool {
+    pub(crate) fn has_map(self, caustic_only: bool) -> bool {
         self == LightOf::All || self == if caustic_only { LightOf::CausticMap } else { LightOf::GlobalMap }
     }
 }
 
 /// Candidates of a point, roughly: what a lookup counts as work.
-pub const TESTS_PER_POINT: u64 = 256;
+pub(crate) const TESTS_PER_POINT: u64 = 256;
 /// Photons in the cells in reach for each within the radius.
 const TESTS_PER_PHOTON: f64 = 4.0;
 /// Landings of each photon of a chunk that a map has room for.
-pub const SEGMENT_BOUNCES: u32 = 16;
+pub(crate) const SEGMENT_BOUNCES: u32 = 16;
 /// Flights of a photon, generously.
 const FLIGHTS_PER_PHOTON: u64 = 8;
 /// Work of a ray, in pair tests.
@@ -193,11 +193,11 @@ impl ScenePlan {
     }
 
     /// Of the light that counts.
-    pub fn traced_maps(&self) -> impl Iterator<Item = &MapPlan> {
+    pub(crate) fn traced_maps(&self) -> impl Iterator<Item = &MapPlan> {
         self.maps().filter(|map| self.light_of.has_map(map.caustic_only))
     }
 
-    pub fn maps(&self) -> impl Iterator<Item = &MapPlan> {
+    pub(crate) fn maps(&self) -> impl Iterator<Item = &MapPlan> {
         self.global.iter().chain(&self.caustic)
     }
 
@@ -231,25 +231,25 @@ impl ScenePlan {
     }
 
     /// Openings that a trial found, and as many of radius 0 as there may be more; none where no light comes from beyond the scene.
-    pub fn openings(&self) -> Vec<CausticTarget> {
+    pub(crate) fn openings(&self) -> Vec<CausticTarget> {
         let mut openings = self.trial.as_ref().map_or_else(Vec::new, |trial| trial.openings.clone());
         openings.resize(if self.constant("HAS_OPENINGS") != 0 { MAX_OPENINGS as usize } else { 0 }, CausticTarget::default());
         openings
     }
 
     /// How shadow rays choose lights; `None` where they do by power.
-    pub fn lights(&self) -> Option<&LightChoice> {
+    pub(crate) fn lights(&self) -> Option<&LightChoice> {
         self.trial.as_ref()?.lights.as_deref().filter(|_| self.constant("HAS_LIGHT_CLUSTERS") != 0)
     }
 
     /// Radius of class 0 in a round, normalised; of all points where there are no classes.
-    pub fn widest_radius(&self, map: &MapPlan, round: u32) -> f64 {
+    pub(crate) fn widest_radius(&self, map: &MapPlan, round: u32) -> f64 {
         radius::of_round(map.radius * map.classes.map_or(1.0, Classes::widest), self.settings.alpha, round)
     }
 
     /// Radius of a map in a round, normalised: r_(i+1)^2 = r_i^2 (i + alpha) / (i + 1) with i from 1
     /// (Knaus and Zwicker 2011, equation 15).
-    pub fn radius(&self, map: &MapPlan, round: u32) -> f64 {
+    pub(crate) fn radius(&self, map: &MapPlan, round: u32) -> f64 {
         radius::of_round(map.radius, self.settings.alpha, round)
     }
 
@@ -315,7 +315,7 @@ impl ScenePlan {
     }
 
     /// The same as the kernels take it.
-    pub fn work(&self) -> WorkDivision {
+    pub(crate) fn work(&self) -> WorkDivision {
         WorkDivision {
             samples: self.samples(),
             shadow_rays: self.shadow_rays(),

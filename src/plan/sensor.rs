@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// What light is asked of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Sensor {
+pub(crate) enum Sensor {
     /// A camera's picture.
     Picture { width: u32, height: u32 },
     /// Irradiance at points; of a phase's many points one set is asked each round.
@@ -13,7 +13,7 @@ pub enum Sensor {
 }
 
 impl Sensor {
-    pub fn pixels(self) -> u32 {
+    pub(crate) fn pixels(self) -> u32 {
         match self {
             Sensor::Picture { width, height } => width.saturating_mul(height),
             Sensor::Receivers { count } => count,
@@ -21,7 +21,7 @@ impl Sensor {
     }
 
     /// Width and height of a picture; receivers have none.
-    pub fn size(self) -> (u32, u32) {
+    pub(crate) fn size(self) -> (u32, u32) {
         match self {
             Sensor::Picture { width, height } => (width, height),
             Sensor::Receivers { .. } => (0, 0),

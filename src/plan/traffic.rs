@@ -32,22 +32,22 @@ impl ScenePlan {
 
 impl MapPlan {
     /// To count stored photons by bucket: by their first half, and numbered.
-    pub fn bytes_of_counting(&self, stored: u64) -> u64 {
+    pub(crate) fn bytes_of_counting(&self, stored: u64) -> u64 {
         stored * (PHOTON / 2 + RANK) + 4 * u64::from(self.bucket_count)
     }
 
     /// To sum the counts up: read and written twice.
-    pub fn bytes_of_scanning(&self) -> u64 {
+    pub(crate) fn bytes_of_scanning(&self) -> u64 {
         16 * u64::from(self.bucket_count)
     }
 
     /// To write stored photons in order.
-    pub fn bytes_of_sorting(&self, stored: u64) -> u64 {
+    pub(crate) fn bytes_of_sorting(&self, stored: u64) -> u64 {
         stored * (2 * PHOTON + RANK)
     }
 
     /// To read all stored photons.
-    pub fn bytes_of_reading(&self, stored: u64) -> u64 {
+    pub(crate) fn bytes_of_reading(&self, stored: u64) -> u64 {
         stored * PHOTON
     }
 }

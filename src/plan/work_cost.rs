@@ -5,7 +5,7 @@ use super::scene::ScenePlan;
 
 /// What paths and photons meet on their way.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Counted {
+pub(crate) struct Counted {
     /// Nodes of the hierarchy for a path from the camera, and for a shadow ray.
     pub nodes: f64,
     pub nodes_of_ray: f64,
@@ -17,7 +17,7 @@ pub struct Counted {
 
 /// What a round takes, nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Cost {
+pub(crate) struct Cost {
     /// In any case.
     pub round: f64,
     /// Of a path through each pixel, and of a shadow ray of each.
@@ -108,7 +108,7 @@ const OF_CAUSTIC_PHOTON: f64 = 1.7;
 
 /// How much a pilot looks at.
 #[derive(Clone, Copy)]
-pub struct PilotSize {
+pub(crate) struct PilotSize {
     /// Rounds of the first look, and its pixels at most, spread over the picture. On a GPU many take hardly longer than few.
     pub rounds: u32,
     pub pixels: u32,
@@ -119,7 +119,7 @@ pub struct PilotSize {
     pub neighbours: f64,
 }
 
-pub fn pilot_size(kind: &str) -> PilotSize {
+pub(crate) fn pilot_size(kind: &str) -> PilotSize {
     match kind {
         "cpu" => PilotSize { rounds: 4, pixels: 1 << 10, photons: 1 << 13, neighbours: 0.5 },
         "discrete" => PilotSize { rounds: 8, pixels: 1 << 14, photons: 1 << 16, neighbours: 2.0 },
@@ -128,7 +128,7 @@ pub fn pilot_size(kind: &str) -> PilotSize {
 }
 
 /// Of a plan's scene and pixels on a class of devices.
-pub fn cost(plan: &ScenePlan, counted: &Counted, kind: &str) -> Cost {
+pub(crate) fn cost(plan: &ScenePlan, counted: &Counted, kind: &str) -> Cost {
     let Costs { path, node, layers, of_layers, of_passing, lookup, triangle, flight, node_of_flight, round, map, chains } = costs(kind);
     let has = |constant: &str| f64::from(plan.constant(constant));
     let Counted { nodes, nodes_of_ray, triangles, flights } = *counted;

@@ -9,7 +9,7 @@ use crate::settings::stop::Stop;
 use crate::text::counted;
 
 /// Rounds of a batch after a run of so many: all batches at both radii together do about as many as the run.
-pub fn rounds_after(rounds: u32) -> u32 {
+pub(crate) fn rounds_after(rounds: u32) -> u32 {
     rounds.div_ceil(2 * BATCHES).max(1)
 }
 
@@ -20,7 +20,7 @@ const REFINEMENTS: u32 = 4;
 
 /// Measures the bias of the first round's radius if it is asked for and the run ends at an error, of which it is a part.
 /// `shrinks` says whether later radii are smaller.
-pub fn bias_before(
+pub(crate) fn bias_before(
     stop: &Stop,
     is_asked: bool,
     shrinks: bool,

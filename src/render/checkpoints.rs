@@ -15,7 +15,7 @@ use crate::output::destination::{Destination, check_not_read, write_synced};
 use crate::text::refusal;
 
 /// What writes checkpoints and snapshots while a run goes on.
-pub struct Checkpoints<'a> {
+pub(crate) struct Checkpoints<'a> {
     tell: Tell<'a>,
     checkpoint: Option<Destination>,
     every: Duration,
@@ -82,7 +82,7 @@ fn check_shard(request: &RenderRequest) -> Result<()> {
 }
 
 /// A file of a run.
-pub fn read(option: &'static str, path: &PathBuf) -> Result<SavedRun> {
+pub(crate) fn read(option: &'static str, path: &PathBuf) -> Result<SavedRun> {
     let refuse = |reason: String| Error::setting(option, path.display(), reason);
     let bytes =
         std::fs::read(path).map_err(|error| refuse(format!("cannot be read ({}); name a file of `checkpoint`", refusal(&error))))?;
@@ -92,7 +92,7 @@ pub fn read(option: &'static str, path: &PathBuf) -> Result<SavedRun> {
 impl<'a> Checkpoints<'a> {
     /// What a request asks for, if anything. Fails now where the file could not be written later, or what is to be gone on with cannot be
     /// read.
-    pub fn open(request: &RenderRequest, observer: &Observer<'a>) -> Result<Checkpoints<'a>> {
+    pub(crate) fn open(request: &RenderRequest, observer: &Observer<'a>) -> Result<Checkpoints<'a>> {
         check_shard(request)?;
         let checkpoint = request.checkpoint.as_ref().map(|path| Destination::open_file("checkpoint", path)).transpose()?;
         let every = request.every.map_or(USUAL_EVERY, |Seconds(seconds)| seconds);
@@ -113,38 +113,38 @@ impl<'a> Checkpoints<'a> {
     }
 
     /// Calls `write` at this interval while the run goes on, but not at its end.
-    pub fn set_snapshot(&mut self, every: Duration, write: Write<'a>) {
+    pub(crate) fn set_snapshot(&mut self, every: Duration, write: Write<'a>) {
         self.snapshot = Some(Snapshot::new(every, write));
     }
 
     /// The same for what need not wait for the picture.
-    pub fn set_display(&mut self, every: Duration, show: Show<'a>) {
+    pub(crate) fn set_display(&mut self, every: Duration, show: Show<'a>) {
         self.display = Some(Snapshot::new(every, show));
     }
 
     /// Refuses outputs in files that are read. A checkpoint may take the place of the one that the run goes on with.
-    pub fn check_not_read<'b>(&self, outputs: &[Destination], inputs: impl IntoIterator<Item = &'b Path>) -> Result<()> {
+    pub(crate) fn check_not_read<'b>(&self, outputs: &[Destination], inputs: impl IntoIterator<Item = &'b Path>) -> Result<()> {
         let others: Vec<Destination> = outputs.iter().filter(|output| Some(*output) != self.checkpoint.as_ref()).cloned().collect();
         check_not_read(outputs, inputs)?;
         check_not_read(&others, self.resume.iter().map(|(path, _)| path.as_path()))
     }
 
     /// Of the run that is gone on with, whose blocks have so many.
-    pub fn rounds_done(&self, block: u32) -> u32 {
+    pub(crate) fn rounds_done(&self, block: u32) -> u32 {
         self.resume.as_ref().map_or(0, |(_, run)| run.done.count() * block)
     }
 
     /// The run that is gone on with.
-    pub fn resumed(&self) -> Option<&SavedRun> {
+    pub(crate) fn resumed(&self) -> Option<&SavedRun> {
         self.resume.as_ref().map(|(_, run)| run)
     }
 
-    pub fn destinations(&self) -> Vec<Destination> {
+    pub(crate) fn destinations(&self) -> Vec<Destination> {
         self.checkpoint.iter().cloned().collect()
     }
 
     /// For a run on a scene of this name.
-    pub fn keep<'b>(&'b mut self, scene: &'b str) -> Keep<'b> {
+    pub(crate) fn keep<'b>(&'b mut self, scene: &'b str) -> Keep<'b> {
         let of_checkpoint = self.checkpoint.as_ref().map(|_| self.every);
         let of_pictures = [self.snapshot.as_ref().map(|snapshot| snapshot.every), self.display.as_ref().map(|display| display.every)];
         let every = of_pictures.into_iter().chain([of_checkpoint]).flatten().min();
@@ -153,7 +153,7 @@ impl<'a> Checkpoints<'a> {
     }
 
     /// Fails where the last checkpoint is not there; says so where there is none, as no block of rounds was done.
-    pub fn finish(self) -> Result<()> {
+    pub(crate) fn finish(self) -> Result<()> {
         if let Some(file) = self.checkpoint.filter(|_| !self.has_checkpoint && self.failed.is_none()) {
             let path = file.path().display();
             (self.tell)(Event::Warning(&format!("`checkpoint` {path}: is not written, as no block of rounds was done")));

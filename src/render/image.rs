@@ -63,7 +63,7 @@ impl PreparedScene {
 impl Inputs {
     /// For an image: keeps the parts of each pixel's light apart where they are shown, but not of a run that goes on with one that has none.
     /// Fails where the image is to be denoised and cannot be.
-    pub fn for_image(mut self, shows_parts: bool, resumed: Option<&SavedRun>) -> Result<Self> {
+    pub(crate) fn for_image(mut self, shows_parts: bool, resumed: Option<&SavedRun>) -> Result<Self> {
         self.denoiser = self.request.denoise.then(|| denoise::open(&self.settings, resumed)).transpose()?;
         self.settings.keeps_parts = (shows_parts || self.request.denoise) && resumed.is_none_or(SavedRun::has_parts);
         Ok(self)
@@ -72,7 +72,7 @@ impl Inputs {
 
 impl Prepared {
     /// Runs to the end; the image is what came of it.
-    pub fn image(&self, gpus: &mut Vec<Gpu>, checkpoints: &mut Checkpoints, observer: &Observer) -> Result<Image> {
+    pub(crate) fn image(&self, gpus: &mut Vec<Gpu>, checkpoints: &mut Checkpoints, observer: &Observer) -> Result<Image> {
         let blocks_with_gaps = blocks_with_gaps(checkpoints.resumed());
         let run = self.run(gpus, checkpoints, observer)?;
         Ok(Image {
@@ -94,13 +94,13 @@ fn blocks_with_gaps(resumed: Option<&SavedRun>) -> u32 {
 }
 
 /// How the image of a request is shown.
-pub fn show(request: &RenderRequest, size: (u32, u32)) -> Show {
+pub(crate) fn show(request: &RenderRequest, size: (u32, u32)) -> Show {
     let layers = request.layers.as_ref().map_or(Layer::ALL.into(), |layers| layers.0.clone());
     Show { size, exposure: request.exposure.map(|stops| stops.0), tone: request.tone.unwrap_or_default(), layers, denoised: None }
 }
 
 /// Refuses what the format of an image's file does not have.
-pub fn check_format(request: &RenderRequest, path: Option<&Path>) -> Result<()> {
+pub(crate) fn check_format(request: &RenderRequest, path: Option<&Path>) -> Result<()> {
     let format = path.map(|path| Format::of("output", path)).transpose()?;
     let name = || path.map_or_else(String::new, |path| path.display().to_string());
     let of_png = "is for PNG only: an EXR holds linear radiance";
@@ -114,7 +114,7 @@ pub fn check_format(request: &RenderRequest, path: Option<&Path>) -> Result<()> 
 }
 
 /// Under whatever name an image is written: equal results are equal files.
-pub fn name_in_text(format: Format) -> &'static str {
+pub(crate) fn name_in_text(format: Format) -> &'static str {
     if format == Format::Png { "picture.png" } else { "picture.exr" }
 }
 
@@ -240,7 +240,7 @@ impl Image {
 }
 
 /// A request with nothing in it but what decides its image, however much work is done for it.
-pub fn kept(request: &RenderRequest) -> RenderRequest {
+pub(crate) fn kept(request: &RenderRequest) -> RenderRequest {
     request.only(|row| row.is_kept(request))
 }
 
@@ -264,7 +264,7 @@ fn command(request: &RenderRequest, run: &RunResult, output: &str) -> String {
 }
 
 /// A command line for a shell, with options that are no request's at its end.
-pub fn command_line(command: &str, request: &RenderRequest, others: &[&str]) -> String {
+pub(crate) fn command_line(command: &str, request: &RenderRequest, others: &[&str]) -> String {
     let options = ROWS.iter().filter_map(|row| Some((row, row.text(request)?))).flat_map(|(row, value)| {
         let value = (row.form() != Form::Flag).then_some(value);
         [Some(format!("--{}", row.option())), value].into_iter().flatten()

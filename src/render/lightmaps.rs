@@ -71,7 +71,7 @@ impl PreparedScene {
 
     /// The same on devices that are opened once the scene's file is known to take lightmaps, with files that none of these may be. What came of
     /// the files stands beside the light, which is not lost with them.
-    pub fn bake_on<Devices: DerefMut<Target = Vec<Gpu>>>(
+    pub(crate) fn bake_on<Devices: DerefMut<Target = Vec<Gpu>>>(
         &self,
         devices: impl FnOnce() -> Result<Devices>,
         bake: &BakeRequest,

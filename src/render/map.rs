@@ -17,19 +17,19 @@ use crate::settings::stop::LEAST_BLOCKS;
 use crate::text::counted;
 
 /// Rounds of a file where nobody says how many: each is a block, and so many tell the error of an image well.
-pub const USUAL_ROUNDS: u32 = 2 * LEAST_BLOCKS;
+pub(crate) const USUAL_ROUNDS: u32 = 2 * LEAST_BLOCKS;
 
 /// A file that was written.
 pub struct WrittenMap {
-    pub header: Header,
-    pub filled: Filled,
+    pub(crate) header: Header,
+    pub(crate) filled: Filled,
     /// Why it holds fewer rounds, where the device is gone for good.
     pub failed: Option<Error>,
 }
 
 impl Prepared {
     /// Traces the photons of all rounds into a file. The rounds should be of a block each, as they know nothing of each other.
-    pub fn write_map(&self, gpu: &mut Gpu, output: &Destination, observer: &Observer) -> Result<WrittenMap> {
+    pub(crate) fn write_map(&self, gpu: &mut Gpu, output: &Destination, observer: &Observer) -> Result<WrittenMap> {
         let (scene, geometry, settings) = (&*self.scene, &*self.geometry, &self.inputs.settings);
         let find = |gpu: &Gpu| trial::find(gpu, scene, &self.view(), settings, self.sensor);
         let trial = until_done(gpu, &observer.failed(), find)?;

@@ -39,8 +39,8 @@
 //! # Ok::<(), photonmill::error::Error>(())
 //! ```
 
-pub mod bias;
-pub mod checkpoints;
+pub(crate) mod bias;
+pub(crate) mod checkpoints;
 mod denoise;
 mod events;
 pub mod image;
@@ -56,12 +56,13 @@ pub mod room;
 pub mod scene;
 pub mod tuned_settings;
 pub mod values;
-pub mod viewpoint;
+pub(crate) mod viewpoint;
 
 pub use events::{Event, Observer, Tell};
 pub use image::Image;
 pub use lightmaps::{BakeRequest, Lightmap, Lightmaps};
-pub use prepare::{Inputs, Prepared, Receivers, Run, prepare};
+pub use prepare::Run;
+pub(crate) use prepare::{Inputs, Prepared, Receivers, prepare};
 pub use request::RenderRequest;
 pub use scene::PreparedScene;
 pub use values::{Percent, Seconds, Stops};

@@ -32,7 +32,7 @@ const OTHERS: &[&str] = &[
 ];
 
 /// Whether a word is the name of a field.
-pub fn is_field(word: &str) -> bool {
+pub(crate) fn is_field(word: &str) -> bool {
     row(word).is_some_and(|row| row.field == word) || OTHERS.contains(&word)
 }
 
@@ -57,7 +57,7 @@ pub fn spelled(text: &str, spell: impl Fn(&str) -> String) -> String {
 }
 
 /// As options of the program.
-pub fn as_option(field: &str) -> String {
+pub(crate) fn as_option(field: &str) -> String {
     format!("--{}", field.replace('_', "-"))
 }
 

@@ -315,7 +315,7 @@ impl Row {
 }
 
 /// The row of a field, or of a command's option without its dashes.
-pub fn row(name: &str) -> Option<&'static Row> {
+pub(crate) fn row(name: &str) -> Option<&'static Row> {
     ROWS.iter().find(|row| row.field == name || row.option() == name)
 }
 

@@ -43,7 +43,7 @@ use crate::settings::scene::SceneSettings;
 use crate::text::counted;
 
 /// A request whose files are open and whose settings are allowed; of the scene nothing is read yet.
-pub struct Inputs {
+pub(crate) struct Inputs {
     pub request: RenderRequest,
     /// What the request asks for; a pilot may choose some of it.
     pub settings: SceneSettings,
@@ -58,7 +58,7 @@ pub struct Inputs {
 
 impl Inputs {
     /// Fails where a file cannot be used, or a value is not allowed.
-    pub fn open(request: &RenderRequest) -> Result<Inputs> {
+    pub(crate) fn open(request: &RenderRequest) -> Result<Inputs> {
         let map = request.map.as_ref().map(|path| MapFile::open("map", path)).transpose()?;
         if let Some((map, rounds)) = map.as_ref().zip(request.rounds).filter(|(map, rounds)| *rounds > map.rounds()) {
             let allowed = format!("must be at most {}, the rounds that the file of `map` holds", map.rounds());
@@ -81,14 +81,14 @@ impl Inputs {
     }
 
     /// For an image of which nothing says when it ends: an error ends it, or the time that suits the device.
-    pub fn ended(self, kind: &str) -> Inputs {
+    pub(crate) fn ended(self, kind: &str) -> Inputs {
         Inputs { settings: self.request.ended(self.settings, kind), ..self }
     }
 }
 
 /// What light is asked of.
 #[derive(Clone, Copy)]
-pub enum Receivers<'a> {
+pub(crate) enum Receivers<'a> {
     /// The image of the request's camera, or of another one: radiance, W/m2/sr.
     Image(Option<&'a Camera>),
     /// Points with the normals of their surfaces, metres: irradiance, W/m2.
@@ -98,7 +98,7 @@ pub enum Receivers<'a> {
 }
 
 /// What is rendered: a scene with the geometry that is left of it, and what receives its light.
-pub struct Prepared {
+pub(crate) struct Prepared {
     pub inputs: Inputs,
     pub scene: Arc<Scene>,
     pub geometry: Arc<Geometry>,
@@ -131,7 +131,7 @@ impl std::ops::Deref for Run {
 }
 
 /// Reads the scene of a request and makes ready what is asked of it.
-pub fn prepare(inputs: Inputs, receivers: Receivers, observer: &Observer) -> Result<Prepared> {
+pub(crate) fn prepare(inputs: Inputs, receivers: Receivers, observer: &Observer) -> Result<Prepared> {
     if matches!(receivers, Receivers::Image(None)) {
         inputs.request.check_camera()?;
     }
@@ -141,7 +141,7 @@ pub fn prepare(inputs: Inputs, receivers: Receivers, observer: &Observer) -> Res
 
 impl PreparedScene {
     /// Makes ready what a request asks of this scene, whatever the scene's name in it. Refuses another light than the scene was read with.
-    pub fn prepare(&self, inputs: Inputs, receivers: Receivers, observer: &Observer) -> Result<Prepared> {
+    pub(crate) fn prepare(&self, inputs: Inputs, receivers: Receivers, observer: &Observer) -> Result<Prepared> {
         let (request, settings) = (&inputs.request, &inputs.settings);
         self.check_read_as(request)?;
         // Photons of a file are those of the scene alone.
@@ -178,7 +178,7 @@ impl PreparedScene {
     }
 
     /// The same with settings that are not of a request. A pilot may choose all that it can.
-    pub fn prepare_with(&self, settings: &SceneSettings, target: Target) -> Result<Prepared> {
+    pub(crate) fn prepare_with(&self, settings: &SceneSettings, target: Target) -> Result<Prepared> {
         let (size, receivers) = match target {
             Target::Picture(camera, [width, height]) => (Some(PictureSize::WidthAndHeight(width, height)), Receivers::Image(Some(camera))),
             Target::Points(points) => (None, Receivers::Points(points)),
@@ -189,36 +189,36 @@ impl PreparedScene {
 }
 
 impl Prepared {
-    pub fn view(&self) -> View<'_> {
+    pub(crate) fn view(&self) -> View<'_> {
         View { geometry: &self.geometry, camera: self.camera.as_ref(), phases: &self.phases }
     }
 
     /// Of an image, width and height in pixels.
-    pub fn size(&self) -> (u32, u32) {
+    pub(crate) fn size(&self) -> (u32, u32) {
         self.sensor.size()
     }
 
-    pub fn scene_hash(&self) -> String {
+    pub(crate) fn scene_hash(&self) -> String {
         scene_hash(&self.geometry)
     }
 
     /// What a device within these limits would do, but for what a trial round finds.
-    pub fn plan_within(&self, limits: &Limits) -> Result<ScenePlan> {
+    pub(crate) fn plan_within(&self, limits: &Limits) -> Result<ScenePlan> {
         self.of_map(ScenePlan::new(&self.scene, &self.geometry, &self.inputs.settings, self.sensor, limits)?)
     }
 
     /// What a device does with these settings, and with what a trial round finds; of a device that works to its end.
-    pub fn plan_on(&self, gpu: &Gpu, settings: &SceneSettings) -> Result<ScenePlan> {
+    pub(crate) fn plan_on(&self, gpu: &Gpu, settings: &SceneSettings) -> Result<ScenePlan> {
         self.of_map(trial::plan(gpu, &self.scene, &self.view(), settings, self.sensor)?)
     }
 
     /// What a pilot chooses; `None` where there is nothing to choose. Of a device that works to its end.
-    pub fn choose(&self, gpu: &Gpu, cancelled: &AtomicBool) -> Result<Option<Pilot>> {
+    pub(crate) fn choose(&self, gpu: &Gpu, cancelled: &AtomicBool) -> Result<Option<Pilot>> {
         pilot::choose_for(gpu, &self.scene, &self.view(), &self.inputs.settings, self.sensor, self.free, cancelled)
     }
 
     /// Runs a plan, and nothing before or after it; on a device that works to its end.
-    pub fn light(&self, gpu: &Gpu, plan: ScenePlan, control: &mut Control) -> Result<RunResult> {
+    pub(crate) fn light(&self, gpu: &Gpu, plan: ScenePlan, control: &mut Control) -> Result<RunResult> {
         light_from(gpu, &self.view(), plan, self.inputs.map.as_ref(), control)
     }
 
@@ -227,7 +227,7 @@ impl Prepared {
     }
 
     /// The settings that a pilot finds best, and what it has found; saved where that is asked for.
-    pub fn tune(&self, gpu: &mut Gpu, observer: &Observer) -> Result<(SceneSettings, Option<Pilot>)> {
+    pub(crate) fn tune(&self, gpu: &mut Gpu, observer: &Observer) -> Result<(SceneSettings, Option<Pilot>)> {
         let Inputs { ref settings, ref tuned, ref save_settings, .. } = self.inputs;
         let mut found = None;
         if settings.stop.has_goal() && self.free != Free::default() {
@@ -292,7 +292,7 @@ impl Prepared {
     }
 
     /// Chooses settings by a pilot and radii by a trial round, runs all rounds, and measures the bias where that is asked for.
-    pub fn run(&self, gpus: &mut Vec<Gpu>, checkpoints: &mut Checkpoints, observer: &Observer) -> Result<Run> {
+    pub(crate) fn run(&self, gpus: &mut Vec<Gpu>, checkpoints: &mut Checkpoints, observer: &Observer) -> Result<Run> {
         let started = Instant::now();
         let (view, map) = (self.view(), self.inputs.map.as_ref());
         let (wanted, pilot) = self.settings(&mut gpus[0], checkpoints.resumed(), observer)?;

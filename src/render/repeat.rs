@@ -34,7 +34,7 @@ pub struct Repeated {
 /// What each round of an image did.
 #[derive(Debug, Clone)]
 pub struct RoundsOf {
-    pub division: Division,
+    pub(crate) division: Division,
     pub tiles: Option<TileSamples>,
 }
 

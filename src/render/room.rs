@@ -77,7 +77,7 @@ impl RenderRequest {
 }
 
 /// The box of a request.
-pub struct PreparedRoom<'a> {
+pub(crate) struct PreparedRoom<'a> {
     pub request: &'a RenderRequest,
     pub settings: RoomSettings,
     pub scene: RoomScene,
@@ -85,7 +85,7 @@ pub struct PreparedRoom<'a> {
 
 impl PreparedRoom<'_> {
     /// Runs to the end, on the CPU where there is no device.
-    pub fn run(&self, gpus: &mut Vec<Gpu>, checkpoints: &mut Checkpoints, observer: &Observer) -> Result<RunResult> {
+    pub(crate) fn run(&self, gpus: &mut Vec<Gpu>, checkpoints: &mut Checkpoints, observer: &Observer) -> Result<RunResult> {
         let (scene, measures_bias) = (&self.scene, self.request.bias);
         let mut settings = self.settings.clone();
         match gpus.first() {
@@ -174,7 +174,7 @@ fn fastest(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings, observer: &Obs
 
 /// The picture of the box.
 pub struct RoomImage<'a> {
-    pub result: RunResult,
+    pub(crate) result: RunResult,
     scene: RoomScene,
     request: &'a RenderRequest,
 }
@@ -211,7 +211,7 @@ impl RoomImage<'_> {
 }
 
 /// What a picture of the box says of how it was made; its command line makes it again.
-pub fn metadata(request: &RenderRequest, outcome: &RunResult, error: &FilmError, format: Format) -> Metadata {
+pub(crate) fn metadata(request: &RenderRequest, outcome: &RunResult, error: &FilmError, format: Format) -> Metadata {
     let settings = &outcome.plan.settings;
     let confidence = settings.stop.confidence;
     let [error, error_bound] = errors(error, confidence);

@@ -46,7 +46,7 @@ impl PreparedScene {
     }
 
     /// Its geometry, made once; with what is to be said of it the first time.
-    pub fn geometry(&self, observer: &Observer) -> Result<Arc<Geometry>> {
+    pub(crate) fn geometry(&self, observer: &Observer) -> Result<Arc<Geometry>> {
         if let Some(geometry) = self.geometry.get() {
             return Ok(geometry.clone());
         }
@@ -100,7 +100,7 @@ pub(super) fn geometry(scene: &Scene, without: &[Effect], observer: &Observer) -
 }
 
 /// Reports the stages of loading `what`, each at its start and at every tenth of it.
-pub fn stages<'a>(what: &'a str, observer: &'a Observer) -> impl FnMut(&'static str, f64) + 'a {
+pub(crate) fn stages<'a>(what: &'a str, observer: &'a Observer) -> impl FnMut(&'static str, f64) + 'a {
     let mut reported = None;
     move |stage, done| {
         let step = (stage, (10.0 * done) as u32);

@@ -30,7 +30,7 @@ pub struct TunedSettings {
     size: [u32; 2],
     /// Class of the device.
     device: String,
-    pub settings: Division,
+    pub(crate) settings: Division,
     /// Tiles with more samples than all pixels have.
     tiles: Option<TileSamples>,
     /// Rounds that the goal was expected to take, whole blocks.
@@ -38,7 +38,7 @@ pub struct TunedSettings {
 }
 
 /// For what something was chosen, or is used.
-pub struct TunedFor<'a> {
+pub(crate) struct TunedFor<'a> {
     pub scene: &'a str,
     pub scene_hash: String,
     pub size: (u32, u32),
@@ -46,7 +46,7 @@ pub struct TunedFor<'a> {
 }
 
 impl TunedSettings {
-    pub fn new(settings: &SceneSettings, rounds: u32, tuned_for: &TunedFor) -> TunedSettings {
+    pub(crate) fn new(settings: &SceneSettings, rounds: u32, tuned_for: &TunedFor) -> TunedSettings {
         TunedSettings {
             format: FORMAT.into(),
             version: env!("CARGO_PKG_VERSION").into(),
@@ -85,7 +85,7 @@ impl TunedSettings {
     }
 
     /// What a picture's file says of its rounds; fails where that is nothing that a run can do.
-    pub fn of_picture(made: &Metadata, settings: Division, tiles: Option<TileSamples>) -> Result<TunedSettings> {
+    pub(crate) fn of_picture(made: &Metadata, settings: Division, tiles: Option<TileSamples>) -> Result<TunedSettings> {
         let tuned = TunedSettings {
             format: FORMAT.into(),
             version: made.photonmill.clone(),
@@ -101,14 +101,14 @@ impl TunedSettings {
         Ok(tuned)
     }
 
-    pub fn write(&self, destination: Destination) -> Result<()> {
+    pub(crate) fn write(&self, destination: Destination) -> Result<()> {
         let mut text = serde_json::to_vec_pretty(self).expect("settings are numbers and names");
         text.push(b'\n');
         write_all([(destination, text)])
     }
 
     /// What is to be said where it was chosen for something else.
-    pub fn difference(&self, used_for: &TunedFor) -> Option<String> {
+    pub(crate) fn difference(&self, used_for: &TunedFor) -> Option<String> {
         let size = |size: [u32; 2]| format!("{} x {} pixels", size[0], size[1]);
         let own = [used_for.size.0, used_for.size.1];
         let other = if self.scene_hash != used_for.scene_hash {

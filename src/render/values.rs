@@ -261,7 +261,7 @@ impl Word for bool {
 }
 
 /// A whole number that `T` does not hold becomes 0, which no setting allows: validation, which knows the range, then refuses it.
-pub fn parse_integer<T: TryFrom<i128> + Default>(text: &str) -> Parsed<T> {
+pub(crate) fn parse_integer<T: TryFrom<i128> + Default>(text: &str) -> Parsed<T> {
     match text.parse::<i128>() {
         Ok(number) => Ok(T::try_from(number).unwrap_or_default()),
         Err(error) if matches!(error.kind(), IntErrorKind::PosOverflow | IntErrorKind::NegOverflow) => Ok(T::default()),
@@ -294,19 +294,19 @@ impl Word for u64 {
     }
 }
 
-pub fn parse_number<T: FromStr>(text: &str) -> Parsed<T> {
+pub(crate) fn parse_number<T: FromStr>(text: &str) -> Parsed<T> {
     text.parse().map_err(|_| "must be a number".to_owned())
 }
 
 /// `1,2,3`.
-pub fn parse_numbers<T: FromStr + Copy, const N: usize>(text: &str) -> Parsed<[T; N]> {
+pub(crate) fn parse_numbers<T: FromStr + Copy, const N: usize>(text: &str) -> Parsed<[T; N]> {
     let wanted = format!("must be {N} numbers separated by commas");
     let parts: Option<Vec<T>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
     parts.and_then(|parts| parts.try_into().ok()).ok_or(wanted)
 }
 
 /// One number for all three channels, or three.
-pub fn parse_colour(text: &str) -> Parsed<[f32; 3]> {
+pub(crate) fn parse_colour(text: &str) -> Parsed<[f32; 3]> {
     let all = match parse_numbers::<f32, 1>(text) {
         Ok([grey]) => [grey; 3],
         Err(_) => parse_numbers::<f32, 3>(text).map_err(|_| "must be one number, or three separated by commas".to_owned())?,
@@ -362,14 +362,14 @@ fn parse_shininess(text: &str) -> Parsed<Shininess> {
     }
 }
 
-pub fn parse_threads(text: &str) -> Parsed<Threads> {
+pub(crate) fn parse_threads(text: &str) -> Parsed<Threads> {
     if text == "all" {
         return Ok(Threads(std::thread::available_parallelism().map_or(1, usize::from)));
     }
     parse_integer(text).map(Threads).map_err(|_| "must be a number of threads, or all".to_owned())
 }
 
-pub fn parse_stops(text: &str) -> Parsed<Stops> {
+pub(crate) fn parse_stops(text: &str) -> Parsed<Stops> {
     let stops = parse_number(text)?;
     if (-64.0..=64.0).contains(&stops) { Ok(Stops(stops)) } else { Err("must be from -64 to 64 stops".to_owned()) }
 }
@@ -518,7 +518,7 @@ choices! {
 }
 
 /// What each builder of photon maps does.
-pub const fn meaning(builder: Builder) -> &'static str {
+pub(crate) const fn meaning(builder: Builder) -> &'static str {
     match builder {
         Builder::Naive => "One slot per photon and bounce, empty slots included (the paper's first)",
         Builder::Atomic => "Only surviving photons, one atomic per thread (the paper's second)",

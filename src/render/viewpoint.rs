@@ -101,13 +101,13 @@ fn text(point: DVec3) -> String {
 }
 
 /// Width and height in pixels; says so if they change what the camera sees.
-pub fn size_of(size: Option<PictureSize>, camera: &Camera, observer: &Observer) -> Result<(u32, u32)> {
+pub(crate) fn size_of(size: Option<PictureSize>, camera: &Camera, observer: &Observer) -> Result<(u32, u32)> {
     let (width, height, remark) = PictureSize::of(size, camera)?;
     remark.iter().for_each(|remark| observer.tell(Event::Note(&format!("note: {remark}"))));
     Ok((width, height))
 }
 
 /// The camera by name, else the scene's first, else one that sees all of it.
-pub fn named(scene: &Scene, name: Option<&str>) -> Result<Camera> {
+pub(crate) fn named(scene: &Scene, name: Option<&str>) -> Result<Camera> {
     name.map_or_else(|| Ok(scene.first_camera()), |name| scene.camera(name))
 }

@@ -22,7 +22,7 @@ const LEAST_SHEEN: f64 = 0.01;
 /// Row by row of equal roughness: (A, B) of GGX at the squares of evenly spaced roots of cosines, A with the weight 1 - (1 - v.h)^5 and
 /// B with (1 - v.h)^5; then of each roughness the means of both over the hemisphere; then of each pair of roughnesses the means of
 /// (A A', A B') and (B A', B B'); then rows of sheen, each twice.
-pub static TABLE: LazyLock<Vec<Vec2>> = LazyLock::new(table);
+pub(crate) static TABLE: LazyLock<Vec<Vec2>> = LazyLock::new(table);
 
 fn roughness(row: usize) -> f64 {
     row as f64 / (ROUGHNESSES - 1) as f64

@@ -11,11 +11,11 @@ use rayon::prelude::*;
 
 use super::bounds_of;
 
-pub struct BoxTree(Bvh2);
+pub(crate) struct BoxTree(Bvh2);
 
 impl BoxTree {
     /// Boxes are wider than their triangles by `slack` on all sides.
-    pub fn new(triangles: impl IndexedParallelIterator<Item = [DVec3; 3]>, slack: f64) -> BoxTree {
+    pub(crate) fn new(triangles: impl IndexedParallelIterator<Item = [DVec3; 3]>, slack: f64) -> BoxTree {
         // One step out for the rounding to f32.
         let box_of = |corners: [DVec3; 3]| {
             let (low, high) = bounds_of(corners.into_iter());
@@ -30,7 +30,7 @@ impl BoxTree {
     }
 
     /// Calls back for the triangles of leaves whose boxes meet something.
-    pub fn visit(&self, meets: impl Fn(DVec3, DVec3) -> bool, mut look: impl FnMut(usize)) {
+    pub(crate) fn visit(&self, meets: impl Fn(DVec3, DVec3) -> bool, mut look: impl FnMut(usize)) {
         let mut open = if self.0.nodes.is_empty() { Vec::new() } else { vec![0] };
         while let Some(place) = open.pop() {
             let node = &self.0.nodes[place];

@@ -23,14 +23,14 @@ const LEAF: u32 = 3;
 /// Triangles of a sample.
 const SAMPLE: usize = 4096;
 
-pub struct Bvh {
+pub(crate) struct Bvh {
     pub nodes: Vec<BvhNode>,
     /// Triangles in the order of the leaves.
     pub order: Vec<u32>,
 }
 
 impl Bvh {
-    pub fn build(corners: &[[Vec3; 3]]) -> Bvh {
+    pub(crate) fn build(corners: &[[Vec3; 3]]) -> Bvh {
         let boxes: Vec<Aabb> = corners.par_iter().map(|corners| Aabb::from_points(&corners.map(Vec3A::from))).collect();
         let tree = build_tree(&boxes);
         Bvh { nodes: tree.nodes.iter().map(record).collect(), order: tree.primitive_indices }
@@ -159,7 +159,7 @@ fn levels(tree: &CwBvh) -> usize {
 }
 
 /// The node as kernels read it: the same bytes.
-pub fn record(node: &CwBvhNode) -> BvhNode {
+pub(crate) fn record(node: &CwBvhNode) -> BvhNode {
     bytemuck::cast(*node)
 }
 

@@ -1,10 +1,10 @@
 //! The values of a random number, dealt to what is chosen by it.
 
 /// Values that a random choice can take.
-pub const CHOICES: u32 = 1 << 24;
+pub(crate) const CHOICES: u32 = 1 << 24;
 
 /// By shares of a sum of 1, at least one to each, so that the probability that a kernel divides by is the one with which it chose.
-pub fn deal(shares: &[f64]) -> Vec<u32> {
+pub(crate) fn deal(shares: &[f64]) -> Vec<u32> {
     if shares.is_empty() {
         return Vec::new();
     }

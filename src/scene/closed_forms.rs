@@ -24,12 +24,12 @@ pub(crate) const SCENES: [Named; 8] = [
 ];
 
 /// Radius of the lamp of `disc-over-plane`, metres.
-pub const DISC_RADIUS: f64 = 0.25;
+pub(crate) const DISC_RADIUS: f64 = 0.25;
 /// Share of light that the furnace's and the integrating sphere's walls scatter.
-pub const WALL_ALBEDO: f32 = 0.5;
+pub(crate) const WALL_ALBEDO: f32 = 0.5;
 
 /// Irradiance of the floor of a scene at (x, 0, z) in closed form, W/m2; `None` where there is none at every point.
-pub fn floor_irradiance(name: &str, x: f64, z: f64) -> Option<f64> {
+pub(crate) fn floor_irradiance(name: &str, x: f64, z: f64) -> Option<f64> {
     let squared = x * x + z * z;
     match name {
         "furnace" => Some(PI / (1.0 - f64::from(WALL_ALBEDO))),

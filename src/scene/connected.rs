@@ -7,7 +7,7 @@ use glam::DVec3;
 
 /// Groups of triangles, by numbers: those that have a key in common are of one group, and so are all that hang together by others. Groups
 /// and their members are in ascending order.
-pub fn connected<K: Eq + Hash>(keys_of_triangles: impl IntoIterator<Item = [K; 3]>) -> Vec<Vec<usize>> {
+pub(crate) fn connected<K: Eq + Hash>(keys_of_triangles: impl IntoIterator<Item = [K; 3]>) -> Vec<Vec<usize>> {
     fn root(parents: &mut [usize], mut place: usize) -> usize {
         while parents[place] != place {
             parents[place] = parents[parents[place]];
@@ -34,6 +34,6 @@ pub fn connected<K: Eq + Hash>(keys_of_triangles: impl IntoIterator<Item = [K; 3
 }
 
 /// A place as a key. The sum turns -0 into 0.
-pub fn bits(place: DVec3) -> [u64; 3] {
+pub(crate) fn bits(place: DVec3) -> [u64; 3] {
     (place + DVec3::ZERO).to_array().map(f64::to_bits)
 }

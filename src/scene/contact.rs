@@ -16,7 +16,7 @@ use super::{Mesh, Scene};
 
 /// What a surface is to others that touch it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub(crate) enum Kind {
     Opaque,
     /// Light passes through it to the same medium.
     Sheet,
@@ -26,7 +26,7 @@ pub enum Kind {
 
 /// What becomes of two surfaces where they touch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Contact {
+pub(crate) enum Contact {
     /// Each is seen from its own side.
     None,
     /// One counts, by [`super::overlap::ranks`].
@@ -37,14 +37,14 @@ pub enum Contact {
 
 /// A surface as others that touch it see it.
 #[derive(Clone, Copy)]
-pub struct Touching<'a> {
+pub(crate) struct Touching<'a> {
     pub kind: Kind,
     pub material: &'a Material,
 }
 
 impl Touching<'_> {
     /// Of two in one plane whose normals have this product.
-    pub fn contact(&self, other: &Touching, cosine: f64) -> Contact {
+    pub(crate) fn contact(&self, other: &Touching, cosine: f64) -> Contact {
         let shows_both = cosine > 0.0 || self.material.has_two_sides() || other.material.has_two_sides();
         match (self.kind, other.kind) {
             (Kind::Solid, Kind::Solid) if has_medium(self.material) && has_medium(other.material) => Contact::Both,
@@ -65,7 +65,7 @@ fn has_medium(material: &Material) -> bool {
 }
 
 /// Each mesh's kind.
-pub fn kinds(scene: &Scene) -> Vec<Kind> {
+pub(crate) fn kinds(scene: &Scene) -> Vec<Kind> {
     // Looking through a large texture takes a while.
     let mut least_alphas = HashMap::new();
     let mut least_alpha = |used: Option<TextureUse>| {

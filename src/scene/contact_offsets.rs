@@ -25,7 +25,7 @@ const LEAST_SINE: f64 = 0.1;
 
 /// By mesh and vertex, metres.
 #[derive(Debug, Default)]
-pub struct Offsets(HashMap<(u32, u32), DVec3>);
+pub(crate) struct Offsets(HashMap<(u32, u32), DVec3>);
 
 /// How far a vertex moves along a direction.
 struct Step {
@@ -37,7 +37,7 @@ struct Step {
 
 impl Offsets {
     /// Corners of a triangle.
-    pub fn corners(&self, scene: &Scene, mesh: u32, triangle: u32) -> [DVec3; 3] {
+    pub(crate) fn corners(&self, scene: &Scene, mesh: u32, triangle: u32) -> [DVec3; 3] {
         let of = &scene.meshes[mesh as usize];
         if self.0.is_empty() {
             return of.corners(triangle as usize);
@@ -47,7 +47,7 @@ impl Offsets {
     }
 
     /// Those that a scene needs.
-    pub fn of(scene: &Scene, kinds: &[Kind]) -> Offsets {
+    pub(crate) fn of(scene: &Scene, kinds: &[Kind]) -> Offsets {
         if kinds.iter().all(|kind| *kind == Kind::Opaque) {
             return Offsets::default();
         }
@@ -103,7 +103,7 @@ impl Offsets {
 }
 
 /// Moves the vertices of a scene's surfaces that touch.
-pub fn apply(scene: &mut Scene) {
+pub(crate) fn apply(scene: &mut Scene) {
     for ((mesh, vertex), way) in Offsets::of(scene, &contact::kinds(scene)).0 {
         scene.meshes[mesh as usize].positions[vertex as usize] += way;
     }

@@ -25,14 +25,14 @@ fn towards_sun(azimuth: f64, elevation: f64) -> DVec3 {
 }
 
 /// The sun alone, white, in W/m2 of 683 lm.
-pub fn sun(azimuth: f64, elevation: f64) -> LightKind {
+pub(crate) fn sun(azimuth: f64, elevation: f64) -> LightKind {
     let towards = towards_sun(azimuth, elevation);
     let illuminance = SOLAR_ILLUMINANCE * (-EXTINCTION / towards.y.max(1e-3)).exp();
     LightKind::Directional { direction: -towards, irradiance: Vec3::splat(illuminance as f32 / LUMENS_PER_WATT) }
 }
 
 /// The sky without the sun, and below the horizon ground that the sun and the sky light.
-pub fn sky(azimuth: f64, elevation: f64) -> Sky {
+pub(crate) fn sky(azimuth: f64, elevation: f64) -> Sky {
     let towards = towards_sun(azimuth, elevation);
     let params =
         SkyParams { elevation: elevation.to_radians().clamp(0.0, FRAC_PI_2) as f32, turbidity: TURBIDITY, albedo: [GROUND_ALBEDO; 3] };

@@ -8,7 +8,7 @@ use crate::text::refusal;
 const MAX_BYTES: u64 = 4 << 30;
 
 /// The content of a file, or what is wrong with it.
-pub fn read(path: &Path) -> Result<Vec<u8>, String> {
+pub(crate) fn read(path: &Path) -> Result<Vec<u8>, String> {
     let unreadable = |error: std::io::Error| format!("cannot be read ({})", refusal(&error));
     let facts = std::fs::metadata(path).map_err(unreadable)?;
     if !facts.is_file() {

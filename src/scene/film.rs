@@ -41,7 +41,7 @@ fn schlick(f0: f64, cosine: f64) -> f64 {
 
 /// What a film of this index and thickness (nanometres) in air reflects of light that meets it at a cosine, over a base that reflects
 /// `f0` in air along the normal.
-pub fn reflectance(f0: DVec3, ior: f64, thickness: f64, cosine: f64) -> DVec3 {
+pub(crate) fn reflectance(f0: DVec3, ior: f64, thickness: f64, cosine: f64) -> DVec3 {
     // Where it ends it is air.
     let share = (thickness / 0.03).clamp(0.0, 1.0);
     let ior = 1.0 + (ior - 1.0) * share * share * (3.0 - 2.0 * share);

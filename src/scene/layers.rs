@@ -63,7 +63,7 @@ impl Medium {
 
 /// What a number of a file may be.
 #[derive(Debug, Clone, Copy)]
-pub enum Range {
+pub(crate) enum Range {
     /// From 0.
     UpTo(f32),
     /// An angle, radians.
@@ -75,11 +75,11 @@ pub enum Range {
 }
 
 /// Of numbers without an upper limit of their own.
-pub const ANY: f32 = f32::MAX;
+pub(crate) const ANY: f32 = f32::MAX;
 
 /// What a member of a glTF material is: its name in complaints and what it may be, or the number that kernels know its texture by; and the
 /// field that has it.
-pub enum Parameter {
+pub(crate) enum Parameter {
     Number(&'static str, Range, fn(&mut Layers) -> &mut f32),
     /// Each channel from 0 to the limit.
     Colour(&'static str, f32, fn(&mut Layers) -> &mut Vec3),
@@ -90,7 +90,7 @@ pub enum Parameter {
 }
 
 /// The object that every glTF material has.
-pub const METALLIC_ROUGHNESS: &str = "pbrMetallicRoughness";
+pub(crate) const METALLIC_ROUGHNESS: &str = "pbrMetallicRoughness";
 
 /// Declares [`Layers`] and [`PARAMETERS`]: by the extension that has them fields with their defaults, and members of the file with the kind of
 /// parameter that each is.
@@ -114,7 +114,7 @@ macro_rules! layers {
 
         /// Members of glTF's materials, by the extension that has them. Files are read and written by it; what is missing has the value of
         /// [`Layers::default`]. Textures of the scene are numbered in this order.
-        pub const PARAMETERS: &[(&str, &[(&str, Parameter)])] = {
+        pub(crate) const PARAMETERS: &[(&str, &[(&str, Parameter)])] = {
             use Range::*;
             &[$(($group, &[$($(($member, Parameter::$kind($($argument,)* |of| &mut of.$field$([$index])?)),)*)*])),*]
         };

@@ -33,7 +33,7 @@ pub enum LightKind {
 }
 
 /// Lumens in a watt at 555 nm: what turns glTF's photometric lights into radiometric ones.
-pub const LUMENS_PER_WATT: f32 = 683.0;
+pub(crate) const LUMENS_PER_WATT: f32 = 683.0;
 
 impl LightKind {
     /// Whether it shines from beyond the scene, in all directions.

@@ -22,7 +22,7 @@ const LEAST_HALF: usize = 8;
 const FAR: f32 = 8.0;
 
 #[derive(Debug, Clone, PartialEq)]
-pub struct LightTree {
+pub(crate) struct LightTree {
     /// The clusters first.
     pub nodes: Vec<LightNode>,
     pub cluster_count: usize,
@@ -30,7 +30,7 @@ pub struct LightTree {
 
 /// Whether all light comes from one light, or from triangles of a plane that hang together, as the two of a rectangle do: by power is
 /// then as good a choice as any.
-pub fn is_one_lamp(geometry: &Geometry) -> bool {
+pub(crate) fn is_one_lamp(geometry: &Geometry) -> bool {
     let emitters = &geometry.emitters;
     if emitters.len() < 2 {
         return true;
@@ -129,7 +129,7 @@ fn cut(places: &mut [Place]) -> usize {
 }
 
 impl LightTree {
-    pub fn new(geometry: &Geometry) -> LightTree {
+    pub(crate) fn new(geometry: &Geometry) -> LightTree {
         let mut places: Vec<Place> = geometry.emitters.iter().enumerate().map(|emitter| Place::of(geometry, emitter)).collect();
         let mut parts = vec![Part::of(&places, 0..places.len())];
         let mut next = 0;
@@ -160,7 +160,7 @@ impl LightTree {
     }
 
     /// Each emitter with its cluster.
-    pub fn clusters_of_emitters(&self) -> Vec<(usize, usize)> {
+    pub(crate) fn clusters_of_emitters(&self) -> Vec<(usize, usize)> {
         let mut clusters: Vec<usize> = (0..self.cluster_count).collect();
         let mut found = Vec::new();
         for (node, LightNode { child, .. }) in self.nodes.iter().enumerate() {

@@ -15,10 +15,10 @@ const RADIANCE_MAGIC: &[u8] = b"#?";
 const EXR_MAGIC: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
 
 /// Of one picture: half of what all textures together may have.
-pub const MAX_TEXELS: u64 = 65_000_000;
+pub(crate) const MAX_TEXELS: u64 = 65_000_000;
 
 /// Row by row from the top.
-pub struct LinearPicture {
+pub(crate) struct LinearPicture {
     pub width: u32,
     pub height: u32,
     pub colours: Vec<Vec3>,
@@ -29,13 +29,13 @@ pub struct LinearPicture {
 }
 
 /// Whether this is the content of such a file.
-pub fn is_one(content: &[u8]) -> bool {
+pub(crate) fn is_one(content: &[u8]) -> bool {
     [RADIANCE_MAGIC, EXR_MAGIC].iter().any(|magic| content.starts_with(magic))
 }
 
 impl LinearPicture {
     /// An error says what is wrong with the file, and what to do.
-    pub fn decode(mut content: Vec<u8>) -> Result<LinearPicture, String> {
+    pub(crate) fn decode(mut content: Vec<u8>) -> Result<LinearPicture, String> {
         if !content.starts_with(RADIANCE_MAGIC) {
             check_layers(&content, MAX_TEXELS)?;
             let decoder = OpenExrDecoder::with_alpha_preference(Cursor::new(&content), Some(false)).map_err(undecodable)?;
@@ -115,7 +115,7 @@ impl RadianceHeader {
 const CUT_OFF: &str = "is cut off; export it again";
 
 /// In plain words, or the library's.
-pub fn undecodable(error: image::ImageError) -> String {
+pub(crate) fn undecodable(error: image::ImageError) -> String {
     let text = error.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
     if text.contains("whole buffer") || text.contains("missing bytes") || text.contains("EOF") {
         return CUT_OFF.into();
@@ -127,13 +127,13 @@ pub fn undecodable(error: image::ImageError) -> String {
 }
 
 /// Refuses what would not fit.
-pub fn check_size(width: u32, height: u32) -> Result<(), String> {
+pub(crate) fn check_size(width: u32, height: u32) -> Result<(), String> {
     let is_allowed = width > 0 && height > 0 && u64::from(width) * u64::from(height) <= MAX_TEXELS;
     if is_allowed { Ok(()) } else { Err(format!("is {width} x {height}; allowed are 1 to {MAX_TEXELS} pixels")) }
 }
 
 /// Refuses an OpenEXR of which some layer has more pixels, whatever size the picture claims: memory is taken for what a layer claims.
-pub fn check_layers(content: &[u8], most: u64) -> Result<(), String> {
+pub(crate) fn check_layers(content: &[u8], most: u64) -> Result<(), String> {
     // What is wrong with another file, its decoder says.
     let Ok(metadata) = MetaData::read_from_buffered(content, false) else { return Ok(()) };
     let sizes = metadata.headers.iter().map(|header| (header.layer_size.0 as u64, header.layer_size.1 as u64));

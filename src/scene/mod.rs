@@ -1,43 +1,43 @@
 //! What is lit: triangle meshes with materials, lights and cameras ([`Scene`]), read from glTF or
 //! built in; and the paper's box, a convex room ([`room::RoomScene`]).
 
-pub mod albedo;
-pub mod box_tree;
+pub(crate) mod albedo;
+pub(crate) mod box_tree;
 pub mod built_in;
-pub mod bvh;
+pub(crate) mod bvh;
 pub mod camera;
 mod choices;
-pub mod closed_forms;
-pub mod connected;
-pub mod contact;
-pub mod contact_offsets;
-pub mod coplanar;
-pub mod daylight;
-pub mod file;
-pub mod film;
-pub mod frame;
-pub mod geometry;
-pub mod gltf;
+pub(crate) mod closed_forms;
+pub(crate) mod connected;
+pub(crate) mod contact;
+pub(crate) mod contact_offsets;
+pub(crate) mod coplanar;
+pub(crate) mod daylight;
+pub(crate) mod file;
+pub(crate) mod film;
+pub(crate) mod frame;
+pub(crate) mod geometry;
+pub(crate) mod gltf;
 pub mod layers;
 pub mod light;
-pub mod light_tree;
-pub mod linear_picture;
+pub(crate) mod light_tree;
+pub(crate) mod linear_picture;
 pub mod material;
 pub mod mesh;
-pub mod open_box;
-pub mod openings;
-pub mod overlap;
+pub(crate) mod open_box;
+pub(crate) mod openings;
+pub(crate) mod overlap;
 pub mod picture_size;
 mod planes;
-pub mod rectangle;
-pub mod room;
-pub mod sensors;
-pub mod showcase;
+pub(crate) mod rectangle;
+pub(crate) mod room;
+pub(crate) mod sensors;
+pub(crate) mod showcase;
 pub mod sky;
-pub mod sky_table;
-pub mod solids;
+pub(crate) mod sky_table;
+pub(crate) mod solids;
 pub mod surroundings;
-pub mod targets;
+pub(crate) mod targets;
 pub mod texture;
 mod work;
 
@@ -49,14 +49,15 @@ use rayon::prelude::*;
 
 pub use camera::{Camera, Lens, Projection};
 pub use light::{Light, LightKind};
-pub use material::{LobeKinds, Material, Surface};
+pub(crate) use material::LobeKinds;
+pub use material::{Material, Surface};
 pub use mesh::Mesh;
 pub use texture::Texture;
 
 use crate::error::{Error, Result};
 
 /// Called with what is being done while a scene is opened, and the share of it that is done.
-pub type Progress<'a> = &'a mut dyn FnMut(&'static str, f64);
+pub(crate) type Progress<'a> = &'a mut dyn FnMut(&'static str, f64);
 
 /// How a file is read.
 #[derive(Debug, Clone, Copy, Default)]
@@ -219,7 +220,7 @@ impl Scene {
 }
 
 /// Along a ray to a triangle, which one in the triangle's plane misses (Moeller and Trumbore 1997).
-pub fn distance_to([a, b, c]: [DVec3; 3], origin: DVec3, direction: DVec3) -> Option<f64> {
+pub(crate) fn distance_to([a, b, c]: [DVec3; 3], origin: DVec3, direction: DVec3) -> Option<f64> {
     let (ab, ac, from) = (b - a, c - a, origin - a);
     let p = direction.cross(ac);
     let scale = 1.0 / ab.dot(p);
@@ -229,6 +230,6 @@ pub fn distance_to([a, b, c]: [DVec3; 3], origin: DVec3, direction: DVec3) -> Op
 }
 
 /// Smallest box around points: (lower corner, upper corner).
-pub fn bounds_of(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
+pub(crate) fn bounds_of(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
     points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), point| (low.min(point), high.max(point)))
 }

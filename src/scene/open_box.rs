@@ -9,7 +9,7 @@ use crate::settings::{HALF_WIDTH, RoomSettings, WALL_NAMES};
 /// Face numbers of the two lit walls, in the order in which photons are dealt out.
 const LIT_FACES: [usize; 2] = [2, 0];
 
-pub fn open_box(settings: &RoomSettings) -> RoomScene {
+pub(crate) fn open_box(settings: &RoomSettings) -> RoomScene {
     let wall = |face: usize| Wall { name: WALL_NAMES[face], albedo: settings.reflectance, shininess: settings.shininess[face] };
     RoomScene {
         name: "open-box",

@@ -9,7 +9,7 @@ use crate::rng::mix32;
 use crate::scene::geometry::Geometry;
 
 /// Of photons from beyond the scene, and of shadow rays that the table of a sky leaves, those that are aimed at openings. Twin of `glsl/world/scene/openings.glsl`.
-pub const OPENING_SHARE: f64 = 0.75;
+pub(crate) const OPENING_SHARE: f64 = 0.75;
 /// Where more rays than this share leave, the scene is open: there is nothing to aim at.
 const OPEN: f64 = 0.125;
 /// Fewer lines tell nothing.
@@ -28,7 +28,7 @@ const LEAST_AIMED: f64 = 0.5;
 const STEP: f64 = 1.0 / 4096.0;
 
 /// Whether any light comes from beyond the scene.
-pub fn light_from_beyond(geometry: &Geometry) -> bool {
+pub(crate) fn light_from_beyond(geometry: &Geometry) -> bool {
     geometry.emitters.iter().any(|emitter| matches!(emitter.kind, EMITTER_ENVIRONMENT | EMITTER_DIRECTIONAL))
 }
 
@@ -94,7 +94,7 @@ fn opening(lines: &[Line]) -> Option<(DVec3, f64)> {
 
 /// At most [`MAX_OPENINGS`] spheres, normalised, that most of the rays that escape pass through; none where that is no narrower than all
 /// directions.
-pub fn openings(rays: &[TrialRay]) -> Vec<CausticTarget> {
+pub(crate) fn openings(rays: &[TrialRay]) -> Vec<CausticTarget> {
     let all: Vec<Line> = rays.iter().filter(|ray| ray.escapes != 0).map(Line::of).collect();
     if all.len() < LEAST_LINES || all.len() as f64 > OPEN * rays.len() as f64 {
         return Vec::new();

@@ -17,7 +17,7 @@ use super::{Scene, work};
 
 /// A triangle of which a part is hidden by others in its plane.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Covered {
+pub(crate) struct Covered {
     pub triangle: usize,
     /// Those that hide it and face as it does; more may hide it whose back is seen.
     pub by: Vec<usize>,
@@ -42,7 +42,7 @@ const PAIRS_SHARE: f64 = 0.5;
 /// lamp in a ceiling's plane is seen; what is opaque over what lets light through, as nothing would be lit through it; a small mesh over a
 /// large one, as rugs lie on floors; and at last the first. What is hidden is so from both sides: from behind, a rug with
 /// one side on a floor with two is the rug's back.
-pub fn ranks(scene: &Scene, kinds: &[Kind]) -> Vec<u32> {
+pub(crate) fn ranks(scene: &Scene, kinds: &[Kind]) -> Vec<u32> {
     const PIECE: usize = 1 << 14;
     let class = |mesh: usize| {
         let lets_through = i32::from(kinds[mesh] != Kind::Opaque);
@@ -102,7 +102,7 @@ impl Sheet<'_> {
 /// Finds the triangles of a scene, normalised, that others of their plane hide in part or whole. `sources` are the
 /// triangles' meshes and numbers there, `ranks` gives those of [`ranks`] where they matter, and `report` is called with the
 /// share that is done.
-pub fn find<'a>(
+pub(crate) fn find<'a>(
     scene: &Scene,
     kinds: &[Kind],
     ranks: impl FnOnce() -> &'a [u32],
@@ -153,7 +153,7 @@ pub fn find<'a>(
 
 /// What is visible of each triangle of a scene, by mesh and number, that others of its plane hide in part or whole. `corners_of` gives
 /// the corners of a mesh's triangle.
-pub fn of_scene(scene: &Scene, kinds: &[Kind], corners_of: impl Fn(u32, u32) -> [DVec3; 3]) -> HashMap<(u32, u32), Vec<[DVec3; 3]>> {
+pub(crate) fn of_scene(scene: &Scene, kinds: &[Kind], corners_of: impl Fn(u32, u32) -> [DVec3; 3]) -> HashMap<(u32, u32), Vec<[DVec3; 3]>> {
     let (min, max) = scene.bounds();
     let (centre, extent) = (0.5 * (min + max), (max - min).max_element());
     if !extent.is_normal() {

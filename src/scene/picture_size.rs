@@ -11,7 +11,7 @@ pub enum PictureSize {
 }
 
 /// Along each side.
-pub const MAX_SIDE: u32 = 65_535;
+pub(crate) const MAX_SIDE: u32 = 65_535;
 /// Pixel numbers are 32-bit, with sums over them.
 const MAX_PIXELS: u32 = 1 << 28;
 /// Pixels of a picture whose size is not given.

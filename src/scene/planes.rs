@@ -6,14 +6,14 @@ use rayon::prelude::*;
 use crate::constants::IN_PLANE_INVERSE;
 
 /// Corners that are no further from a plane lie in it.
-pub const IN_PLANE: f64 = 1.0 / IN_PLANE_INVERSE as f64;
+pub(crate) const IN_PLANE: f64 = 1.0 / IN_PLANE_INVERSE as f64;
 
 /// Bits of a triangle's number in what is sorted, below those of its class, hash or cell.
-pub const NUMBER_BITS: u32 = 28;
-pub const NUMBER: u64 = (1 << NUMBER_BITS) - 1;
+pub(crate) const NUMBER_BITS: u32 = 28;
+pub(crate) const NUMBER: u64 = (1 << NUMBER_BITS) - 1;
 
 /// Planes of triangles, those that agree to a few units in the last place as one.
-pub struct Planes {
+pub(crate) struct Planes {
     /// Unit normal n of the front, then what makes n . p + offset = 0.
     pub planes: Vec<Vec4>,
     /// Each triangle's number among them.
@@ -22,7 +22,7 @@ pub struct Planes {
 
 impl Planes {
     /// Of the fronts of normalised triangles, in the order of the first triangle of each.
-    pub fn of(corners: &[[Vec3; 3]]) -> Planes {
+    pub(super) fn of(corners: &[[Vec3; 3]]) -> Planes {
         // A quarter of what two surfaces must be apart.
         const STEP: f64 = 0.25 * IN_PLANE;
         let plane = |corners: &[Vec3; 3]| {
@@ -65,7 +65,7 @@ impl Planes {
 }
 
 /// Of a few words, for [`for_equals`].
-pub fn hash_of(words: &[u32]) -> u64 {
+pub(crate) fn hash_of(words: &[u32]) -> u64 {
     words.iter().fold(0u64, |hash, word| {
         let mixed = (hash ^ u64::from(*word)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         mixed ^ mixed >> 32
@@ -74,7 +74,7 @@ pub fn hash_of(words: &[u32]) -> u64 {
 
 /// Calls `each` with the numbers, ascending, of every two or more things below `count` whose words, and so their hashes, are
 /// the same.
-pub fn for_equals<const N: usize>(
+pub(crate) fn for_equals<const N: usize>(
     count: usize,
     hash: impl Fn(u32) -> u64 + Sync,
     words: impl Fn(u32) -> [u32; N] + Sync,

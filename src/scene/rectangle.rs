@@ -4,23 +4,23 @@ use glam::DVec3;
 
 /// `origin` + s u + t v with s and t from 0 to 1; u and v are perpendicular. Metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rectangle {
+pub(crate) struct Rectangle {
     pub origin: DVec3,
     pub u: DVec3,
     pub v: DVec3,
 }
 
 impl Rectangle {
-    pub fn at(&self, s: f64, t: f64) -> DVec3 {
+    pub(crate) fn at(&self, s: f64, t: f64) -> DVec3 {
         self.origin + s * self.u + t * self.v
     }
 
-    pub fn centre(&self) -> DVec3 {
+    pub(crate) fn centre(&self) -> DVec3 {
         self.at(0.5, 0.5)
     }
 
     /// Centres of `columns` x `rows` texels, row by row: column i lies at (i + 1/2) / columns.
-    pub fn texel_centres(&self, columns: u32, rows: u32) -> impl Iterator<Item = DVec3> {
+    pub(crate) fn texel_centres(&self, columns: u32, rows: u32) -> impl Iterator<Item = DVec3> {
         (0..rows).flat_map(move |row| {
             (0..columns)
                 .map(move |column| self.at((f64::from(column) + 0.5) / f64::from(columns), (f64::from(row) + 0.5) / f64::from(rows)))
@@ -29,7 +29,7 @@ impl Rectangle {
 
     /// Area of the disc of `radius` around the point (s, t) that lies on the rectangle, square
     /// metres.
-    pub fn covered_area(&self, s: f64, t: f64, radius: f64) -> f64 {
+    pub(crate) fn covered_area(&self, s: f64, t: f64, radius: f64) -> f64 {
         let (width, height) = (self.u.length(), self.v.length());
         disc_rectangle_area(radius, [-s * width, (1.0 - s) * width], [-t * height, (1.0 - t) * height])
     }
@@ -39,7 +39,7 @@ impl Rectangle {
 ///
 /// The rectangle is split into its four quadrant parts, so that each has a corner at the origin; the
 /// shared area of one of those is elementary.
-pub fn disc_rectangle_area(radius: f64, x: [f64; 2], y: [f64; 2]) -> f64 {
+pub(crate) fn disc_rectangle_area(radius: f64, x: [f64; 2], y: [f64; 2]) -> f64 {
     let corner = |a: f64, b: f64| a.signum() * b.signum() * quadrant_area(radius, a.abs(), b.abs());
     corner(x[1], y[1]) - corner(x[0], y[1]) - corner(x[1], y[0]) + corner(x[0], y[0])
 }

@@ -9,7 +9,7 @@ use crate::scene::rectangle::Rectangle;
 
 /// An axis-aligned convex room whose faces are walls or openings, with lights in its walls.
 #[derive(Debug, Clone, PartialEq)]
-pub struct RoomScene {
+pub(crate) struct RoomScene {
     pub name: &'static str,
     pub min_corner: DVec3,
     pub max_corner: DVec3,
@@ -19,7 +19,7 @@ pub struct RoomScene {
 }
 
 #[derive(Debug, Clone, PartialEq)]
-pub struct Wall {
+pub(crate) struct Wall {
     pub name: &'static str,
     /// Share of arriving light that is reflected.
     pub albedo: f32,
@@ -29,7 +29,7 @@ pub struct Wall {
 
 /// A disc of light that neither blocks nor changes its wall.
 #[derive(Debug, Clone, PartialEq)]
-pub struct DiscLight {
+pub(crate) struct DiscLight {
     /// Face in whose centre the disc lies.
     pub face: usize,
     /// Metres.
@@ -39,18 +39,18 @@ pub struct DiscLight {
 }
 
 /// Axis (0 to 2) of a face and the sign of its side.
-pub fn face_axis(face: usize) -> (usize, f64) {
+pub(crate) fn face_axis(face: usize) -> (usize, f64) {
     (face / 2, if face % 2 == 1 { 1.0 } else { -1.0 })
 }
 
 impl RoomScene {
     /// The walls with their face numbers, openings left out.
-    pub fn walls(&self) -> impl Iterator<Item = (usize, &Wall)> {
+    pub(crate) fn walls(&self) -> impl Iterator<Item = (usize, &Wall)> {
         self.faces.iter().enumerate().filter_map(|(face, wall)| wall.as_ref().map(|wall| (face, wall)))
     }
 
     /// A face as a rectangle: u and v follow the two axes after the face's own, cyclically.
-    pub fn rectangle(&self, face: usize) -> Rectangle {
+    pub(crate) fn rectangle(&self, face: usize) -> Rectangle {
         let (axis, sign) = face_axis(face);
         let extent = self.max_corner - self.min_corner;
         let mut origin = self.min_corner;
@@ -61,11 +61,11 @@ impl RoomScene {
         Rectangle { origin, u: along((axis + 1) % 3), v: along((axis + 2) % 3) }
     }
 
-    pub fn room_record(&self) -> records::Room {
+    pub(crate) fn room_record(&self) -> records::Room {
         records::Room { min_corner: self.min_corner.as_vec3(), max_corner: self.max_corner.as_vec3() }
     }
 
-    pub fn wall_records(&self) -> Vec<records::Wall> {
+    pub(crate) fn wall_records(&self) -> Vec<records::Wall> {
         self.faces
             .iter()
             .enumerate()
@@ -84,7 +84,7 @@ impl RoomScene {
     }
 
     /// One record a light; `relative_flux` is that of each of its photons.
-    pub fn light_records(&self, relative_flux: &[f32]) -> Vec<records::DiscLight> {
+    pub(crate) fn light_records(&self, relative_flux: &[f32]) -> Vec<records::DiscLight> {
         self.lights
             .iter()
             .zip(relative_flux)
@@ -98,7 +98,7 @@ impl RoomScene {
     }
 
     /// Watts of all lights.
-    pub fn power(&self) -> f64 {
+    pub(crate) fn power(&self) -> f64 {
         self.lights.iter().map(|light| light.power).sum()
     }
 }

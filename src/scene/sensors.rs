@@ -24,7 +24,7 @@ const NORMAL_STEPS: f64 = (1u32 << 22) as f64;
 
 /// The scene with sheets for the points, with their normals, that lie on no surface, where photons alone tell some of the light. Without
 /// the effects that let light pass a sheet there is none.
-pub fn with_sensors<'a>(scene: &'a Scene, points: &[(DVec3, DVec3)], settings: &SceneSettings) -> Cow<'a, Scene> {
+pub(crate) fn with_sensors<'a>(scene: &'a Scene, points: &[(DVec3, DVec3)], settings: &SceneSettings) -> Cow<'a, Scene> {
     let passes = ![Effect::Layers, Effect::Alpha].into_iter().any(|effect| settings.leaves_out(effect));
     let kinds = scene.lobe_kinds();
     let has_sharp = scene.meshes.iter().any(|mesh| kinds[mesh.material].is_sharp());

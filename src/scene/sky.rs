@@ -95,7 +95,7 @@ impl Sky {
 }
 
 #[cfg(test)]
-pub mod tests {
+pub(crate) mod tests {
     use super::*;
 
     pub fn sky(width: u32, height: u32, colour: impl Fn(u32, u32) -> Vec3) -> Sky {

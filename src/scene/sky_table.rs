@@ -20,7 +20,7 @@ const BRIGHT: f64 = 0.25;
 const MOST_BY_TABLE: f64 = 0.75;
 
 /// Rows of equal angle and cells of equal azimuth.
-pub struct Table {
+pub(crate) struct Table {
     pub columns: u32,
     pub rows: u32,
     /// For the kernels: the rows' cumulative shares; then each row's edges as 1 - |cosine| of the angle to the vertical; then for each
@@ -40,7 +40,7 @@ pub struct Table {
 
 impl Sky {
     /// What samples it.
-    pub fn table(&self) -> Table {
+    pub(crate) fn table(&self) -> Table {
         let (width, height) = (self.texture.width, self.texture.height);
         // An even number of rows: each lies above or below the horizon.
         let cells = |size: u32, allowed: RangeInclusive<u32>| (size * allowed.start().div_ceil(size)).min(*allowed.end());

@@ -101,7 +101,7 @@ fn shells_of(scene: &Scene, meshes: &[u32], corners_of: impl Fn(u32, u32) -> [DV
 
 /// Turns closed solids whose faces look inwards, and returns the names of their meshes. A shell that looks inwards within another of its
 /// material is a hollow.
-pub fn turn_outwards(scene: &mut Scene) -> BTreeSet<String> {
+pub(crate) fn turn_outwards(scene: &mut Scene) -> BTreeSet<String> {
     let mut turned: Vec<(u32, u32)> = Vec::new();
     for shells in shells(scene, |mesh, triangle| scene.meshes[mesh as usize].corners(triangle as usize)).values() {
         let volumes: Vec<f64> = shells.iter().map(Shell::volume).collect();
@@ -148,7 +148,7 @@ pub fn turn_outwards(scene: &mut Scene) -> BTreeSet<String> {
 
 /// The most solids that lie in one another anywhere, as far as places just inside of their shells tell, if it may be more than `few`; and
 /// a mesh that has so many around it.
-pub fn most_nested(scene: &Scene, few: usize, corners_of: impl Fn(u32, u32) -> [DVec3; 3]) -> Option<(usize, u32)> {
+pub(crate) fn most_nested(scene: &Scene, few: usize, corners_of: impl Fn(u32, u32) -> [DVec3; 3]) -> Option<(usize, u32)> {
     let shells: Vec<Shell> = shells(scene, corners_of).into_values().flatten().collect();
     let mut order: Vec<&Shell> = shells.iter().collect();
     order.sort_by(|a, b| a.min.x.total_cmp(&b.min.x));
@@ -172,7 +172,7 @@ pub fn most_nested(scene: &Scene, few: usize, corners_of: impl Fn(u32, u32) -> [
 }
 
 /// Which of the solids that a place is in counts there.
-pub enum Order {
+pub(crate) enum Order {
     /// The one entered last: each holds the other or lies outside of it, or their media are the same.
     Entry,
     /// Solids lie partly in one another, and who is in both may have entered either last: the smaller one counts. Materials, the largest
@@ -183,12 +183,12 @@ pub enum Order {
 }
 
 /// What makes solids' media different: index of refraction, its spread over colours, and what is absorbed.
-pub fn medium(material: &Material) -> Option<(f32, f32, Medium)> {
+pub(crate) fn medium(material: &Material) -> Option<(f32, f32, Medium)> {
     material.enclosed_medium().map(|medium| (material.layers.ior, material.layers.ior_spread(), medium))
 }
 
 /// As far as places just inside of their shells tell.
-pub fn order(scene: &Scene) -> Order {
+pub(crate) fn order(scene: &Scene) -> Order {
     let medium = |material: usize| medium(&scene.materials[material]);
     let mut media = scene.meshes.iter().filter_map(|mesh| medium(mesh.material));
     let Some(first) = media.next() else { return Order::Entry };

@@ -30,7 +30,7 @@ struct Sphere {
 ///
 /// Connected triangles stay together, and pairs are merged for as long as that leaves less to aim at: the sum of the
 /// squared radii, as a cone's solid angle goes with that.
-pub fn caustic_targets(geometry: &Geometry, is_wanted: &[bool]) -> Vec<CausticTarget> {
+pub(crate) fn caustic_targets(geometry: &Geometry, is_wanted: &[bool]) -> Vec<CausticTarget> {
     let wanted = geometry.triangles.iter().filter(|triangle| triangle.plane < HIDDEN && is_wanted[triangle.material as usize]);
     let mut groups = Vec::new();
     gathered(groups_of(&wanted.map(|triangle| [triangle.a, triangle.b, triangle.c]).collect::<Vec<_>>()), MAX_GROUPS_MERGED, &mut groups);
@@ -131,7 +131,7 @@ fn target(points: &[DVec3]) -> CausticTarget {
 
 /// Bounds of the share of an emitter's light that leaves towards each target, summed over targets and at most 1:
 /// the least and the largest such sum of all emitters. Twin of the sums in `glsl/world/scene/aim.glsl`, which are of one place.
-pub fn aimed_shares(geometry: &Geometry, targets: &[CausticTarget]) -> (f64, f64) {
+pub(crate) fn aimed_shares(geometry: &Geometry, targets: &[CausticTarget]) -> (f64, f64) {
     let shares = geometry.emitters.iter().map(|emitter| {
         let share = |target: &CausticTarget| share_towards(geometry, emitter, target);
         targets.iter().map(share).sum::<f64>().min(1.0)

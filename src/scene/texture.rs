@@ -46,7 +46,7 @@ pub enum Texels {
 }
 
 /// Linear value of each 8-bit code.
-pub static LINEAR_OF_SRGB: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|code| linear_of_srgb(code as u8)));
+pub(crate) static LINEAR_OF_SRGB: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|code| linear_of_srgb(code as u8)));
 
 impl Texels {
     pub fn count(&self) -> usize {
@@ -185,7 +185,7 @@ impl Texels {
 }
 
 /// The sRGB transfer function (IEC 61966-2-1), from 8-bit code to linear.
-pub fn linear_of_srgb(code: u8) -> f32 {
+pub(crate) fn linear_of_srgb(code: u8) -> f32 {
     let value = f32::from(code) / 255.0;
     if value <= 0.040_45 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
 }

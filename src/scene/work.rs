@@ -5,14 +5,14 @@ thread_local!(static DONE: std::cell::Cell<usize> = const { std::cell::Cell::new
 
 /// Adds to the work of this thread.
 #[inline]
-pub fn add(_amount: impl FnOnce() -> usize) {
+pub(crate) fn add(_amount: impl FnOnce() -> usize) {
     #[cfg(test)]
     DONE.set(DONE.get() + _amount());
 }
 
 /// Work of one thread that does all of `run`.
 #[cfg(test)]
-pub fn of<T: Send>(run: impl FnOnce() -> T + Send) -> (T, usize) {
+pub(crate) fn of<T: Send>(run: impl FnOnce() -> T + Send) -> (T, usize) {
     let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread can be started");
     alone.install(|| {
         let found = run();

@@ -54,7 +54,7 @@ use stop::Stop;
 /// How photons near a point are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Gather {
+pub(crate) enum Gather {
     /// Step through the whole photon list, as the paper does.
     Brute,
     /// Look into the cells of a sorted uniform grid.
@@ -67,7 +67,7 @@ pub enum Gather {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 #[repr(u32)]
-pub enum Sums {
+pub(crate) enum Sums {
     /// 64-bit fixed point: the same bits in whatever order photons come.
     Integer = constants::SUMS_INTEGER,
     /// 32-bit floats: a sum's last digits depend on the order of addition, and it stops growing once
@@ -103,7 +103,7 @@ pub enum Math {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 #[repr(u32)]
-pub enum PhongDirection {
+pub(crate) enum PhongDirection {
     /// The mirror direction of the arriving photon.
     Mirror = constants::PHONG_MIRROR,
     /// The direction in which the photon left.
@@ -113,7 +113,7 @@ pub enum PhongDirection {
 /// The paper's experiments.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Preset {
+pub(crate) enum Preset {
     /// Figure 1: naive slots, 2 bounces.
     Naive,
     /// Figure 2: the modified implementation, 15 bounces.
@@ -125,7 +125,7 @@ pub enum Preset {
 }
 
 /// Walls of the open box in the order of their numbers; the sixth face is the opening.
-pub const WALL_NAMES: [&str; 5] = ["left", "right", "floor", "ceiling", "back"];
+pub(crate) const WALL_NAMES: [&str; 5] = ["left", "right", "floor", "ceiling", "back"];
 
 with_defaults! {
     #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -178,13 +178,13 @@ with_defaults! {
 }
 
 /// Half the edge of the open box, metres.
-pub const HALF_WIDTH: f64 = 0.25;
+pub(crate) const HALF_WIDTH: f64 = 0.25;
 
 /// Photons of the paper's round, to which its `full_light` refers.
-pub const PAPER_PHOTONS: u32 = 5000;
+pub(crate) const PAPER_PHOTONS: u32 = 5000;
 
 impl RoomSettings {
-    pub fn preset(preset: Preset) -> RoomSettings {
+    pub(crate) fn preset(preset: Preset) -> RoomSettings {
         let modified = RoomSettings::default();
         match preset {
             Preset::Modified => modified,
@@ -346,17 +346,17 @@ const MAX_QUANTITY: f64 = 1e12;
 const MAX_MESH: u32 = 1024;
 /// Smallest radius relative to the box: below it the squares of f32 distances lose their meaning.
 /// Smallest radius at which a bias is measured, over the smallest that a run allows: there is room for the smaller radius.
-pub const ROOM_BELOW: f64 = 1.415;
+pub(crate) const ROOM_BELOW: f64 = 1.415;
 const MIN_RADIUS_SHARE: f64 = 1.0 / 65_536.0;
 /// The same in metres.
-pub const MIN_RADIUS: f64 = 2.0 * HALF_WIDTH * MIN_RADIUS_SHARE;
+pub(crate) const MIN_RADIUS: f64 = 2.0 * HALF_WIDTH * MIN_RADIUS_SHARE;
 /// Rounds of a run that ends by itself.
-pub const MOST_ROUNDS: u32 = 1 << 20;
+pub(crate) const MOST_ROUNDS: u32 = 1 << 20;
 /// Photons * bounces that a film sum can hold with 16 bits after the binary point.
-pub const MAX_EVENTS: u64 = 1 << 47;
+pub(crate) const MAX_EVENTS: u64 = 1 << 47;
 /// Rounds * nearest photons that a film sum can hold, each scaled up by 2^`NEAREST_GAIN_BITS`, with 10 bits after
 /// the binary point.
-pub const MAX_NEAREST_SUMMED: u64 = 1 << 31;
+pub(crate) const MAX_NEAREST_SUMMED: u64 = 1 << 31;
 
 /// Checks what both worlds have and allow alike, but for the most rounds.
 fn check_common((rounds, most_rounds): (u32, u32), group_size: u32, stop: &Stop) -> Result<()> {

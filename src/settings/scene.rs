@@ -168,15 +168,15 @@ fn cap<S: serde::Serializer>(bounces: &u32, serializer: S) -> std::result::Resul
     Some(*bounces).filter(|bounces| *bounces < MAX_BOUNCES).serialize(serializer)
 }
 
-pub const MAX_ROUNDS: u32 = 1 << 20;
+pub(crate) const MAX_ROUNDS: u32 = 1 << 20;
 /// Photons of a round within the first radius of a point of the global map, by default: about what a radius by the scene's area leaves of
 /// light that was scattered before, in closed rooms.
-pub const NEIGHBOURS: u32 = 24;
+pub(crate) const NEIGHBOURS: u32 = 24;
 /// A caustic has edges: half the radius.
-pub const CAUSTIC_NEIGHBOURS: u32 = 6;
+pub(crate) const CAUSTIC_NEIGHBOURS: u32 = 6;
 /// Camera paths through a pixel in a block of rounds, at least.
-pub const SAMPLES_PER_BLOCK: u32 = 4;
-pub const MAX_BLOCK: u32 = 1 << 10;
+pub(crate) const SAMPLES_PER_BLOCK: u32 = 4;
+pub(crate) const MAX_BLOCK: u32 = 1 << 10;
 const MAX_NEIGHBOURS: u32 = 10_000;
 /// A visible point's rays are one loop.
 const MAX_SHADOW_RAYS: u32 = 64;

@@ -16,13 +16,13 @@ named! {
 }
 
 /// Blocks before the error is looked at first: a spread of fewer says little.
-pub const FIRST_LOOK: u32 = 16;
+pub(crate) const FIRST_LOOK: u32 = 16;
 
 /// Blocks of which the spread is an error at all: that of eight is 27 % uncertain itself, that of four 41 %. Of fewer it is unknown.
-pub const LEAST_BLOCKS: u32 = 8;
+pub(crate) const LEAST_BLOCKS: u32 = 8;
 
 /// Levels of confidence with which errors may be stated.
-pub const CONFIDENCES: std::ops::RangeInclusive<f64> = 0.5..=0.9999;
+pub(crate) const CONFIDENCES: std::ops::RangeInclusive<f64> = 0.5..=0.9999;
 
 with_defaults! {
     #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

@@ -5,9 +5,9 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, Result};
 
 /// A pixel's paths are summed by one invocation.
-pub const MAX_SAMPLES: u32 = 1024;
+pub(crate) const MAX_SAMPLES: u32 = 1024;
 /// Pixels along the side of a tile.
-pub const TILE: u32 = 4;
+pub(crate) const TILE: u32 = 4;
 
 /// Of each tile by how often its samples are twice those of all pixels: a row of digits for each row of tiles.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use super::{Span, Timings};
 
 /// Times nested scopes on the host's clock.
-pub struct HostClock {
+pub(crate) struct HostClock {
     started: Instant,
     /// Name of the whole, and of the scopes that are open.
     whole: &'static str,
@@ -15,18 +15,18 @@ pub struct HostClock {
 
 impl HostClock {
     /// `whole` names the row that spans everything.
-    pub fn start(whole: &'static str) -> HostClock {
+    pub(crate) fn start(whole: &'static str) -> HostClock {
         let mut timings = Timings::default();
         timings.count(whole);
         HostClock { started: Instant::now(), whole, open: Vec::new(), timings }
     }
 
     /// The zero of all times.
-    pub fn started(&self) -> Instant {
+    pub(crate) fn started(&self) -> Instant {
         self.started
     }
 
-    pub fn time<T>(&mut self, name: &str, body: impl FnOnce(&mut Self) -> T) -> T {
+    pub(crate) fn time<T>(&mut self, name: &str, body: impl FnOnce(&mut Self) -> T) -> T {
         let path = self.open.last().map_or_else(|| name.to_owned(), |outer| format!("{outer}/{name}"));
         self.timings.count(&path);
         self.open.push(path);
@@ -38,7 +38,7 @@ impl HostClock {
         result
     }
 
-    pub fn finish(mut self) -> Timings {
+    pub(crate) fn finish(mut self) -> Timings {
         self.timings.add(Span::of_host(self.whole, Duration::ZERO, self.started.elapsed()));
         self.timings
     }

@@ -7,13 +7,13 @@ use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-pub use host_clock::HostClock;
+pub(crate) use host_clock::HostClock;
 use serde::Serialize;
-pub use spread::Spread;
+pub(crate) use spread::Spread;
 
 /// One line of the timing table: everything that ran under one name.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Row {
+pub(crate) struct Row {
     /// Path from the outermost scope, such as `round/build/bounce 3`.
     pub name: String,
     pub count: u64,
@@ -27,14 +27,14 @@ pub struct Row {
 
 /// Which clock saw a span.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Clock {
+pub(crate) enum Clock {
     Gpu,
     Wall,
 }
 
 /// One run of one scope, for the trace file.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Span {
+pub(crate) struct Span {
     pub name: Arc<str>,
     pub clock: Clock,
     /// Since the start of the run. Device spans are placed by the host's time of their submission.
@@ -45,14 +45,14 @@ pub struct Span {
 
 impl Span {
     /// Of what the host's clock saw.
-    pub fn of_host(name: &str, start: Duration, duration: Duration) -> Span {
+    pub(crate) fn of_host(name: &str, start: Duration, duration: Duration) -> Span {
         Span { name: name.into(), clock: Clock::Wall, start, duration, handled: Handled::default() }
     }
 }
 
 /// What a scope is known to have handled; 0 where the host does not know it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Handled {
+pub(crate) struct Handled {
     /// Photons that left their lights in it.
     pub photons: u64,
     /// Photons of a map that it sorted or looked up.
@@ -74,11 +74,11 @@ pub struct Timings {
 const MAX_SPANS: usize = 200_000;
 
 impl Timings {
-    pub fn rows(&self) -> &[Row] {
+    pub(crate) fn rows(&self) -> &[Row] {
         &self.rows
     }
 
-    pub fn spans(&self) -> &[Span] {
+    pub(crate) fn spans(&self) -> &[Span] {
         &self.spans
     }
 
@@ -87,7 +87,7 @@ impl Timings {
         self.spans_left_out
     }
 
-    pub fn row(&self, name: &str) -> Option<&Row> {
+    pub(crate) fn row(&self, name: &str) -> Option<&Row> {
         self.by_name.get(name).map(|&index| &self.rows[index])
     }
 
@@ -106,7 +106,7 @@ impl Timings {
     }
 
     /// Adds time to a scope.
-    pub fn add(&mut self, span: Span) {
+    pub(crate) fn add(&mut self, span: Span) {
         let milliseconds = span.duration.as_secs_f64() * 1e3;
         let row = self.row_mut(&span.name);
         let sum = match span.clock {

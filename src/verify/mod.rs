@@ -2,6 +2,6 @@
 //! radiosity; and any picture against another one.
 
 #[cfg(any(feature = "program", feature = "lab"))]
-pub mod compare;
-pub mod judge;
-pub mod selfcheck;
+pub(crate) mod compare;
+pub(crate) mod judge;
+pub(crate) mod selfcheck;

@@ -6,7 +6,7 @@ use crate::scene::{Camera, Lens, Projection};
 
 /// What moves the camera in a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Motion {
+pub(crate) struct Motion {
     /// Around the pivot, in radians: to the right and up.
     pub orbit: [f64; 2],
     /// About the eye.
@@ -21,7 +21,7 @@ pub struct Motion {
 
 /// Of a scene whose vertical is y.
 #[derive(Debug, Clone)]
-pub struct MovingCamera {
+pub(crate) struct MovingCamera {
     pub camera: Camera,
     /// Distance of what it turns around, along the view.
     pub pivot: f64,
@@ -32,7 +32,7 @@ const LEAST_ANGLE: f64 = 0.02;
 
 impl MovingCamera {
     /// Whether anything has changed.
-    pub fn apply(&mut self, motion: &Motion) -> bool {
+    pub(super) fn apply(&mut self, motion: &Motion) -> bool {
         if *motion == Motion::default() {
             return false;
         }

@@ -7,7 +7,7 @@ use crate::settings::scene::{Effect, SceneSettings};
 use crate::settings::{Builder, RoomSettings};
 
 #[derive(Debug, Clone, PartialEq)]
-pub struct Choices {
+pub(crate) struct Choices {
     /// `SHOW_...`
     pub shows: u32,
     pub stops: f32,
@@ -20,7 +20,7 @@ pub struct Choices {
 
 /// What makes another run.
 #[derive(Debug, Clone, PartialEq)]
-pub struct RunChoices {
+pub(crate) struct RunChoices {
     /// `None`: what is usual.
     pub builder: Option<Builder>,
     /// Of the global map, per round; the caustic map has as many more or less as it had.
@@ -41,7 +41,7 @@ const ROUNDS_OF_BOX: u32 = 1 << 12;
 
 impl RunChoices {
     /// What was asked for, or is usual on a class of devices.
-    pub fn of(view: &ViewRequest, kind: &str) -> RunChoices {
+    pub(super) fn of(view: &ViewRequest, kind: &str) -> RunChoices {
         let request = &view.request;
         let (builder, own) = match &view.subject {
             Subject::Scene { .. } => (request.variant.and_then(Variant::builder), SceneSettings::default().photons),
@@ -57,14 +57,14 @@ impl RunChoices {
         RunChoices { builder, photons: request.photons.unwrap_or(usual), usual_photons, radius_factor: 1.0, without }
     }
 
-    pub fn toggle(&mut self, effect: Effect) {
+    pub(super) fn toggle(&mut self, effect: Effect) {
         match self.without.iter().position(|without| *without == effect) {
             Some(place) => drop(self.without.remove(place)),
             None => self.without.push(effect),
         }
     }
 
-    pub fn scale_radius(&mut self, factor: f64) {
+    pub(super) fn scale_radius(&mut self, factor: f64) {
         self.radius_factor = (self.radius_factor * factor).clamp(0.01, 100.0);
     }
 
@@ -78,7 +78,7 @@ impl RunChoices {
     }
 
     /// What a picture of a scene in a file is asked for.
-    pub fn of_scene(&self, request: &RenderRequest) -> RenderRequest {
+    pub(super) fn of_scene(&self, request: &RenderRequest) -> RenderRequest {
         let usual = request.settings(None);
         let other = |is_other: bool, value: u32| is_other.then_some(value);
         let (photons, radius) = (self.usual_photons != Some(self.photons), self.radius_factor != 1.0);
@@ -94,7 +94,7 @@ impl RunChoices {
     }
 
     /// What a run without end is asked for, which the window shows.
-    pub fn live(&self, request: &RenderRequest) -> RenderRequest {
+    pub(super) fn live(&self, request: &RenderRequest) -> RenderRequest {
         let usual = request.settings(None);
         RenderRequest {
             photons: Some(self.photons),
@@ -107,7 +107,7 @@ impl RunChoices {
     }
 
     /// What the paper's box is asked for; it ends after so many rounds, or none are given.
-    pub fn of_box(&self, request: &RenderRequest, rounds: Option<u32>) -> RenderRequest {
+    pub(super) fn of_box(&self, request: &RenderRequest, rounds: Option<u32>) -> RenderRequest {
         let usual = RenderRequest { photons: None, ..request.clone() }.room_settings();
         RenderRequest {
             variant: Some(Variant::Of(self.builder.unwrap_or(usual.builder))),
@@ -121,7 +121,7 @@ impl RunChoices {
     }
 
     /// The same for a run without end.
-    pub fn live_box(&self, request: &RenderRequest) -> RoomSettings {
+    pub(super) fn live_box(&self, request: &RenderRequest) -> RoomSettings {
         RenderRequest { error: None, time: None, ..self.of_box(request, Some(ROUNDS_OF_BOX)) }.room_settings()
     }
 }

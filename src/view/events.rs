@@ -14,7 +14,7 @@ use winit::window::{Window, WindowId};
 
 use crate::error::{Error, Result};
 
-pub struct Events {
+pub(crate) struct Events {
     event_loop: EventLoop<()>,
     seen: Seen,
 }
@@ -35,7 +35,7 @@ fn no_window(reason: impl std::fmt::Display) -> Error {
 
 impl Events {
     /// Opens a window with room for a picture of this size.
-    pub fn open(title: &str, size: [u32; 2], interface: &Context) -> Result<Events> {
+    pub(super) fn open(title: &str, size: [u32; 2], interface: &Context) -> Result<Events> {
         // winit's words name no remedy and span lines.
         let event_loop = EventLoop::new().map_err(|_| no_window("there is no display; log in on a desktop, or set DISPLAY"))?;
         let seen = Seen { title: title.to_owned(), size, window: None, failed: None, is_closed: false, interface: interface.clone() };
@@ -50,28 +50,28 @@ impl Events {
     }
 
     /// Takes what has happened, and waits for something at most so long.
-    pub fn wait(&mut self, most: Duration) {
+    pub(super) fn wait(&mut self, most: Duration) {
         if let PumpStatus::Exit(_) = self.event_loop.pump_app_events(Some(most), &mut self.seen) {
             self.seen.is_closed = true;
         }
     }
 
-    pub fn is_closed(&self) -> bool {
+    pub(super) fn is_closed(&self) -> bool {
         self.seen.is_closed
     }
 
-    pub fn window(&self) -> &Arc<Window> {
+    pub(super) fn window(&self) -> &Arc<Window> {
         &self.seen.window.as_ref().expect("the window was opened").0
     }
 
     /// What happened since the last call, for the user interface.
-    pub fn take_input(&mut self) -> RawInput {
+    pub(super) fn take_input(&mut self) -> RawInput {
         let (window, state) = self.seen.window.as_mut().expect("the window was opened");
         state.take_egui_input(window)
     }
 
     /// The same without what its user did, which waits for the next call of `take_input`.
-    pub fn look_at_input(&mut self) -> RawInput {
+    pub(super) fn look_at_input(&mut self) -> RawInput {
         let mut input = self.take_input();
         let (_, state) = self.seen.window.as_mut().expect("the window was opened");
         state.egui_input_mut().events = std::mem::take(&mut input.events);
@@ -79,7 +79,7 @@ impl Events {
     }
 
     /// Does what the user interface asks of the system: pointers, the clipboard.
-    pub fn obey(&mut self, output: &mut FullOutput) {
+    pub(super) fn obey(&mut self, output: &mut FullOutput) {
         let (window, state) = self.seen.window.as_mut().expect("the window was opened");
         state.handle_platform_output(window, std::mem::take(&mut output.platform_output));
     }

@@ -14,7 +14,7 @@ use crate::scene::Camera;
 use crate::timings::{Row, Timings};
 
 /// The two kinds of runs.
-pub enum Live<'a> {
+pub(crate) enum Live<'a> {
     Scene(Box<LiveScene<'a>>),
     Room(Box<LiveRoom<'a>>),
 }
@@ -31,13 +31,13 @@ macro_rules! either {
 
 /// Rounds per second, over the last ones.
 #[derive(Default)]
-pub struct Rate {
+pub(crate) struct Rate {
     since: Option<(Instant, u32)>,
     pub per_second: f64,
 }
 
 impl Rate {
-    pub fn take(&mut self, rounds: u32) {
+    pub(super) fn take(&mut self, rounds: u32) {
         let (since, before) = *self.since.get_or_insert((Instant::now(), rounds));
         let seconds = since.elapsed().as_secs_f64();
         // A camera that moved has begun anew.
@@ -52,7 +52,7 @@ impl Rate {
 
 impl Status {
     /// Takes what the latest round has left.
-    pub fn take(&mut self, live: &mut Live) {
+    pub(super) fn take(&mut self, live: &mut Live) {
         self.ledger = either!(live, live => live.run.state.ledger());
         if let Live::Scene(live) = live {
             (self.kept_rounds, self.kept_bytes) = live.kept();
@@ -76,7 +76,7 @@ impl Status {
 }
 
 /// What a look at the film tells.
-pub struct Look {
+pub(crate) struct Look {
     pub noise: f64,
     pub bias: Option<f64>,
     /// At most, of light that no path or photon has met so far.
@@ -88,36 +88,36 @@ pub struct Look {
 
 impl<'a> Live<'a> {
     /// One more round; whether there are more.
-    pub fn round(&mut self) -> Result<bool> {
+    pub(super) fn round(&mut self) -> Result<bool> {
         either!(self, live => live.round())?;
         Ok(!self.has_ended())
     }
 
-    pub fn has_ended(&self) -> bool {
+    pub(super) fn has_ended(&self) -> bool {
         either!(self, live => live.run.has_ended())
     }
 
-    pub fn rounds(&self) -> u32 {
+    pub(super) fn rounds(&self) -> u32 {
         either!(self, live => live.run.state.rounds())
     }
 
-    pub fn take_timings(&mut self) -> Timings {
+    pub(super) fn take_timings(&mut self) -> Timings {
         either!(self, live => std::mem::take(live.run.recorder.timings()))
     }
 
     /// The room's light is on its walls, whoever looks.
-    pub fn look_from(&mut self, camera: &Camera) -> Result<()> {
+    pub(super) fn look_from(&mut self, camera: &Camera) -> Result<()> {
         match self {
             Live::Scene(live) => live.look_from(camera),
             Live::Room(_) => Ok(()),
         }
     }
 
-    pub fn commands(&mut self) -> &mut Commands<'a> {
+    pub(super) fn commands(&mut self) -> &mut Commands<'a> {
         either!(self, live => &mut live.run.recorder)
     }
 
-    pub fn look(&mut self) -> Result<Look> {
+    pub(super) fn look(&mut self) -> Result<Look> {
         match self {
             Live::Scene(live) => {
                 let (film, error) = live.run.look()?;

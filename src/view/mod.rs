@@ -6,7 +6,7 @@ mod choices;
 mod events;
 mod live;
 mod panel;
-pub mod picture;
+pub(crate) mod picture;
 mod session;
 
 use std::sync::Arc;
@@ -23,13 +23,13 @@ use events::Events;
 use session::{Next, Session};
 
 /// What is looked at: by a camera of its own, or the paper's box.
-pub enum Subject {
+pub(crate) enum Subject {
     Scene { scene: Arc<PreparedScene>, camera: Camera },
     Box,
 }
 
 /// What `photonmill view` is asked for.
-pub struct ViewRequest<'a> {
+pub(crate) struct ViewRequest<'a> {
     pub subject: Subject,
     /// What the picture in a file is asked for, but for its camera and what the user of the window chooses.
     pub request: RenderRequest,
@@ -48,7 +48,7 @@ const PANEL_WINDOW: u32 = 600;
 const ZOOM_OF_CPU: u32 = 4;
 
 /// Shows a window until it is closed.
-pub fn run(request: ViewRequest) -> Result<()> {
+pub(crate) fn run(request: ViewRequest) -> Result<()> {
     let interface = egui::Context::default();
     let name = match &request.subject {
         Subject::Scene { scene, .. } => scene.scene.name.clone(),

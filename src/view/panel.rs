@@ -28,11 +28,11 @@ const ERROR_LABELS: [&str; 5] = ["0.1 %", "", "3 %", "", "100 %"];
 const LEAST_UNSEEN: f64 = 5e-5;
 const MESSAGE_COLOUR: Color32 = Color32::from_rgb(255, 200, 90);
 /// Dots of photons of the global and of the caustic map.
-pub const PHOTON_COLOURS: [[u8; 3]; 2] = [[255, 176, 0], [86, 180, 233]];
+pub(crate) const PHOTON_COLOURS: [[u8; 3]; 2] = [[255, 176, 0], [86, 180, 233]];
 
 /// What is said of the run.
 #[derive(Debug, Clone, Default)]
-pub struct Status {
+pub(crate) struct Status {
     pub title: String,
     pub device: String,
     pub size: [u32; 2],
@@ -61,7 +61,7 @@ pub struct Status {
 
 /// What the user asks for, beside choices.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Requests {
+pub(crate) struct Requests {
     pub motion: Motion,
     pub screenshot: bool,
     pub render: bool,
@@ -82,7 +82,7 @@ const NARROWER: f64 = 0.8;
 const STOPS_PER_SECOND: f32 = 3.0;
 
 /// Draws the panel, and takes what the user does in it, on the picture and on keys.
-pub fn show(context: &Context, choices: &mut Choices, status: &Status, pivot: f64) -> Requests {
+pub(crate) fn show(context: &Context, choices: &mut Choices, status: &Status, pivot: f64) -> Requests {
     let mut requests = Requests::default();
     if choices.is_open {
         egui::Window::new(&status.title).default_size([270.0, 640.0]).default_pos([12.0, 12.0]).show(context, |ui| {

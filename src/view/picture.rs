@@ -12,7 +12,7 @@ use crate::records::DisplayPush;
 
 /// How values become colours.
 #[derive(Debug, Clone, Copy)]
-pub struct Exposure {
+pub(crate) struct Exposure {
     pub shows: u32,
     pub stops: f32,
     /// The paper's box has display values, which no curve changes.
@@ -20,7 +20,7 @@ pub struct Exposure {
 }
 
 /// Buffers of one size of window and picture.
-pub struct Picture {
+pub(crate) struct Picture {
     pub size: [u32; 2],
     pub window: [u32; 2],
     /// Radiance, or the relative error; see `glsl/kernels/show_scene.comp`.
@@ -29,7 +29,7 @@ pub struct Picture {
 }
 
 impl Picture {
-    pub fn new(gpu: &Gpu, size: [u32; 2], window: [u32; 2]) -> Result<Picture> {
+    pub(crate) fn new(gpu: &Gpu, size: [u32; 2], window: [u32; 2]) -> Result<Picture> {
         let count = |size: [u32; 2]| u64::from(size[0]) * u64::from(size[1]);
         Ok(Picture {
             size,
@@ -40,7 +40,7 @@ impl Picture {
     }
 
     /// Records the pixels of the window, of which so many are one of the picture along each side.
-    pub fn expose(&self, commands: &mut Commands, exposure: Exposure, zoom: u32, blue_first: bool) -> Result<()> {
+    pub(crate) fn expose(&self, commands: &mut Commands, exposure: Exposure, zoom: u32, blue_first: bool) -> Result<()> {
         let push = DisplayPush {
             width: self.window[0],
             height: self.window[1],
@@ -57,7 +57,7 @@ impl Picture {
     }
 
     /// The window's pixels as they are, red first, for a file.
-    pub fn codes(&self, commands: &mut Commands, blue_first: bool) -> Result<Vec<[u8; 3]>> {
+    pub(crate) fn codes(&self, commands: &mut Commands, blue_first: bool) -> Result<Vec<[u8; 3]>> {
         let count = u64::from(self.window[0]) * u64::from(self.window[1]);
         let words = commands.read(&self.pixels, count as usize)?;
         let code = |word: u32| {
@@ -68,7 +68,7 @@ impl Picture {
     }
 
     /// Shows the pixels, which are written by now. `false`: the window has another size.
-    pub fn present(&self, presenter: &mut Presenter, interface: &egui::Context, output: FullOutput) -> Result<bool> {
+    pub(crate) fn present(&self, presenter: &mut Presenter, interface: &egui::Context, output: FullOutput) -> Result<bool> {
         let primitives = interface.tessellate(output.shapes, output.pixels_per_point);
         let overlay = Overlay { textures: output.textures_delta, primitives, pixels_per_point: output.pixels_per_point };
         presenter.present(&self.pixels, self.window, overlay)

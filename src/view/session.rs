@@ -33,7 +33,7 @@ use crate::scene::{Camera, Projection};
 use crate::settings::scene::Part;
 
 /// How a run that was looked at ended.
-pub enum Next {
+pub(crate) enum Next {
     /// `works`: it had begun.
     Anew {
         works: bool,
@@ -42,7 +42,7 @@ pub enum Next {
 }
 
 /// What stays from run to run.
-pub struct Session<'a> {
+pub(crate) struct Session<'a> {
     gpu: &'a Gpu,
     request: &'a ViewRequest<'a>,
     interface: Context,
@@ -67,7 +67,7 @@ const STOPS_OF_PHOTONS: f32 = 2.0;
 const SAID: Duration = Duration::from_secs(8);
 
 impl<'a> Session<'a> {
-    pub fn new(gpu: &'a Gpu, request: &'a ViewRequest<'a>, interface: Context, title: String) -> Session<'a> {
+    pub(super) fn new(gpu: &'a Gpu, request: &'a ViewRequest<'a>, interface: Context, title: String) -> Session<'a> {
         let camera = match &request.subject {
             Subject::Scene { scene, camera } => {
                 let scene = &scene.scene;
@@ -98,13 +98,13 @@ impl<'a> Session<'a> {
         }
     }
 
-    pub fn say(&mut self, message: String) {
+    pub(super) fn say(&mut self, message: String) {
         self.status.message = message;
         self.said = Some(Instant::now());
     }
 
     /// Runs with these choices until they must begin anew.
-    pub fn show(&mut self, events: &mut Events, presenter: &mut Presenter, choices: &mut Choices) -> Result<Next> {
+    pub(super) fn show(&mut self, events: &mut Events, presenter: &mut Presenter, choices: &mut Choices) -> Result<Next> {
         let Some(window) = self.settled_size(events, presenter)? else { return Ok(Next::Close) };
         let size = self.request.size.unwrap_or(window.map(|length| (length / choices.zoom).max(1)));
         let picture = Picture::new(self.gpu, size, window)?;

@@ -266,6 +266,40 @@ fn files_that_are_named_exist() {
     }
 }
 
+/// Items that are `pub` at the top level of a file, by path: what the library shows, or gives as the type of something that it shows.
+fn public_items(sources: &BTreeMap<String, String>) -> BTreeSet<String> {
+    const BEFORE_NAMES: [&str; 9] = ["async", "const", "enum", "fn", "static", "struct", "trait", "type", "unsafe"];
+    let of_file = |(module, source): (&String, &String)| {
+        let path = |name: &str| format!("{module}::{name}").trim_start_matches("lib::").to_owned();
+        // What is indented is a field or a method, but for an enum in a macro that writes more of it.
+        let code = format!("\n{}", code_of(source)).replace("\n    pub enum ", "\npub enum ");
+        let names = |item: &str| match item.strip_prefix("use ").and_then(|rest| rest.split(';').next()) {
+            Some(tree) => opened(tree).iter().map(|used| path(used.rsplit([':', ' ']).next().unwrap_or_default())).collect(),
+            None => {
+                let mut words = item.split(|letter: char| !(letter.is_alphanumeric() || letter == '_'));
+                words.find(|word| !BEFORE_NAMES.contains(word)).filter(|word| *word != "mod").map(path).into_iter().collect::<Vec<_>>()
+            }
+        };
+        code.split("\npub ").skip(1).flat_map(names).collect::<Vec<_>>()
+    };
+    sources.iter().flat_map(of_file).collect()
+}
+
+/// What is public stays as it is until x of 0.x rises, so that nothing is by chance: a list has all of it.
+#[test]
+fn what_is_public_is_promised() {
+    let promised = read("tests/program/promised.txt");
+    let promised: BTreeSet<String> = promised.lines().filter(|line| !line.starts_with('#')).map(str::to_owned).collect();
+    let public = public_items(&sources());
+    let differences: Vec<&String> = public.symmetric_difference(&promised).collect();
+    assert!(differences.is_empty(), "public and not in promised.txt, or in it and not public: {differences:?}");
+
+    let a =
+        "pub use b::{C, d::E as F};\npub const fn g() {}\npub(crate) fn h() {}\nimpl C {\n    pub fn i() {}\n}\nx! {\n    pub enum J {}\n}";
+    let sources = [("lib", "pub mod a;\npub struct K;"), ("a", a)].map(|(module, source)| (module.to_owned(), source.to_owned()));
+    assert_eq!(public_items(&sources.into()), ["K", "a::C", "a::F", "a::J", "a::g"].map(str::to_owned).into());
+}
+
 /// A file of tests that no module names would never run.
 #[test]
 fn every_file_of_tests_is_run() {

@@ -50,7 +50,7 @@ pub enum BiasFrom {
 const ALLOWANCE: (f64, f64) = (0.9, 2.1);
 
 /// The smaller radius over the larger one, and how many times their difference the bias of the larger one is.
-pub const SMALLER: f64 = FRAC_1_SQRT_2;
+pub(crate) const SMALLER: f64 = FRAC_1_SQRT_2;
 const TIMES: f64 = 2.0;
 
 impl Bias {
@@ -101,7 +101,7 @@ impl Bias {
 }
 
 /// Vectors of independent groups of rounds, each with how many equal parts it is the sum of: by these, and by scalar products.
-pub struct Groups {
+pub(crate) struct Groups {
     parts: Vec<f64>,
     products: Vec<Vec<f64>>,
 }
@@ -110,7 +110,7 @@ impl Groups {
     /// Fewer tell no spread.
     const LEAST: usize = 4;
 
-    pub fn of<T: Copy + Into<f64>>(groups: &[(f64, Vec<T>)]) -> Groups {
+    pub(crate) fn of<T: Copy + Into<f64>>(groups: &[(f64, Vec<T>)]) -> Groups {
         let product = |one: &[T], two: &[T]| one.iter().zip(two).map(|(a, b)| (*a).into() * (*b).into()).sum();
         Groups {
             parts: groups.iter().map(|(parts, _)| *parts).collect(),
@@ -120,7 +120,7 @@ impl Groups {
 
     /// The length of the mean of a part without its noise: lower end, estimate and upper end. Of few groups the upper end is the length
     /// with its noise; of a single one that is all there is, and of none it is unknown.
-    pub fn mean_size(&self, confidence: f64) -> [f64; 3] {
+    pub(crate) fn mean_size(&self, confidence: f64) -> [f64; 3] {
         let root = |square: f64| square.max(0.0).sqrt();
         let groups = self.parts.len();
         if groups < Groups::LEAST {

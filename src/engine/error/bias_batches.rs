@@ -10,10 +10,10 @@ use crate::engine::run::watch::{Control, End};
 use crate::error::Result;
 use crate::settings::stop::{Measure, Stop};
 
-pub const BATCHES: u32 = 8;
+pub(crate) const BATCHES: u32 = 8;
 
 /// Batches of a run's own kind, with photons of their own.
-pub struct Batches<'a> {
+pub(crate) struct Batches<'a> {
     /// Of the run.
     pub seed: u64,
     pub measure: Measure,
@@ -24,7 +24,7 @@ pub struct Batches<'a> {
 }
 
 /// What a batch differs in from the run.
-pub struct Batch {
+pub(crate) struct Batch {
     /// Of the radius, which stays.
     pub factor: f64,
     pub rounds: u32,
@@ -35,12 +35,12 @@ pub struct Batch {
 
 impl Batches<'_> {
     /// The bias at the run's radius; `None` if it was cancelled. `run` gives the values of a batch's result.
-    pub fn measure(&self, mut run: impl FnMut(&Batch, &mut Control) -> Result<(End, Vec<f64>)>) -> Result<Option<Bias>> {
+    pub(crate) fn measure(&self, mut run: impl FnMut(&Batch, &mut Control) -> Result<(End, Vec<f64>)>) -> Result<Option<Bias>> {
         extrapolate(self.measure, self.confidence, self.rounds, |factor, number| self.values(factor, number, &mut run))
     }
 
     /// The values of a batch; `None` if it was cancelled.
-    pub fn values(
+    pub(crate) fn values(
         &self,
         factor: f64,
         number: u32,
@@ -55,7 +55,7 @@ impl Batches<'_> {
 
 /// The bias at a radius. `batch` gives the result's values of a batch at the radius times a factor, the same photons for
 /// the same batch; `None` ends it without an answer.
-pub fn extrapolate(
+pub(crate) fn extrapolate(
     measure: Measure,
     confidence: f64,
     rounds_per_batch: u32,
@@ -69,7 +69,7 @@ pub fn extrapolate(
 
 /// How far the result at a smaller radius is from that at the whole one, relative to the latter: the lower end of the
 /// interval, the estimate, the upper end.
-pub fn difference(
+pub(crate) fn difference(
     measure: Measure,
     confidence: f64,
     factor: f64,
@@ -97,7 +97,7 @@ pub fn difference(
 }
 
 /// Seed of a batch: 32 bits, which is what every generator takes, and far from the run's own.
-pub fn seed(run: u64, batch: u32) -> u64 {
+pub(crate) fn seed(run: u64, batch: u32) -> u64 {
     // The output function of SplitMix64 (Steele, Lea and Flood 2014).
     let mut z = run.wrapping_add(u64::from(batch + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -17,21 +17,21 @@ pub struct FilmError {
     pub blocks: u32,
     /// Standard error; infinite of fewer than two blocks.
     pub noise: f64,
-    pub freedom: DegreesOfFreedom,
+    pub(crate) freedom: DegreesOfFreedom,
     /// What nothing has reached.
-    pub unknown: Unknown,
+    pub(crate) unknown: Unknown,
     /// What light may add that is so rare that no round may have shown it, with the confidence that was asked for: as many hits
     /// of the brightest lamp in mirrors and glass as a run may miss. Infinite where all else is black.
     pub unseen: f64,
     /// Of the radius; `None` where it was not measured.
     pub bias: Option<Bias>,
     /// Where the noise sits; `None` where that is not known.
-    pub places: Option<ErrorPlaces>,
+    pub(crate) places: Option<ErrorPlaces>,
 }
 
 /// Where the error of the noise sits, as shares of its square.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct ErrorPlaces {
+pub(crate) struct ErrorPlaces {
     /// One in a hundred, and the share of these.
     pub worst_pixels: u64,
     pub of_worst_pixels: f64,
@@ -41,7 +41,7 @@ pub struct ErrorPlaces {
 
 impl ErrorPlaces {
     /// The share of caustics and indirect light, which come from maps.
-    pub fn of_maps(&self) -> f64 {
+    pub(crate) fn of_maps(&self) -> f64 {
         let [_, _, caustic, indirect] = self.of_parts;
         caustic + indirect
     }
@@ -82,7 +82,7 @@ impl FilmError {
 ///
 /// The standard error is taken one standard error of its own larger, because runs that end at an error end sooner where it is too
 /// small by chance. The bound is infinite where nothing tells the error. The bias of the radius is not part of it.
-pub fn error_bound(relative_error: f64, freedom: DegreesOfFreedom, confidence: f64) -> f64 {
+pub(crate) fn error_bound(relative_error: f64, freedom: DegreesOfFreedom, confidence: f64) -> f64 {
     if relative_error == 0.0 || relative_error.is_infinite() {
         return relative_error;
     }
@@ -129,7 +129,7 @@ impl ErrorSource {
 
 /// The bound of noise and bias together, each as it was found and its own bound. Squares add up, and so do the squares of how far
 /// these may lie above what was found, as the one may be found too small where the other is not.
-pub fn bound_of_both([noise, most_noise]: [f64; 2], [bias, most_bias]: [f64; 2]) -> f64 {
+pub(crate) fn bound_of_both([noise, most_noise]: [f64; 2], [bias, most_bias]: [f64; 2]) -> f64 {
     if most_noise.is_infinite() || most_bias.is_infinite() {
         return f64::INFINITY;
     }

@@ -11,7 +11,7 @@
 
 /// Of a film's squared error, and of what the rounds tell of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct DegreesOfFreedom {
+pub(crate) struct DegreesOfFreedom {
     pub error: f64,
     pub estimate: f64,
 }
@@ -23,13 +23,13 @@ const SURE: f64 = 1.645;
 
 impl DegreesOfFreedom {
     /// All errors go together, as far as anybody knows.
-    pub fn least(rounds: u32) -> DegreesOfFreedom {
+    pub(crate) fn least(rounds: u32) -> DegreesOfFreedom {
         DegreesOfFreedom { error: 1.0, estimate: (f64::from(rounds) - 1.0).max(1.0) }
     }
 
     /// Of so many rounds, of which `latest` has what some left at some places, `size` numbers each. `alone` is [`concentration`] of all
     /// places' variances.
-    pub fn of(latest: &[Vec<f64>], size: usize, rounds: u32, alone: f64) -> DegreesOfFreedom {
+    pub(crate) fn of(latest: &[Vec<f64>], size: usize, rounds: u32, alone: f64) -> DegreesOfFreedom {
         let least = DegreesOfFreedom::least(rounds);
         let kept = latest.len() as f64;
         if latest.len() < 4 || !alone.is_finite() {
@@ -79,7 +79,7 @@ impl DegreesOfFreedom {
 }
 
 /// Of variances of places that have nothing in common: one over how many equal ones would do the same.
-pub fn concentration(variances: impl Iterator<Item = f64>) -> f64 {
+pub(crate) fn concentration(variances: impl Iterator<Item = f64>) -> f64 {
     let (sum, squares) = variances.fold((0.0, 0.0), |(sum, squares), variance| (sum + variance, squares + variance * variance));
     squares / (sum * sum)
 }

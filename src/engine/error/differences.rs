@@ -12,17 +12,17 @@ use crate::plan::differences::row_length;
 /// Of a film in film units, as `glsl/film/differences.glsl` and `glsl/kernels/end_difference.comp` leave them: for each row three
 /// channels of each sum, then how many blocks it has. Two's complement. Empty where nobody measures.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Differences(pub Vec<u64>);
+pub(crate) struct Differences(pub Vec<u64>);
 
 impl Differences {
     /// Adds the blocks of another part of the same run.
-    pub fn merge(&mut self, other: &Differences) {
+    pub(crate) fn merge(&mut self, other: &Differences) {
         self.0.iter_mut().zip(&other.0).for_each(|(sum, others)| *sum = sum.wrapping_add(*others));
     }
 
     /// The bias of a film of so many places; `relative` is what a difference of one unit in one value adds to the root of the square of
     /// the relative error.
-    pub fn bias(&self, places: usize, relative: f64, confidence: f64) -> Bias {
+    pub(crate) fn bias(&self, places: usize, relative: f64, confidence: f64) -> Bias {
         let rows: Vec<(f64, Vec<f64>)> = self
             .0
             .chunks_exact(row_length(places))

@@ -3,11 +3,11 @@
 use crate::settings::stop::Measure;
 
 /// Of the mean, what [`Measure::RelMse`] adds to each value: a value far below the mean counts like one of a hundredth of it.
-pub const REL_MSE_EPSILON: f64 = 0.01;
+pub(crate) const REL_MSE_EPSILON: f64 = 0.01;
 
 /// What an error of a value adds, in a result of so many values with this mean.
 #[derive(Debug, Clone, Copy)]
-pub struct ErrorMeasure {
+pub(crate) struct ErrorMeasure {
     measure: Measure,
     values: f64,
     mean: f64,
@@ -15,13 +15,13 @@ pub struct ErrorMeasure {
 
 impl ErrorMeasure {
     /// Of values whose sum is known; `values` is how many there are, a share of one where a pixel shows little of them.
-    pub fn new(measure: Measure, values: f64, sum: f64) -> ErrorMeasure {
+    pub(crate) fn new(measure: Measure, values: f64, sum: f64) -> ErrorMeasure {
         let values = values.max(f64::MIN_POSITIVE);
         ErrorMeasure { measure, values, mean: sum / values }
     }
 
     /// The root of what an absolute error adds to the square of the relative one, at a value; infinite where all is black.
-    pub fn relative(&self, error: f64, value: f64) -> f64 {
+    pub(crate) fn relative(&self, error: f64, value: f64) -> f64 {
         if error == 0.0 {
             return 0.0;
         }
@@ -33,7 +33,7 @@ impl ErrorMeasure {
     }
 
     /// The same of an error that may be of any value: that of the mean.
-    pub fn relative_to_mean(&self, error: f64) -> f64 {
+    pub(crate) fn relative_to_mean(&self, error: f64) -> f64 {
         self.relative(error, self.mean)
     }
 }

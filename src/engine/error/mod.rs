@@ -2,9 +2,9 @@
 //! the bound of both.
 
 pub mod bias;
-pub mod bias_batches;
+pub(crate) mod bias_batches;
 pub mod bound;
-pub mod degrees_of_freedom;
-pub mod differences;
-pub mod measure;
-pub mod unknown;
+pub(crate) mod degrees_of_freedom;
+pub(crate) mod differences;
+pub(crate) mod measure;
+pub(crate) mod unknown;

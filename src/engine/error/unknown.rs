@@ -11,13 +11,13 @@ use crate::constants::DIM_PHOTONS;
 use crate::text::counted;
 
 /// Hits that a run may expect at most, with this confidence, where it had none.
-pub fn most_hits(confidence: f64) -> f64 {
+pub(crate) fn most_hits(confidence: f64) -> f64 {
     -(1.0 - confidence).ln()
 }
 
 /// What nothing has reached, of pixels, texels or probes.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct Unknown {
+pub(crate) struct Unknown {
     /// Points that asked for light.
     pub asked: u64,
     /// Those that nothing has reached: their error is not known, but an upper bound of their light is.
@@ -42,7 +42,7 @@ pub struct Unknown {
 
 /// Points whose error is unknown, as they lie on no surface.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct OffSurfaces {
+pub(crate) struct OffSurfaces {
     pub points: u64,
     /// All points there are.
     pub of: u64,
@@ -57,7 +57,7 @@ impl OffSurfaces {
     pub(crate) const NAMED: usize = 8;
 
     /// Whether no error is known of any point.
-    pub fn is_all(&self) -> bool {
+    pub(crate) fn is_all(&self) -> bool {
         self.points > 0 && self.points == self.of
     }
 
@@ -76,7 +76,7 @@ impl OffSurfaces {
 
 /// Light that may be missing at some points, or not exist. No error counts it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct Uncounted {
+pub(crate) struct Uncounted {
     pub points: u64,
     /// The most light that it may add to one of these, in the result's unit.
     pub upper_bound: f64,
@@ -98,7 +98,7 @@ impl Unknown {
     }
 
     /// A line each for points and kinds of light; `unit` is the result's.
-    pub fn text(&self, point: &str, unit: &str, confidence: f64, rounds: u32) -> String {
+    pub(crate) fn text(&self, point: &str, unit: &str, confidence: f64, rounds: u32) -> String {
         let Unknown { asked, unreached, upper_bound, relative, absent, hidden, unseen, dim, off_surfaces } = self;
         let sure = 100.0 * confidence;
         let mut text = String::new();

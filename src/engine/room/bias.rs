@@ -13,7 +13,7 @@ use crate::settings::{MIN_RADIUS, ROOM_BELOW, RoomSettings};
 
 /// The bias of irradiance with so many rounds a batch, on a device or, without one, on the CPU; `None` if it was
 /// cancelled. A radius as small as is allowed is taken for a larger one that leaves room below it.
-pub fn measure_bias(
+pub(crate) fn measure_bias(
     gpu: Option<&Gpu>,
     scene: &RoomScene,
     settings: &RoomSettings,

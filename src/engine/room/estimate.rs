@@ -1,6 +1,6 @@
 //! Density estimates of the paper's box: adds to the film what each point receives from a chunk's photons, and ends a round.
 
-pub mod tree;
+pub(crate) mod tree;
 
 use crate::constants::{GATHER_SLICE, MAX_GROUPS};
 use crate::engine::room::Chunk;
@@ -14,7 +14,7 @@ use crate::records::{DispatchSizePush, EndRoundPush, GatherPush};
 use crate::settings::Sums;
 
 /// Refuses sums that a device cannot make.
-pub fn check_sums(plan: &RoomPlan, facts: &DeviceFacts) -> Result<()> {
+pub(crate) fn check_sums(plan: &RoomPlan, facts: &DeviceFacts) -> Result<()> {
     let can_add = plan.settings.sums != Sums::Compensated || facts.int64_atomics;
     let why = format!("needs 64-bit atomics, which {} lacks; use `sums` integer or f32", facts.name);
     require(can_add, "sums", "compensated", why)
@@ -30,7 +30,7 @@ fn adds_in_one_word(plan: &RoomPlan, facts: &DeviceFacts) -> bool {
 }
 
 /// Kernels that the estimate needs.
-pub fn modules(plan: &RoomPlan, facts: &DeviceFacts) -> Vec<Module> {
+pub(crate) fn modules(plan: &RoomPlan, facts: &DeviceFacts) -> Vec<Module> {
     let mut modules = match (plan.gathers_by_tree(), plan.gathers_by_grid(), adds_in_one_word(plan, facts)) {
         (true, ..) => tree::modules(plan, facts),
         (_, false, true) => vec![GatherBruteU64::MODULE],
@@ -87,7 +87,7 @@ fn in_pieces(
 }
 
 /// Adds a chunk to the film.
-pub fn gather(commands: &mut Commands, chunk: Chunk) -> Result<()> {
+pub(crate) fn gather(commands: &mut Commands, chunk: Chunk) -> Result<()> {
     commands.scope("gather", |commands| match (&chunk.resources.tree, &chunk.resources.index) {
         (Some(tree), _) => tree::gather(commands, chunk, tree),
         (None, Some(index)) => gather_grid(commands, chunk, index),
@@ -147,7 +147,7 @@ fn gather_grid(commands: &mut Commands, chunk: Chunk, index: &IndexBuffers) -> R
 }
 
 /// Moves what a round left on the film to the sums and squares of all rounds, of which there are several.
-pub fn end_round(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan, round: u32) -> Result<()> {
+pub(crate) fn end_round(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan, round: u32) -> Result<()> {
     let RoomResources { film, rounds: Some(RoundBuffers { film_totals, low_squares, high_squares, latest_blocks }), .. } = resources else {
         return Ok(());
     };

@@ -16,7 +16,7 @@ use crate::settings::stop::{LEAST_BLOCKS, Measure, Stop};
 
 /// Sums of a run, point by point, and what they are worth.
 #[derive(Debug, Clone, PartialEq)]
-pub struct RoomFilm {
+pub(crate) struct RoomFilm {
     /// `channel_count` sums a point, in fixed-point units: relative flux, then the paper's illumination
     /// power (photons within the radius times their Phong weight). With one channel the two are the same. With
     /// `--nearest` it is what the disc of the radius would hold at the density of the nearest photons. A block is a round. No squares
@@ -50,7 +50,7 @@ impl DerefMut for RoomFilm {
 
 impl RoomFilm {
     /// Of no photon.
-    pub fn new(plan: &RoomPlan) -> RoomFilm {
+    pub(crate) fn new(plan: &RoomPlan) -> RoomFilm {
         let count = plan.points.len() * plan.channel_count as usize;
         let squares = if plan.keeps_squares() { vec![0; count] } else { Vec::new() };
         RoomFilm {
@@ -66,7 +66,7 @@ impl RoomFilm {
 
     /// Adds what a whole round left, and empties it for the next. Twin of `glsl/kernels/end_round.comp`. Sums of floats
     /// go on over all rounds instead, as their additions are what is looked at.
-    pub fn end_round(&mut self, number: u32, of_round: &mut [u64]) {
+    pub(crate) fn end_round(&mut self, number: u32, of_round: &mut [u64]) {
         if self.kind != Sums::Integer {
             self.rounds += 1;
             self.blocks += 1;
@@ -84,7 +84,7 @@ impl RoomFilm {
     }
 
     /// Adds the rounds of another part of the same run.
-    pub fn merge(&mut self, other: &RoomFilm) -> Result<(), TooLarge> {
+    pub(crate) fn merge(&mut self, other: &RoomFilm) -> Result<(), TooLarge> {
         self.of_blocks.merge(&other.of_blocks)?;
         self.latest.merge(&other.latest);
         self.emitted = self.emitted.checked_add(other.emitted).ok_or(TooLarge)?;
@@ -92,7 +92,7 @@ impl RoomFilm {
     }
 
     /// Standard error of [`RoomFilm::flux`], from the variance between rounds; infinite where fewer than two are whole.
-    pub fn flux_error(&self, point: usize) -> f64 {
+    pub(crate) fn flux_error(&self, point: usize) -> f64 {
         let place = point * self.channel_count as usize;
         self.variance(place).sqrt() / self.scale
     }
@@ -104,14 +104,14 @@ impl RoomFilm {
     }
 
     /// Relative error of irradiance, as the measure adds it up. `weights` are [`irradiance_weights`].
-    pub fn relative_error(&self, weights: &[f64], measure: Measure) -> f64 {
+    pub(crate) fn relative_error(&self, weights: &[f64], measure: Measure) -> f64 {
         let measure = self.measure(weights, measure);
         let of_point = |(point, weight): (usize, &f64)| measure.relative(weight * self.flux_error(point), weight * self.flux(point));
         weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0).map(|point| of_point(point).powi(2)).sum::<f64>().sqrt()
     }
 
     /// What it tells of its error; `unit` makes W/m2 of flux times weight.
-    pub fn error(&self, weights: &[f64], unit: f64, stop: &Stop) -> FilmError {
+    pub(crate) fn error(&self, weights: &[f64], unit: f64, stop: &Stop) -> FilmError {
         let measure = self.measure(weights, stop.measure);
         let weighted = |point: usize, values: &[f32]| {
             let weight = weights[point];
@@ -135,7 +135,7 @@ impl RoomFilm {
 
     /// Points of walls that reflect, but where no photon was stored: what is known of them is a bound. Of relative flux, a
     /// photon has 1 at most; `unit` makes W/m2 of flux times weight.
-    pub fn unknown(&self, weights: &[f64], unit: f64, stop: &Stop) -> Unknown {
+    pub(crate) fn unknown(&self, weights: &[f64], unit: f64, stop: &Stop) -> Unknown {
         let measure = self.measure(weights, stop.measure);
         let mut unknown = Unknown { asked: weights.iter().filter(|weight| **weight > 0.0).count() as u64, ..Unknown::default() };
         let mut bounds = 0.0;
@@ -156,16 +156,16 @@ impl RoomFilm {
     }
 
     /// Whether no photon was found at a point.
-    pub fn is_unreached(&self, point: usize) -> bool {
+    pub(crate) fn is_unreached(&self, point: usize) -> bool {
         self.units(point * self.channel_count as usize) == 0.0
     }
 
-    pub fn point_count(&self) -> usize {
+    pub(crate) fn point_count(&self) -> usize {
         self.sums.len() / self.channel_count as usize
     }
 
     /// A sum in fixed-point units.
-    pub fn units(&self, sum: usize) -> f64 {
+    pub(crate) fn units(&self, sum: usize) -> f64 {
         let bits = self.sums[sum];
         let float = |word: u64| f64::from(f32::from_bits(word as u32));
         match self.kind {
@@ -176,12 +176,12 @@ impl RoomFilm {
     }
 
     /// Relative flux within the radius of a point.
-    pub fn flux(&self, point: usize) -> f64 {
+    pub(crate) fn flux(&self, point: usize) -> f64 {
         self.units(point * self.channel_count as usize) / self.scale
     }
 
     /// The paper's photon power within the radius of a point.
-    pub fn power(&self, point: usize) -> f64 {
+    pub(crate) fn power(&self, point: usize) -> f64 {
         let last = self.channel_count as usize - 1;
         self.units(point * self.channel_count as usize + last) / self.scale
     }
@@ -189,7 +189,7 @@ impl RoomFilm {
 
 /// One wall of the result: its texels row by row, column i along u, row j along v.
 #[derive(Debug, Clone, PartialEq)]
-pub struct WallEstimate {
+pub(crate) struct WallEstimate {
     pub name: &'static str,
     pub face: usize,
     /// Photon power over full light, not clamped: the paper shows 1 and more as full.
@@ -224,7 +224,7 @@ fn areas(scene: &RoomScene, plan: &RoomPlan) -> Vec<f64> {
 
 /// What a unit of flux at each point is worth in irradiance, but for what all points share; 0 where a wall reflects
 /// nothing, and its photons are not stored.
-pub fn irradiance_weights(scene: &RoomScene, plan: &RoomPlan) -> Vec<f64> {
+pub(crate) fn irradiance_weights(scene: &RoomScene, plan: &RoomPlan) -> Vec<f64> {
     let albedo = |point: usize| scene.faces[plan.points[point].wall as usize].as_ref().map_or(0.0, |wall| f64::from(wall.albedo));
     let weight = |(point, area): (usize, f64)| if albedo(point) > 0.0 { 1.0 / (area * albedo(point)) } else { 0.0 };
     areas(scene, plan).into_iter().enumerate().map(weight).collect()
@@ -235,7 +235,7 @@ pub fn irradiance_weights(scene: &RoomScene, plan: &RoomPlan) -> Vec<f64> {
 /// The radiosity of a point is the flux of the photons stored within the radius over the area in
 /// which they were looked for: with edge correction the part of the disc that lies on the wall,
 /// without it the whole disc, which is dark along edges.
-pub fn estimate_walls(film: &RoomFilm, scene: &RoomScene, plan: &RoomPlan) -> Vec<WallEstimate> {
+pub(crate) fn estimate_walls(film: &RoomFilm, scene: &RoomScene, plan: &RoomPlan) -> Vec<WallEstimate> {
     let settings = &plan.settings;
     let mesh = settings.mesh as usize;
     // A film without photons is dark, not undefined.

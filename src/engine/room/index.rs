@@ -1,6 +1,6 @@
 //! The index of a chunk's photons: counted by grid cell, prefix sums, sorted into cell order; or a kd-tree ([`tree`]).
 
-pub mod tree;
+pub(crate) mod tree;
 
 use crate::engine::prefix_sum::scan;
 use crate::engine::room::Chunk;
@@ -12,7 +12,7 @@ use crate::plan::RoomPlan;
 use crate::records::DispatchSizePush;
 
 /// Kernels that the index needs.
-pub fn modules(plan: &RoomPlan) -> Vec<Module> {
+pub(crate) fn modules(plan: &RoomPlan) -> Vec<Module> {
     if plan.gathers_by_tree() {
         return tree::modules();
     }
@@ -25,7 +25,7 @@ pub fn modules(plan: &RoomPlan) -> Vec<Module> {
 /// Sorts the photon map into cell order, or into the leaves of a kd-tree.
 ///
 /// Does nothing where the plan has no index.
-pub fn build(commands: &mut Commands, chunk: Chunk) -> Result<()> {
+pub(crate) fn build(commands: &mut Commands, chunk: Chunk) -> Result<()> {
     let Chunk { resources, plan, .. } = chunk;
     if let Some(buffers) = &resources.tree {
         return commands.scope("index", |commands| tree::build(commands, chunk, buffers));
@@ -51,7 +51,7 @@ pub fn build(commands: &mut Commands, chunk: Chunk) -> Result<()> {
 }
 
 /// Counts work, and hands the commands over once they amount to a submission.
-pub fn add_work(commands: &mut Commands, plan: &RoomPlan, pair_tests: u64) -> Result<()> {
+pub(crate) fn add_work(commands: &mut Commands, plan: &RoomPlan, pair_tests: u64) -> Result<()> {
     commands.add_work(pair_tests);
     if commands.is_due(plan.pair_tests_per_submission) { commands.submit() } else { Ok(()) }
 }

@@ -20,7 +20,7 @@ use crate::scene::Camera;
 use crate::scene::room::RoomScene;
 use crate::settings::RoomSettings;
 
-pub struct LiveRoom<'a> {
+pub(crate) struct LiveRoom<'a> {
     pub run: Run<'a, RoomOnGpu<'a>>,
     scene: &'a RoomScene,
     plan: &'a RoomPlan,
@@ -29,13 +29,13 @@ pub struct LiveRoom<'a> {
 
 impl<'a> LiveRoom<'a> {
     /// The plan of a run that is shown, which has several rounds.
-    pub fn plan(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings) -> Result<RoomPlan> {
+    pub(crate) fn plan(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings) -> Result<RoomPlan> {
         let plan = RoomPlan { is_kept: true, ..RoomPlan::new(scene, settings, &engine::limits(gpu.facts()))? };
         estimate::check_sums(&plan, gpu.facts())?;
         Ok(plan)
     }
 
-    pub fn new(gpu: &'a Gpu, scene: &'a RoomScene, plan: &'a RoomPlan, cancelled: &'a AtomicBool) -> Result<LiveRoom<'a>> {
+    pub(crate) fn new(gpu: &'a Gpu, scene: &'a RoomScene, plan: &'a RoomPlan, cancelled: &'a AtomicBool) -> Result<LiveRoom<'a>> {
         let modules = [modules(plan, gpu), vec![ShowRoom::MODULE, Display::MODULE]].concat();
         let mut commands = run::commands(gpu, &modules, constants(plan), plan.settings.math, Instant::now())?;
         let resources = commands.scope("set-up", |commands| RoomResources::new(commands, scene, plan))?;
@@ -46,12 +46,12 @@ impl<'a> LiveRoom<'a> {
     }
 
     /// One more round, unless all have been.
-    pub fn round(&mut self) -> Result<()> {
+    pub(crate) fn round(&mut self) -> Result<()> {
         self.run.round_to_look_at(self.cancelled)
     }
 
     /// The error over the mean, as far as it is known, and the mean of the illumination.
-    pub fn look(&mut self) -> Result<(f64, f64)> {
+    pub(crate) fn look(&mut self) -> Result<(f64, f64)> {
         let (film, error) = self.run.look()?;
         let walls = estimate_walls(&film, self.scene, self.plan);
         let values: Vec<f64> = walls.iter().flat_map(|wall| wall.illumination.iter().copied()).collect();
@@ -59,7 +59,7 @@ impl<'a> LiveRoom<'a> {
     }
 
     /// Records what a camera sees of the walls.
-    pub fn show(&mut self, shows: u32, mean: f64, camera: &Camera, [width, height]: [u32; 2], shown: &Buffer<Vec4>) -> Result<()> {
+    pub(crate) fn show(&mut self, shows: u32, mean: f64, camera: &Camera, [width, height]: [u32; 2], shown: &Buffer<Vec4>) -> Result<()> {
         let Run { world, recorder, state } = &mut self.run;
         let RoomResources { room, rounds, .. } = &world.resources;
         let RoundBuffers { film_totals, low_squares, high_squares, .. } = rounds.as_ref().expect("a plan that is kept has them");

@@ -2,22 +2,22 @@
 //! [`on_cpu`] with their twins.
 
 mod bias;
-pub mod estimate;
-pub mod film;
-pub mod index;
-pub mod live;
+pub(crate) mod estimate;
+pub(crate) mod film;
+pub(crate) mod index;
+pub(crate) mod live;
 mod on_cpu;
 pub(super) mod on_gpu;
 mod replay;
-pub mod resources;
-pub mod trace;
+pub(crate) mod resources;
+pub(crate) mod trace;
 
 use std::cell::OnceCell;
 
-pub use bias::measure_bias;
-pub use on_cpu::on_cpu;
-pub use on_gpu::{constants, on_gpu};
-pub use replay::{photons_on_cpu, photons_on_gpu, replay};
+pub(crate) use bias::measure_bias;
+pub(crate) use on_cpu::on_cpu;
+pub(crate) use on_gpu::{constants, on_gpu};
+pub(crate) use replay::{photons_on_cpu, photons_on_gpu, replay};
 
 use crate::engine::Control;
 use crate::engine::room::film::{RoomFilm, irradiance_weights};
@@ -35,10 +35,10 @@ use crate::scene::room::RoomScene;
 use crate::settings::{Builder, RoomSettings, Sums};
 
 /// What a run leaves behind.
-pub type RunResult = run::RunResult<RoomPlan, RoomFilm>;
+pub(crate) type RunResult = run::RunResult<RoomPlan, RoomFilm>;
 
 /// Runs on a device or, without one and by the CPU builder, on the CPU.
-pub fn run(gpu: Option<&Gpu>, scene: &RoomScene, settings: &RoomSettings, control: &mut Control) -> Result<RunResult> {
+pub(crate) fn run(gpu: Option<&Gpu>, scene: &RoomScene, settings: &RoomSettings, control: &mut Control) -> Result<RunResult> {
     match gpu.filter(|_| settings.builder != Builder::Cpu) {
         Some(gpu) => on_gpu(gpu, scene, settings, control),
         None => on_cpu(scene, settings, control),
@@ -47,7 +47,7 @@ pub fn run(gpu: Option<&Gpu>, scene: &RoomScene, settings: &RoomSettings, contro
 
 /// Photons that are traced together: what the stages of their way to the film share.
 #[derive(Clone, Copy)]
-pub struct Chunk<'a> {
+pub(crate) struct Chunk<'a> {
     pub resources: &'a RoomResources,
     pub plan: &'a RoomPlan,
     pub photon_count: u32,
@@ -55,14 +55,14 @@ pub struct Chunk<'a> {
 
 impl Chunk<'_> {
     /// Entries of the photon map that it uses: all slots, or as many as there is room for.
-    pub fn photon_list_capacity(self) -> u32 {
+    pub(crate) fn photon_list_capacity(self) -> u32 {
         let Chunk { plan, photon_count, .. } = self;
         if plan.has_slots() { (photon_count * plan.settings.bounces).min(plan.photon_capacity) } else { plan.photon_capacity }
     }
 }
 
 /// What a run of a plan is to do.
-pub fn task<'a>(scene: &'a RoomScene, plan: &'a RoomPlan) -> Task<'a, RoomFilm> {
+pub(crate) fn task<'a>(scene: &'a RoomScene, plan: &'a RoomPlan) -> Task<'a, RoomFilm> {
     let weights = OnceCell::new();
     Task {
         identity: None,

@@ -40,7 +40,7 @@ struct RoomOnCpu<'a> {
 }
 
 /// Runs on the CPU, on `settings.threads` threads.
-pub fn on_cpu(scene: &RoomScene, settings: &RoomSettings, control: &mut Control) -> Result<RunResult> {
+pub(crate) fn on_cpu(scene: &RoomScene, settings: &RoomSettings, control: &mut Control) -> Result<RunResult> {
     let clock = HostClock::start("run");
     let plan = &RoomPlan { is_kept: control.keep.is_used(), ..plan(scene, settings)? };
     let identity = super::identity(&mut control.keep, scene, plan, None)?;

@@ -22,13 +22,13 @@ use crate::plan::{RoomPlan, photons_of};
 use crate::scene::room::RoomScene;
 use crate::settings::RoomSettings;
 
-pub struct RoomOnGpu<'a> {
+pub(crate) struct RoomOnGpu<'a> {
     pub(super) plan: &'a RoomPlan,
     pub(super) resources: RoomResources,
 }
 
 /// Runs on the GPU.
-pub fn on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings, control: &mut Control) -> Result<RunResult> {
+pub(crate) fn on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings, control: &mut Control) -> Result<RunResult> {
     let started = Instant::now();
     let plan = RoomPlan { is_kept: control.keep.is_used(), ..RoomPlan::new(scene, settings, &engine::limits(gpu.facts()))? };
     let identity = super::identity(&mut control.keep, scene, &plan, Some(gpu.facts()))?;
@@ -132,7 +132,7 @@ fn restore(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan, 
 }
 
 /// Specialization constants of a plan.
-pub fn constants(plan: &RoomPlan) -> Constants {
+pub(crate) fn constants(plan: &RoomPlan) -> Constants {
     let settings = &plan.settings;
     Constants::new(settings.group_size)
         .set("RNG", settings.rng as u32)

@@ -24,7 +24,7 @@ use crate::settings::RoomSettings;
 use crate::text::counted;
 
 /// One photon of a run, on a device or, without one, on the CPU.
-pub fn replay(gpu: Option<&Gpu>, scene: &RoomScene, settings: &RoomSettings, name: PhotonName) -> Result<Replayed<Path, Photon>> {
+pub(crate) fn replay(gpu: Option<&Gpu>, scene: &RoomScene, settings: &RoomSettings, name: PhotonName) -> Result<Replayed<Path, Photon>> {
     if name.caustic {
         return Err(name.refused("must be ROUND:PHOTON here: the paper's box has no caustic map"));
     }
@@ -67,7 +67,7 @@ fn replay_on_cpu(scene: &RoomScene, settings: &RoomSettings, name: PhotonName) -
 }
 
 /// The photon map of round 0, for comparing builders.
-pub fn photons_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings) -> Result<Vec<Photon>> {
+pub(crate) fn photons_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings) -> Result<Vec<Photon>> {
     let plan = RoomPlan { keeps_origins: true, ..RoomPlan::new(scene, settings, &engine::limits(gpu.facts()))? };
     let mut commands = Commands::new(gpu, constants(&plan), Instant::now())?;
     let resources = RoomResources::new(&mut commands, scene, &plan)?;
@@ -80,7 +80,7 @@ pub fn photons_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings) -> 
 }
 
 /// The same by the CPU builder.
-pub fn photons_on_cpu(scene: &RoomScene, settings: &RoomSettings) -> Result<Vec<Photon>> {
+pub(crate) fn photons_on_cpu(scene: &RoomScene, settings: &RoomSettings) -> Result<Vec<Photon>> {
     let plan = on_cpu::plan(scene, settings)?;
     let pool = on_cpu::thread_pool(settings)?;
     let tracer = Tracer::new(scene, &plan);
@@ -113,7 +113,7 @@ fn stored(
 
 impl Replayed<Path, Photon> {
     /// A line per place where it is stored: position and weight at the eye.
-    pub fn table(&self, scene: &RoomScene, seed: u64) -> String {
+    pub(crate) fn table(&self, scene: &RoomScene, seed: u64) -> String {
         let name_of = |wall: u32| scene.faces[wall as usize].as_ref().map_or("opening", |wall| wall.name);
         let PhotonName { round, photon, .. } = self.name;
         let (start, p, d) = (name_of(self.start.wall), self.start.position, self.start.direction);

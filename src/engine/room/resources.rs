@@ -14,7 +14,7 @@ use crate::scene::room::RoomScene;
 use crate::settings::Builder;
 
 buffers! {
-    pub struct RoomResources(planned: &Planned, commands: &mut Commands, scene: &RoomScene, plan: &RoomPlan) {
+    pub(crate) struct RoomResources(planned: &Planned, commands: &mut Commands, scene: &RoomScene, plan: &RoomPlan) {
         /// Written once.
         room: kernels::Room = kernels::Room {
             rooms: planned.filled(commands, room::ROOMS, &[scene.room_record()])?,
@@ -54,14 +54,14 @@ buffers! {
 
 impl RoomResources {
     /// Makes the buffers and records the upload of what never changes.
-    pub fn new(commands: &mut Commands, scene: &RoomScene, plan: &RoomPlan) -> Result<RoomResources> {
+    pub(crate) fn new(commands: &mut Commands, scene: &RoomScene, plan: &RoomPlan) -> Result<RoomResources> {
         RoomResources::made(&Planned { gpu: commands.gpu(), buffers: plan.buffers() }, commands, scene, plan)
     }
 }
 
 buffers! {
     /// Survivors of a bounce, for prefix sums over them.
-    pub struct OrderBuffers(planned: &Planned) {
+    pub(crate) struct OrderBuffers(planned: &Planned) {
         /// Survivors in each work group of paths, then their prefix sums, and the sum of all behind them.
         survivors: Buffer<u32> = planned.one(room::SURVIVORS)?,
         sums_of_survivors: Vec<Buffer<u32>> = planned.all(room::SUMS_OF_SURVIVORS)?,
@@ -72,7 +72,7 @@ buffers! {
 
 buffers! {
     /// The rounds that have ended, sum by sum of the film.
-    pub struct RoundBuffers(planned: &Planned, commands: &mut Commands) {
+    pub(crate) struct RoundBuffers(planned: &Planned, commands: &mut Commands) {
         film_totals: Buffer<u64> = planned.zeroed(commands, room::FILM_TOTALS)?,
         /// Lower and upper 64 bits of the sums of squares.
         low_squares: Buffer<u64> = planned.zeroed(commands, room::LOW_SQUARES)?,
@@ -82,7 +82,7 @@ buffers! {
 }
 
 buffers! {
-    pub struct IndexBuffers(planned: &Planned) {
+    pub(crate) struct IndexBuffers(planned: &Planned) {
         /// Photons in each cell; after their prefix sums the first photon of each, and behind the last the number of all.
         cells: Buffer<u32> = planned.one(room::CELLS)?,
         /// Place of each entry of the photon map among those of its cell.
@@ -97,7 +97,7 @@ buffers! {
 
 buffers! {
     /// The kd-tree of `glsl/index/tree.glsl`, and what it is built with.
-    pub struct TreeBuffers(planned: &Planned, plan: &RoomPlan) {
+    pub(crate) struct TreeBuffers(planned: &Planned, plan: &RoomPlan) {
         /// (order key, entry of the photon map) in the order along the walls' first axis and along their second, and one
         /// to write into, in changing roles.
         tree_lists: [Buffer<UVec2>; 3] = planned.several(room::TREE_LISTS)?,
@@ -124,7 +124,7 @@ buffers! {
 }
 
 buffers! {
-    pub struct SearchBuffers(planned: &Planned) {
+    pub(crate) struct SearchBuffers(planned: &Planned) {
         /// Nearest photons of each point that is searched for.
         nearest_photons: Buffer<UVec2> = planned.one(room::NEAREST_PHOTONS)?,
         /// As many as go on at once.

@@ -18,7 +18,7 @@ use crate::settings::Builder;
 use crate::timings::Handled;
 
 /// Kernels that tracing needs.
-pub fn modules(plan: &RoomPlan) -> Vec<Module> {
+pub(crate) fn modules(plan: &RoomPlan) -> Vec<Module> {
     match plan.settings.builder {
         Builder::Naive => vec![EmitRoom::MODULE, TraceRoomNaive::MODULE],
         Builder::Atomic if plan.counters > 1 => vec![EmitRoom::MODULE, TraceRoomAtomic::MODULE, FillGaps::MODULE, EndBounce::MODULE],
@@ -34,7 +34,13 @@ pub fn modules(plan: &RoomPlan) -> Vec<Module> {
 }
 
 /// Traces the photons of a chunk into the photon map and adds their fates to the tallies.
-pub fn chunk(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan, round: u32, ranges: &[EmissionRange]) -> Result<()> {
+pub(crate) fn chunk(
+    commands: &mut Commands,
+    resources: &RoomResources,
+    plan: &RoomPlan,
+    round: u32,
+    ranges: &[EmissionRange],
+) -> Result<()> {
     let photon_count = photons_of(ranges);
     let chunk = Chunk { resources, plan, photon_count };
     commands.scope("build", |commands| {
@@ -58,7 +64,13 @@ pub fn chunk(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan
 }
 
 /// Writes the paths of a chunk as they leave their lights, light after light.
-pub fn emit(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan, round: u32, ranges: &[EmissionRange]) -> Result<()> {
+pub(crate) fn emit(
+    commands: &mut Commands,
+    resources: &RoomResources,
+    plan: &RoomPlan,
+    round: u32,
+    ranges: &[EmissionRange],
+) -> Result<()> {
     let RoomResources { room, stream_seeds, paths: [paths, _], nonfinite_values, .. } = resources;
     let mut path_offset = 0;
     for range in ranges {
@@ -112,7 +124,7 @@ fn trace_persistent(commands: &mut Commands, Chunk { resources, plan, .. }: Chun
 const TIMESTAMP_RESERVE: u32 = 64;
 
 /// Timestamps after which a chunk need not submit on its own account.
-pub fn timestamps_per_chunk(plan: &RoomPlan) -> u32 {
+pub(crate) fn timestamps_per_chunk(plan: &RoomPlan) -> u32 {
     (6 * plan.settings.bounces + TIMESTAMP_RESERVE).min(4 * TIMESTAMP_RESERVE)
 }
 

@@ -7,11 +7,11 @@ use serde::{Deserialize, Serialize};
 
 /// Numbers of blocks, as ranges in order that do not touch.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Blocks(Vec<Range<u32>>);
+pub(crate) struct Blocks(Vec<Range<u32>>);
 
 /// Every so many-th block of a run, from block `number` on: all of them, where nothing is shared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Share {
+pub(crate) struct Share {
     pub number: u32,
     pub of: u32,
 }
@@ -24,18 +24,18 @@ impl Default for Share {
 
 impl Share {
     /// How many of the blocks below `end` it has.
-    pub fn count(self, end: u32) -> u32 {
+    pub(crate) fn count(self, end: u32) -> u32 {
         end.saturating_sub(self.number).div_ceil(self.of)
     }
 
     /// Its first block from `from` on that is not done and lies below `end`.
-    pub fn next(self, from: u32, done: &Blocks, end: u32) -> Option<u32> {
+    pub(crate) fn next(self, from: u32, done: &Blocks, end: u32) -> Option<u32> {
         let first = self.number + from.saturating_sub(self.number).next_multiple_of(self.of);
         (first..end).step_by(self.of as usize).find(|block| !done.contains(*block))
     }
 
     /// Those below `end` that are not done.
-    pub fn missing(self, done: &Blocks, end: u32) -> u32 {
+    pub(crate) fn missing(self, done: &Blocks, end: u32) -> u32 {
         (self.number..end).step_by(self.of as usize).filter(|block| !done.contains(*block)).count() as u32
     }
 }
@@ -48,34 +48,34 @@ impl std::fmt::Display for Share {
 }
 
 impl Blocks {
-    pub fn count(&self) -> u32 {
+    pub(crate) fn count(&self) -> u32 {
         self.0.iter().map(|range| range.end - range.start).sum()
     }
 
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    pub fn contains(&self, block: u32) -> bool {
+    pub(crate) fn contains(&self, block: u32) -> bool {
         let place = self.0.partition_point(|range| range.end <= block);
         self.0.get(place).is_some_and(|range| range.contains(&block))
     }
 
-    pub fn ranges(&self) -> impl Iterator<Item = Range<u32>> {
+    pub(crate) fn ranges(&self) -> impl Iterator<Item = Range<u32>> {
         self.0.iter().cloned()
     }
 
-    pub fn iter(&self) -> impl Iterator<Item = u32> {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = u32> {
         self.ranges().flatten()
     }
 
     /// The one behind the last.
-    pub fn end(&self) -> u32 {
+    pub(crate) fn end(&self) -> u32 {
         self.0.last().map_or(0, |range| range.end)
     }
 
     /// Adds one that is not among them.
-    pub fn insert(&mut self, block: u32) {
+    pub(crate) fn insert(&mut self, block: u32) {
         assert!(!self.contains(block), "block {block} is done twice");
         let place = self.0.partition_point(|range| range.end < block);
         match self.0.get_mut(place) {
@@ -89,7 +89,7 @@ impl Blocks {
     }
 
     /// Adds others; fails with one that is among both.
-    pub fn merge(&mut self, others: &Blocks) -> Result<(), u32> {
+    pub(crate) fn merge(&mut self, others: &Blocks) -> Result<(), u32> {
         if let Some(block) = others.iter().find(|block| self.contains(*block)) {
             return Err(block);
         }
@@ -98,14 +98,14 @@ impl Blocks {
     }
 
     /// Whether they are what files may hold: ranges in order that do not touch.
-    pub fn is_valid(&self) -> bool {
+    pub(crate) fn is_valid(&self) -> bool {
         self.0.iter().all(|range| range.start < range.end) && self.0.windows(2).all(|pair| pair[0].end < pair[1].start)
     }
 }
 
 /// Deals the blocks of a run to several devices: the next one to whichever asks.
 #[derive(Debug)]
-pub struct Dealer(Mutex<Dealing>);
+pub(crate) struct Dealer(Mutex<Dealing>);
 
 #[derive(Debug)]
 struct Dealing {
@@ -120,7 +120,7 @@ struct Dealing {
 
 impl Dealer {
     /// `looks` come after so many of the blocks, in rising order.
-    pub fn new(blocks: Vec<u32>, devices: usize, looks: impl Iterator<Item = u32>) -> Dealer {
+    pub(crate) fn new(blocks: Vec<u32>, devices: usize, looks: impl Iterator<Item = u32>) -> Dealer {
         let count = blocks.len() as u32;
         Dealer(Mutex::new(Dealing {
             blocks,
@@ -136,7 +136,7 @@ impl Dealer {
     }
 
     /// A block for a device, and whether it must hand over before that what it has done.
-    pub fn next(&self, device: usize) -> Option<(u32, bool)> {
+    pub(crate) fn next(&self, device: usize) -> Option<(u32, bool)> {
         let mut dealing = self.lock();
         let Dealing { blocks, dealt, looks, behind, first } = &mut *dealing;
         let block = *blocks.get(*dealt as usize)?;
@@ -149,37 +149,37 @@ impl Dealer {
     }
 
     /// Looks that a device has come past.
-    pub fn looks_behind(&self, device: usize) -> usize {
+    pub(crate) fn looks_behind(&self, device: usize) -> usize {
         self.lock().behind[device]
     }
 
     /// Whether a device has no block before a look, and will have none.
-    pub fn has_none_before(&self, device: usize, look: usize) -> bool {
+    pub(crate) fn has_none_before(&self, device: usize, look: usize) -> bool {
         let dealing = self.lock();
         let Some(look) = dealing.looks.get(look).filter(|look| **look <= dealing.dealt) else { return false };
         dealing.first[device].is_none_or(|first| first >= *look)
     }
 
     /// Blocks that were dealt.
-    pub fn dealt(&self) -> u32 {
+    pub(crate) fn dealt(&self) -> u32 {
         self.lock().dealt
     }
 
     /// Looks before which all blocks are dealt.
-    pub fn looks_dealt(&self) -> usize {
+    pub(crate) fn looks_dealt(&self) -> usize {
         let dealing = self.lock();
         dealing.looks.partition_point(|look| *look <= dealing.dealt)
     }
 
     /// Has all devices hand over before the next block that each takes.
-    pub fn look_now(&self) {
+    pub(crate) fn look_now(&self) {
         let mut dealing = self.lock();
         let (dealt, place) = (dealing.dealt, dealing.looks.partition_point(|look| *look <= dealing.dealt));
         dealing.looks.insert(place, dealt);
     }
 
     /// Deals no more.
-    pub fn close(&self) {
+    pub(crate) fn close(&self) {
         let mut dealing = self.lock();
         let dealt = dealing.dealt as usize;
         dealing.blocks.truncate(dealt);

@@ -11,7 +11,7 @@ use crate::text::one_line;
 
 /// By default that of a run that nobody has to know again.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct Identity {
+pub(crate) struct Identity {
     /// What the scene is called; another name makes no other identity.
     pub scene: String,
     /// Hash of all that is lit, of the camera, or of the points that are asked about.
@@ -28,7 +28,7 @@ pub struct Identity {
 const WITHOUT_EFFECT: [&str; 9] = ["rounds", "stop", "keeps_parts", "builder", "chunk", "group_size", "paranoid", "counters", "threads"];
 
 /// Settings of either world that change bits of a block.
-pub fn settings_with_effect(settings: &impl Serialize) -> Map<String, Value> {
+pub(crate) fn settings_with_effect(settings: &impl Serialize) -> Map<String, Value> {
     let Ok(Value::Object(mut settings)) = serde_json::to_value(settings) else { unreachable!("settings are an object") };
     WITHOUT_EFFECT.iter().for_each(|name| drop(settings.remove(*name)));
     settings
@@ -36,7 +36,14 @@ pub fn settings_with_effect(settings: &impl Serialize) -> Map<String, Value> {
 
 impl Identity {
     /// `settings` are those of either world.
-    pub fn new(scene: &str, content: Hash, settings: &impl Serialize, plan: Hash, device: Option<&DeviceFacts>, math: Math) -> Identity {
+    pub(crate) fn new(
+        scene: &str,
+        content: Hash,
+        settings: &impl Serialize,
+        plan: Hash,
+        device: Option<&DeviceFacts>,
+        math: Math,
+    ) -> Identity {
         let settings = settings_with_effect(settings);
         let device = match (math, device) {
             (Math::Strict, _) => None,
@@ -47,7 +54,7 @@ impl Identity {
     }
 
     /// Why a file of `other` does not go with this, if it does not: what differs, and the remedy.
-    pub fn differs_from(&self, other: &Identity) -> Option<String> {
+    pub(crate) fn differs_from(&self, other: &Identity) -> Option<String> {
         let names = self.settings.keys().chain(other.settings.keys().filter(|name| !self.settings.contains_key(*name)));
         let value = |identity: &Identity, name: &str| match identity.settings.get(name) {
             None => "nothing".to_owned(),
@@ -75,20 +82,20 @@ impl Identity {
 
 /// Of what is compared as a whole.
 #[derive(Default)]
-pub struct Hash(Sha256);
+pub(crate) struct Hash(Sha256);
 
 impl Hash {
-    pub fn add<T: Pod>(&mut self, values: &[T]) {
+    pub(crate) fn add<T: Pod>(&mut self, values: &[T]) {
         self.0.update((values.len() as u64).to_le_bytes());
         self.0.update(bytemuck::cast_slice::<T, u8>(values));
     }
 
     /// Numbers as text, which has all their digits.
-    pub fn add_text(&mut self, text: &str) {
+    pub(crate) fn add_text(&mut self, text: &str) {
         self.add(text.as_bytes());
     }
 
-    pub fn finish(self) -> String {
+    pub(crate) fn finish(self) -> String {
         self.0.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
     }
 }

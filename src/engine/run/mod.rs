@@ -1,12 +1,12 @@
 //! The one loop over rounds, of every run: until something ends it, with the fate of every photon.
 
-pub mod blocks;
-pub mod identity;
+pub(crate) mod blocks;
+pub(crate) mod identity;
 mod recorder;
 mod result;
-pub mod retry;
-pub mod saved;
-pub mod several_devices;
+pub(crate) mod retry;
+pub(crate) mod saved;
+pub(crate) mod several_devices;
 mod state;
 pub mod watch;
 
@@ -14,9 +14,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-pub use recorder::Recorder;
+pub(crate) use recorder::Recorder;
 pub use result::RunResult;
-pub use state::RunState;
+pub(crate) use state::RunState;
 
 use crate::engine::error::bound::FilmError;
 use crate::engine::nonfinite_values::NonfiniteValues;
@@ -32,7 +32,7 @@ use saved::WorldFilm;
 use watch::{Control, End, Later};
 
 /// What a run of a world is to do, on one device or several, and what its film tells.
-pub struct Task<'a, Film> {
+pub(crate) struct Task<'a, Film> {
     /// Of a run that is kept.
     pub identity: Option<Identity>,
     /// `None` for the paper's box.
@@ -61,7 +61,7 @@ pub struct Task<'a, Film> {
 }
 
 /// What is lit: the paper's box or a scene, on a device or on the CPU.
-pub trait World {
+pub(crate) trait World {
     type Recorder: Recorder;
     type Film: WorldFilm;
 
@@ -82,7 +82,7 @@ pub trait World {
 }
 
 /// A run under way: a world that is set up, what its rounds are recorded with, and how far it has come.
-pub struct Run<'a, W: World> {
+pub(crate) struct Run<'a, W: World> {
     pub world: W,
     pub recorder: W::Recorder,
     pub state: RunState<'a, W::Film>,
@@ -90,7 +90,7 @@ pub struct Run<'a, W: World> {
 
 impl<'a, W: World> Run<'a, W> {
     /// Goes on with what was saved, if anything was.
-    pub fn new(world: W, recorder: W::Recorder, task: Task<'a, W::Film>, control: &mut Control) -> Result<Run<'a, W>> {
+    pub(crate) fn new(world: W, recorder: W::Recorder, task: Task<'a, W::Film>, control: &mut Control) -> Result<Run<'a, W>> {
         let state = RunState::new(task, &recorder, control)?;
         let mut run = Run { world, recorder, state };
         // What was saved may be enough, or have to be handed over.
@@ -101,12 +101,12 @@ impl<'a, W: World> Run<'a, W> {
         Ok(run)
     }
 
-    pub fn has_ended(&self) -> bool {
+    pub(crate) fn has_ended(&self) -> bool {
         self.state.end.is_some()
     }
 
     /// One more round, of a run that has not ended.
-    pub fn round(&mut self, control: &mut Control) -> Result<()> {
+    pub(crate) fn round(&mut self, control: &mut Control) -> Result<()> {
         let Run { world, recorder, state } = self;
         let mut is_cut = false;
         let round = recorder.round(|recorder| {
@@ -137,7 +137,7 @@ impl<'a, W: World> Run<'a, W> {
 
     /// One more round, unless all have been, of a run that is looked at between two of its rounds: runs what is recorded and counts the
     /// fates of its photons.
-    pub fn round_to_look_at(&mut self, cancelled: &AtomicBool) -> Result<()> {
+    pub(crate) fn round_to_look_at(&mut self, cancelled: &AtomicBool) -> Result<()> {
         if !self.has_ended() {
             self.round(&mut Control::quiet(cancelled))?;
             self.state.collect(&mut self.world, &mut self.recorder, false)?;
@@ -146,19 +146,19 @@ impl<'a, W: World> Run<'a, W> {
     }
 
     /// What all whole blocks have left.
-    pub fn film(&mut self) -> Result<W::Film> {
+    pub(crate) fn film(&mut self) -> Result<W::Film> {
         Ok(self.world.film(&mut self.recorder, &self.state)?())
     }
 
     /// The same with its error as users are told of it.
-    pub fn look(&mut self) -> Result<(W::Film, FilmError)> {
+    pub(crate) fn look(&mut self) -> Result<(W::Film, FilmError)> {
         let film = self.film()?;
         let error = (self.state.task.error)(&film).stated();
         Ok((film, error))
     }
 
     /// Begins anew from round 0, with a world that knows nothing of the rounds before.
-    pub fn begin_anew(&mut self, task: Task<'a, W::Film>, control: &mut Control) -> Result<()> {
+    pub(crate) fn begin_anew(&mut self, task: Task<'a, W::Film>, control: &mut Control) -> Result<()> {
         self.state = RunState::new(task, &self.recorder, control)?;
         Ok(())
     }
@@ -196,7 +196,7 @@ impl<'a, W: World> Run<'a, W> {
 }
 
 /// Runs a world that is set up to its end.
-pub fn run<W: World, Plan: Clone>(
+pub(crate) fn run<W: World, Plan: Clone>(
     world: W,
     recorder: W::Recorder,
     plan: &Plan,
@@ -211,12 +211,18 @@ pub fn run<W: World, Plan: Clone>(
 }
 
 /// Refuses arithmetic that the device does not do.
-pub fn check_math(gpu: &Gpu, math: Math) -> Result<()> {
+pub(crate) fn check_math(gpu: &Gpu, math: Math) -> Result<()> {
     if math == Math::Strict { strict_math(gpu) } else { Ok(()) }
 }
 
 /// The commands of a run on a device that makes these pipelines, and no others; `started` is the zero of its times.
-pub fn commands<'gpu>(gpu: &'gpu Gpu, modules: &[Module], constants: Constants, math: Math, started: Instant) -> Result<Commands<'gpu>> {
+pub(crate) fn commands<'gpu>(
+    gpu: &'gpu Gpu,
+    modules: &[Module],
+    constants: Constants,
+    math: Math,
+    started: Instant,
+) -> Result<Commands<'gpu>> {
     check_math(gpu, math)?;
     let mut commands = Commands::new(gpu, constants, started)?;
     commands.prepare(modules)?;

@@ -4,7 +4,7 @@ use crate::error::Result;
 use crate::gpu::{Commands, Gpu};
 use crate::timings::{HostClock, Timings};
 
-pub trait Recorder {
+pub(crate) trait Recorder {
     /// Runs `body` as a round, and times it.
     fn round(&mut self, body: impl FnOnce(&mut Self) -> Result<()>) -> Result<()>;
     /// The device, and the pipelines that it made since; `None` for the CPU.

@@ -15,7 +15,7 @@ pub struct RunResult<Plan, Film> {
     pub plan: Plan,
     pub film: Film,
     /// Of the photons of each map.
-    pub fates: Vec<Fates>,
+    pub(crate) fates: Vec<Fates>,
     pub timings: Timings,
     /// `None` for the CPU builder.
     pub device: Option<DeviceFacts>,
@@ -33,7 +33,7 @@ pub struct RunResult<Plan, Film> {
     /// Pipelines that the run made.
     pub pipelines: usize,
     /// Nonfinite values that `--paranoid` found; `None` without it.
-    pub nonfinite_values: Option<NonfiniteValues>,
+    pub(crate) nonfinite_values: Option<NonfiniteValues>,
 }
 
 impl<Plan, Film> RunResult<Plan, Film> {

@@ -17,14 +17,14 @@ use crate::settings::stop::Stop;
 
 /// What is done about a device that failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Remedy {
+pub(crate) enum Remedy {
     OpenedAnew,
     LessMemory,
     GivenUp,
 }
 
 /// What became of a device that failed, in words.
-pub fn in_words(gpu: &Gpu, error: &Error, remedy: Remedy) -> String {
+pub(crate) fn in_words(gpu: &Gpu, error: &Error, remedy: Remedy) -> String {
     let facts = gpu.facts();
     let what = match remedy {
         Remedy::OpenedAnew => "was opened anew, and the run goes on".to_owned(),
@@ -35,7 +35,7 @@ pub fn in_words(gpu: &Gpu, error: &Error, remedy: Remedy) -> String {
 }
 
 /// Told of a device that failed, why, and what is done about it.
-pub type Failed<'a> = &'a dyn Fn(&Gpu, &Error, Remedy);
+pub(crate) type Failed<'a> = &'a dyn Fn(&Gpu, &Error, Remedy);
 
 /// A device that fails more often without having done anything in between is not worth it.
 const MOST_FAILURES: u32 = 4;
@@ -50,7 +50,7 @@ fn mend(gpu: &mut Gpu, error: &Error) -> Option<Remedy> {
 }
 
 /// Does what can be done again from its start until a device is fit for it.
-pub fn until_done<T>(gpu: &mut Gpu, failed: Failed, mut work: impl FnMut(&Gpu) -> Result<T>) -> Result<T> {
+pub(crate) fn until_done<T>(gpu: &mut Gpu, failed: Failed, mut work: impl FnMut(&Gpu) -> Result<T>) -> Result<T> {
     for failures in 1.. {
         let error = match work(gpu) {
             Err(error) if failures <= MOST_FAILURES => error,
@@ -99,7 +99,7 @@ impl SaveRun for Notes<'_> {
 }
 
 /// Does a task on one device or several to its end.
-pub fn run_on<Plan, Film>(
+pub(crate) fn run_on<Plan, Film>(
     gpus: &mut Vec<Gpu>,
     task: &Task<Film>,
     run: &RunOnOne<Plan, Film>,

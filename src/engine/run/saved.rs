@@ -21,7 +21,7 @@ use crate::text::one_line;
 
 /// A run as far as whole blocks of it are done.
 #[derive(Debug, Clone, PartialEq)]
-pub struct SavedRun {
+pub(crate) struct SavedRun {
     pub identity: Identity,
     /// Which part of the run it is; all of it after a merge.
     pub share: Share,
@@ -36,14 +36,14 @@ pub struct SavedRun {
 
 /// Of either world.
 #[derive(Debug, Clone, PartialEq)]
-pub enum SavedFilm {
+pub(crate) enum SavedFilm {
     Room(RoomFilm),
     Scene(Box<SceneFilm>),
 }
 
 /// Why two saved runs are no parts of one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum NotMerged {
+pub(crate) enum NotMerged {
     /// Both hold this block.
     Twice(u32),
     /// Their sums are not of the same things.
@@ -53,7 +53,7 @@ pub enum NotMerged {
 }
 
 /// Of one of the two.
-pub trait WorldFilm: Clone + Into<SavedFilm> + Send + 'static {
+pub(crate) trait WorldFilm: Clone + Into<SavedFilm> + Send + 'static {
     /// Of what a run saved whose identity is this world's.
     fn of(saved: &SavedFilm) -> &Self;
 }
@@ -92,7 +92,7 @@ impl SavedFilm {
         }
     }
 
-    pub fn latest(&self) -> &LatestBlocks {
+    pub(crate) fn latest(&self) -> &LatestBlocks {
         match self {
             SavedFilm::Room(film) => &film.latest,
             SavedFilm::Scene(film) => &film.latest,
@@ -102,7 +102,7 @@ impl SavedFilm {
 
 impl SavedRun {
     /// Adds the blocks of another part of the same run. Where that fails, what is here is of no use any more.
-    pub fn merge(&mut self, other: &SavedRun) -> Result<(), NotMerged> {
+    pub(crate) fn merge(&mut self, other: &SavedRun) -> Result<(), NotMerged> {
         if self.shape() != other.shape() {
             return Err(NotMerged::OtherShape);
         }
@@ -132,12 +132,12 @@ impl SavedRun {
     }
 
     /// Whether the parts of each pixel's light are kept apart.
-    pub fn has_parts(&self) -> bool {
+    pub(crate) fn has_parts(&self) -> bool {
         matches!(&self.film, SavedFilm::Scene(film) if film.parts.is_some())
     }
 
     /// Whether it holds as much as a run with these fates, sums of its film, and values kept of a block.
-    pub fn has_lengths(&self, fates: &[Fates], sums: usize, kept: usize) -> bool {
+    pub(crate) fn has_lengths(&self, fates: &[Fates], sums: usize, kept: usize) -> bool {
         let bounces = |fates: &Fates| fates.bounces.len();
         self.fates.iter().map(bounces).eq(fates.iter().map(bounces))
             && self.film.blocks().sums.len() == sums
@@ -145,12 +145,12 @@ impl SavedRun {
     }
 
     /// Photons of its blocks, of all maps.
-    pub fn emitted(&self) -> u64 {
+    pub(crate) fn emitted(&self) -> u64 {
         self.fates.iter().map(|fates| fates.emitted).sum()
     }
 
     /// Blocks that it should have and does not.
-    pub fn missing(&self) -> u32 {
+    pub(crate) fn missing(&self) -> u32 {
         self.share.missing(&self.done, self.wanted)
     }
 }
@@ -253,7 +253,7 @@ impl Reader<'_> {
 }
 
 impl SavedRun {
-    pub fn to_bytes(&self) -> Vec<u8> {
+    pub(crate) fn to_bytes(&self) -> Vec<u8> {
         let mut arrays = Arrays::default();
         arrays.add_sums("sums", self.film.blocks());
         let latest = self.film.latest();
@@ -301,7 +301,7 @@ impl SavedRun {
     }
 
     /// Fails with what is wrong with the file.
-    pub fn from_bytes(bytes: &[u8]) -> Result<SavedRun, String> {
+    pub(crate) fn from_bytes(bytes: &[u8]) -> Result<SavedRun, String> {
         let rest = bytes.strip_prefix(MAGIC).ok_or("is no saved run of photonmill; give a file that `checkpoint` wrote")?;
         let damaged = || "is cut off or was changed, as its checksum shows; use an older copy, or begin the run anew".to_owned();
         let (content, checksum) = bytes.split_at_checked(bytes.len().saturating_sub(CHECKSUM_BYTES)).ok_or_else(damaged)?;
@@ -398,7 +398,7 @@ impl SavedRun {
 }
 
 /// The header of a file. Before anything else of it is read, its format, as it may look otherwise in another one.
-pub fn read_header<T: DeserializeOwned>(bytes: &[u8], known: u32) -> Result<T, String> {
+pub(crate) fn read_header<T: DeserializeOwned>(bytes: &[u8], known: u32) -> Result<T, String> {
     let header: serde_json::Value = serde_json::from_slice(bytes).map_err(|_| "has no header".to_owned())?;
     let (format, program) = (&header["format"], one_line(header["program"].as_str().unwrap_or("unknown")));
     if format.as_u64() != Some(known.into()) {

@@ -24,10 +24,10 @@ use crate::ledger::Ledger;
 use crate::settings::stop::Stop;
 
 /// Runs on one device until a goal is reached, or as long as it is dealt blocks.
-pub type RunOnOne<'a, Plan, Film> = dyn Fn(&Gpu, Stop, &mut Control) -> Result<RunResult<Plan, Film>> + Sync + 'a;
+pub(crate) type RunOnOne<'a, Plan, Film> = dyn Fn(&Gpu, Stop, &mut Control) -> Result<RunResult<Plan, Film>> + Sync + 'a;
 
 /// Between two times at which a run is noted, in memory.
-pub const NOTED_EVERY: Duration = Duration::from_secs(10);
+pub(crate) const NOTED_EVERY: Duration = Duration::from_secs(10);
 
 /// What a device says.
 enum Event<Plan, Film> {
@@ -77,7 +77,7 @@ struct Known<Plan, Film> {
 }
 
 /// How some devices ended together.
-pub enum Outcome<Plan, Film> {
+pub(crate) enum Outcome<Plan, Film> {
     Ended(Box<RunResult<Plan, Film>>),
     /// One failed; the others were stopped. With what all had done at the last look.
     Failed {
@@ -91,7 +91,7 @@ pub enum Outcome<Plan, Film> {
 const PAUSE: Duration = Duration::from_millis(20);
 
 /// One attempt.
-pub struct Together<'a, Plan, Film> {
+pub(crate) struct Together<'a, Plan, Film> {
     pub task: &'a Task<'a, Film>,
     pub run: &'a RunOnOne<'a, Plan, Film>,
     pub started: Instant,
@@ -120,7 +120,7 @@ struct Attempt<'a, Plan, Film> {
 }
 
 impl<Plan: Send, Film: WorldFilm> Together<'_, Plan, Film> {
-    pub fn run(
+    pub(crate) fn run(
         &self,
         gpus: &mut [Gpu],
         resume: Option<(std::path::PathBuf, SavedRun)>,

@@ -15,7 +15,7 @@ use crate::ledger::{Fates, Ledger};
 use crate::text::counted;
 
 /// How far a run has come, and whether it goes on.
-pub struct RunState<'a, Film> {
+pub(crate) struct RunState<'a, Film> {
     pub(super) task: Task<'a, Film>,
     pub(super) watch: Watch,
     /// Of each map in whole blocks, and in the block under way, as far as they are collected.
@@ -124,38 +124,38 @@ impl<'a, Film: WorldFilm> RunState<'a, Film> {
     }
 
     /// When the run's time is up.
-    pub fn deadline(&self) -> Option<Instant> {
+    pub(crate) fn deadline(&self) -> Option<Instant> {
         self.watch.deadline()
     }
 
     /// Whole blocks.
-    pub fn blocks(&self) -> u32 {
+    pub(crate) fn blocks(&self) -> u32 {
         self.done.count()
     }
 
     /// Rounds that have ended.
-    pub fn rounds(&self) -> u32 {
+    pub(crate) fn rounds(&self) -> u32 {
         self.blocks() * self.task.rounds_per_block + self.rounds_of_block
     }
 
     /// The number of the round under way.
-    pub fn round(&self) -> u32 {
+    pub(crate) fn round(&self) -> u32 {
         self.block * self.task.rounds_per_block + self.rounds_of_block
     }
 
     /// Whether the round under way is the last of its block.
-    pub fn ends_block(&self) -> bool {
+    pub(crate) fn ends_block(&self) -> bool {
         self.rounds_of_block + 1 == self.task.rounds_per_block
     }
 
     /// So many photons of a map are handed out.
-    pub fn hand_out(&mut self, map: usize, photons: u32) {
+    pub(crate) fn hand_out(&mut self, map: usize, photons: u32) {
         self.open[map] += u64::from(photons);
         self.emitted += u64::from(photons);
     }
 
     /// Counts the fates of all photons of a map that were handed out, and of those of whole blocks among them.
-    pub fn count(&mut self, map: usize, mut all: Fates, mut of_blocks: Fates) {
+    pub(crate) fn count(&mut self, map: usize, mut all: Fates, mut of_blocks: Fates) {
         all.emitted = std::mem::take(&mut self.open[map]);
         of_blocks.emitted = std::mem::take(&mut self.open_of_blocks[map]);
         let rest = &mut self.fates_of_rest[map];
@@ -171,17 +171,17 @@ impl<'a, Film: WorldFilm> RunState<'a, Film> {
     }
 
     /// Of the photons that the film is of: of whole blocks, or where there is none, of all.
-    pub fn fates(&self) -> &[Fates] {
+    pub(crate) fn fates(&self) -> &[Fates] {
         if self.blocks() > 0 { &self.fates_of_blocks } else { &self.fates_of_rest }
     }
 
     /// Of all photons that were counted, those under way among them.
-    pub fn ledger(&self) -> Ledger {
+    pub(crate) fn ledger(&self) -> Ledger {
         sum_of(&self.fates_of_blocks).plus(&sum_of(&self.fates_of_rest))
     }
 
     /// Photons that the film is of.
-    pub fn emitted(&self) -> u64 {
+    pub(crate) fn emitted(&self) -> u64 {
         if self.blocks() > 0 { self.emitted_of_blocks } else { self.emitted }
     }
 

@@ -17,7 +17,7 @@ use crate::settings::stop::{FIRST_LOOK, Stop};
 use serde::Serialize;
 
 /// How a caller watches a run and ends it early.
-pub struct Control<'a> {
+pub(crate) struct Control<'a> {
     /// Set from outside to end the run after the photons, or the round, under way.
     pub cancelled: &'a AtomicBool,
     /// Told from time to time how far the run has come.
@@ -26,10 +26,10 @@ pub struct Control<'a> {
 }
 
 /// Made when it is wanted.
-pub type Later<T> = Box<dyn FnOnce() -> T + Send>;
+pub(crate) type Later<T> = Box<dyn FnOnce() -> T + Send>;
 
 /// Takes a run as far as whole blocks are done.
-pub trait SaveRun {
+pub(crate) trait SaveRun {
     /// Whether it must know what the run computes.
     fn wants_identity(&self) -> bool {
         true
@@ -54,7 +54,7 @@ pub trait SaveRun {
 
 /// What of a run is kept, gone on with, and shared.
 #[derive(Default)]
-pub struct Keep<'a> {
+pub(crate) struct Keep<'a> {
     /// What the scene is called.
     pub scene: &'a str,
     /// The part of the run that is to be done.
@@ -70,7 +70,7 @@ pub struct Keep<'a> {
 
 impl<'a> Control<'a> {
     /// Watches nothing but `cancelled`.
-    pub fn quiet(cancelled: &'a AtomicBool) -> Control<'a> {
+    pub(crate) fn quiet(cancelled: &'a AtomicBool) -> Control<'a> {
         // A closure without captures takes no memory, so none is lost.
         Control { cancelled, progress: Box::leak(Box::new(|_: &Progress| {})), keep: Keep::default() }
     }
@@ -78,18 +78,18 @@ impl<'a> Control<'a> {
 
 impl Keep<'_> {
     /// Whether more than the result is asked for.
-    pub fn is_used(&self) -> bool {
+    pub(crate) fn is_used(&self) -> bool {
         self.save.is_some() || self.resume.is_some() || self.share.of > 1
     }
 
     /// Whether the first block to be done may be another than block 0.
-    pub fn begins_later(&self) -> bool {
+    pub(crate) fn begins_later(&self) -> bool {
         self.share.number > 0 || self.resume.is_some() || self.dealt.is_some()
     }
 
     /// The identity of the run, which takes a while to find out, where anybody asks. Fails where the file that it is to go on with is
     /// of another one.
-    pub fn identity(&mut self, of_run: impl FnOnce(&str) -> Identity) -> Result<Option<Identity>> {
+    pub(crate) fn identity(&mut self, of_run: impl FnOnce(&str) -> Identity) -> Result<Option<Identity>> {
         let is_wanted = match (&self.save, &self.resume) {
             (None, None) => return Ok(None),
             (Some(save), _) => save.wants_identity(),
@@ -113,7 +113,7 @@ impl Keep<'_> {
     }
 
     /// Fails where the file that the run is to go on with holds other values than its own identity asks for.
-    pub fn check_resumed(&self, holds: impl FnOnce(&SavedRun) -> bool) -> Result<()> {
+    pub(crate) fn check_resumed(&self, holds: impl FnOnce(&SavedRun) -> bool) -> Result<()> {
         let Some((path, saved)) = &self.resume else { return Ok(()) };
         let allowed = "contradicts itself: its settings ask for other values than it holds; begin anew without it";
         require(holds(saved), "resume", path.display(), allowed)
@@ -166,12 +166,12 @@ fn next_look(look: u32) -> u32 {
 }
 
 /// Numbers of blocks after which the error is looked at, from so many on.
-pub fn looks(blocks: u32) -> impl Iterator<Item = u32> {
+pub(crate) fn looks(blocks: u32) -> impl Iterator<Item = u32> {
     std::iter::successors(Some(FIRST_LOOK), |look| Some(next_look(*look))).skip_while(move |look| *look < blocks)
 }
 
 /// Watches a run: how long it has taken, and how large its error still is.
-pub struct Watch {
+pub(crate) struct Watch {
     stop: Stop,
     /// How fast the radius shrinks (`mean_squared_radius`); 1 keeps it.
     alpha: f64,
@@ -207,34 +207,34 @@ struct Look {
 
 impl Watch {
     /// Of a run that began at `started`.
-    pub fn new(stop: Stop, alpha: f64, rounds_per_block: u32, started: Instant) -> Watch {
+    pub(crate) fn new(stop: Stop, alpha: f64, rounds_per_block: u32, started: Instant) -> Watch {
         Watch { stop, alpha, rounds_per_block, started, next_look: FIRST_LOOK, looked: started, seen: None }
     }
 
     /// Looks at no film of fewer blocks: those that were done before have been looked at.
-    pub fn go_on(&mut self, blocks: u32) {
+    pub(crate) fn go_on(&mut self, blocks: u32) {
         self.next_look = looks(blocks).next().expect("looks have no end");
     }
 
     /// Whether the film should be read after so many blocks.
-    pub fn is_due(&self, blocks: u32) -> bool {
+    pub(crate) fn is_due(&self, blocks: u32) -> bool {
         // Where no error ends the run, people look, and need not do so often.
         let is_wanted = self.stop.error.is_some() || self.looked.elapsed() >= LOOK_FOR_PEOPLE;
         blocks >= self.next_look && is_wanted
     }
 
     /// Whether the run must be looked at now, as it may have done enough.
-    pub fn may_end(&self, blocks: u32, photons: u64) -> bool {
+    pub(crate) fn may_end(&self, blocks: u32, photons: u64) -> bool {
         (self.stop.error.is_some() && self.is_due(blocks)) || self.has_photons(photons)
     }
 
     /// When the run's time is up.
-    pub fn deadline(&self) -> Option<Instant> {
+    pub(crate) fn deadline(&self) -> Option<Instant> {
         self.stop.seconds.map(|seconds| self.started + Duration::from_secs_f64(seconds))
     }
 
     /// Takes what a film tells, and what limits kept from it.
-    pub fn look(&mut self, error: &FilmError, losses: &Losses) {
+    pub(crate) fn look(&mut self, error: &FilmError, losses: &Losses) {
         let FilmError { rounds, blocks, noise, freedom, ref unknown, unseen, .. } = *error;
         let noise = [noise, error_bound(noise, freedom, self.stop.confidence)];
         let of_maps = error.places.map_or(1.0, |places| places.of_maps());
@@ -256,7 +256,7 @@ impl Watch {
 
     /// Refuses an error that cannot be reached, and that nothing else would end: where limits alone keep more light from the result, or
     /// the bias of a radius that never shrinks is more.
-    pub fn check_error(&self, bounces: u32) -> Result<()> {
+    pub(crate) fn check_error(&self, bounces: u32) -> Result<()> {
         if self.stop.seconds.is_some() || self.stop.photons.is_some() {
             return Ok(());
         }
@@ -303,12 +303,12 @@ impl Watch {
         }
     }
 
-    pub fn has_photons(&self, photons: u64) -> bool {
+    pub(crate) fn has_photons(&self, photons: u64) -> bool {
         self.stop.photons.is_some_and(|wanted| photons >= wanted)
     }
 
     /// Whether the run has done enough after so many blocks and photons.
-    pub fn end(&self, blocks: u32, photons: u64) -> Option<End> {
+    pub(crate) fn end(&self, blocks: u32, photons: u64) -> Option<End> {
         let rounds = blocks * self.rounds_per_block;
         let small_enough = |wanted: f64| self.error().is_some_and(|(at, error)| at == rounds && error <= wanted);
         if self.stop.error.is_some_and(small_enough) {
@@ -318,12 +318,12 @@ impl Watch {
     }
 
     /// Whether the run's time is up.
-    pub fn is_late(&self) -> bool {
+    pub(crate) fn is_late(&self) -> bool {
         self.deadline().is_some_and(|deadline| Instant::now() >= deadline)
     }
 
     /// How far the run has come, in rounds, which have so many photons each.
-    pub fn progress(&self, rounds: f64, most_rounds: u32, photons_per_round: u64, ledger: Ledger) -> Progress {
+    pub(crate) fn progress(&self, rounds: f64, most_rounds: u32, photons_per_round: u64, ledger: Ledger) -> Progress {
         let seconds = self.started.elapsed().as_secs_f64();
         let a_round = seconds / rounds.max(1e-9);
         let most = f64::from(most_rounds);

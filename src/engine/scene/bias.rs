@@ -18,7 +18,7 @@ use crate::settings::scene::SceneSettings;
 use crate::settings::stop::Stop;
 
 /// Refuses an error of a scene whose bias is unknown, and that nothing else would end.
-pub fn check(stop: &Stop, bias: BiasPlan) -> Result<()> {
+pub(crate) fn check(stop: &Stop, bias: BiasPlan) -> Result<()> {
     let ends_otherwise = stop.seconds.is_some() || stop.photons.is_some();
     let Some(wanted) = stop.error.filter(|_| bias == BiasPlan::Nothing && !ends_otherwise) else { return Ok(()) };
     let allowed = format!(
@@ -30,7 +30,7 @@ pub fn check(stop: &Stop, bias: BiasPlan) -> Result<()> {
 
 /// The bias of all light at the plan's radii of the first round times `factor`, kept through so many rounds a batch;
 /// `None` if it was cancelled. Radii as small as is allowed are taken for larger ones that leave room below them. Light that no map has is the same at every radius, and has no bias.
-pub fn measure(
+pub(crate) fn measure(
     gpu: &Gpu,
     scene: &Scene,
     view: &View,
@@ -52,7 +52,7 @@ pub fn measure(
 }
 
 /// Radiance or irradiance of a batch, three channels a pixel, at the first round's radii times a factor.
-pub fn batch(
+pub(crate) fn batch(
     gpu: &Gpu,
     scene: &Scene,
     view: &View,

@@ -19,7 +19,7 @@ use crate::records::{CellPush, CrowdSizePush, DiscCutsPush, EndDifferencePush, F
 use crate::timings::Handled;
 
 /// Finds the walls at which each visible point's density estimates from a map end.
-pub fn cut_discs(commands: &mut Commands, round: Round, map: &MapPlan) -> Result<()> {
+pub(crate) fn cut_discs(commands: &mut Commands, round: Round, map: &MapPlan) -> Result<()> {
     let Round { resources, plan, .. } = round;
     let SceneResources { scene, visible_points, radius_classes, disc_cuts, .. } = resources;
     let (width, height) = plan.sensor.size();
@@ -42,7 +42,7 @@ pub fn cut_discs(commands: &mut Commands, round: Round, map: &MapPlan) -> Result
 }
 
 /// Adds a chunk of a map to the estimates of all visible points whose class this grid serves, all where radii have no classes.
-pub fn gather(commands: &mut Commands, round: Round, map: &MapPlan, classes: Range<u32>, cells_push: CellPush) -> Result<()> {
+pub(crate) fn gather(commands: &mut Commands, round: Round, map: &MapPlan, classes: Range<u32>, cells_push: CellPush) -> Result<()> {
     let PhotonBuffers { cells, sorted_map, crowded_points, dispatch_args, .. } = round.photons();
     let Round { resources, plan, number: round, .. } = round;
     let SceneResources { scene, visible_points, matt_lobes, matt_covers, estimates, near_sums, .. } = resources;
@@ -93,7 +93,7 @@ pub fn gather(commands: &mut Commands, round: Round, map: &MapPlan, classes: Ran
 }
 
 /// Turns what the maps found at all visible points into light; so many photons of the global and of the caustic map were traced.
-pub fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u32; 2]) -> Result<()> {
+pub(crate) fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u32; 2]) -> Result<()> {
     let Round { resources, geometry, plan, .. } = round;
     let SceneResources {
         scene,
@@ -152,7 +152,7 @@ pub fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u32; 2])
 }
 
 /// Ends a round: light that was found joins its block, and at the end of that the film.
-pub fn resolve(commands: &mut Commands, round: Round, ends_block: bool) -> Result<()> {
+pub(crate) fn resolve(commands: &mut Commands, round: Round, ends_block: bool) -> Result<()> {
     let Round { resources, plan, .. } = round;
     let SceneResources { extra_samples, pass_sums, estimates, film, .. } = resources;
     let FilmBuffers { sums_of_block, film_sums, film_squares, part_totals, part_sums, latest_blocks, .. } = film;
@@ -192,7 +192,7 @@ pub fn resolve(commands: &mut Commands, round: Round, ends_block: bool) -> Resul
 }
 
 /// Ends a block: what a smaller radius would change in it joins the sums of all blocks.
-pub fn end_difference(commands: &mut Commands, round: Round) -> Result<()> {
+pub(crate) fn end_difference(commands: &mut Commands, round: Round) -> Result<()> {
     let Round { resources, plan, .. } = round;
     let (row_length, block) = (row_length(plan.sensor.pixels() as usize) as u32, round.number / plan.film.rounds_per_block);
     let kernel = EndDifference { differences: &resources.film.differences };

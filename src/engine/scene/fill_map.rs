@@ -20,7 +20,7 @@ use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::scene::geometry::Geometry;
 
 /// What became of it.
-pub struct Filled {
+pub(crate) struct Filled {
     pub rounds: u32,
     /// Ended from outside before the last round.
     pub is_cancelled: bool,
@@ -29,7 +29,7 @@ pub struct Filled {
 
 /// Traces the photons of all rounds of a plan that a writer lacks, and hands them to it. A round that is cut short is left out; without
 /// a first one this fails.
-pub fn fill(
+pub(crate) fn fill(
     gpu: &Gpu,
     geometry: &Geometry,
     plan: &ScenePlan,

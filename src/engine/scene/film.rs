@@ -36,14 +36,14 @@ const FEW_HITS: f64 = 16.0;
 /// Exact sums over blocks, three channels a pixel, in film units, and what else a run leaves of its light.
 #[derive(Debug, Clone)]
 pub struct SceneFilm {
-    pub plan: FilmPlan,
+    pub(crate) plan: FilmPlan,
     pub of_blocks: BlockSums,
     /// Of light that surfaces scatter; `None` where nothing else is seen, as of points.
     pub of_surfaces: Option<BlockSums>,
     /// Parts of that light at some pixels.
-    pub latest: LatestBlocks,
+    pub(crate) latest: LatestBlocks,
     /// What a smaller radius would change; empty where blocks do not tell the bias.
-    pub differences: Differences,
+    pub(crate) differences: Differences,
     /// For each pixel and kind of light what one hit would have added to a round, or that something has hit
     /// (`glsl/world/scene/one_hit.glsl`).
     pub one_hits: Vec<u32>,
@@ -80,7 +80,7 @@ impl Deref for SceneFilm {
 
 impl SceneFilm {
     /// Adds the blocks of another part of the same run.
-    pub fn merge(&mut self, other: &SceneFilm) -> Result<(), TooLarge> {
+    pub(crate) fn merge(&mut self, other: &SceneFilm) -> Result<(), TooLarge> {
         self.of_blocks.merge(&other.of_blocks)?;
         self.of_surfaces.iter_mut().zip(&other.of_surfaces).try_for_each(|(surfaces, others)| surfaces.merge(others))?;
         self.latest.merge(&other.latest);
@@ -156,7 +156,7 @@ impl SceneFilm {
     }
 
     /// The first and the last class that a point of this map has.
-    pub fn classes(&self, map: &MapPlan) -> Option<(u32, u32)> {
+    pub(crate) fn classes(&self, map: &MapPlan) -> Option<(u32, u32)> {
         let first = if map.caustic_only { RADIUS_CLASSES as usize } else { 0 };
         let counts = self.class_counts.get(first..first + RADIUS_CLASSES as usize)?;
         let is_used = |count: &u32| *count > 0;
@@ -217,7 +217,7 @@ impl SceneFilm {
     }
 
     /// How errors of its values add up.
-    pub fn measure(&self) -> ErrorMeasure {
+    pub(crate) fn measure(&self) -> ErrorMeasure {
         let sum = self.surface_means().map(DVec3::element_sum).sum();
         ErrorMeasure::new(self.plan.measure, 3.0 * self.pixels_of_surfaces(), sum)
     }
@@ -399,7 +399,7 @@ impl SceneFilm {
     }
 
     /// Pixels, and kinds of light, of which no hit is all that is known.
-    pub fn unknown(&self, confidence: f64) -> Unknown {
+    pub(crate) fn unknown(&self, confidence: f64) -> Unknown {
         let scales = self.bound_scales(confidence);
         let bound = |pixel: usize, kind: usize| self.most_light(pixel, kind, &scales);
         let pixels = || 0..self.pixels();

@@ -19,7 +19,7 @@ use crate::plan::scene::ScenePlan;
 
 buffers! {
     /// Light of pixels in fixed point, and counts.
-    pub struct FilmBuffers(planned: &Planned, commands: &mut Commands) {
+    pub(crate) struct FilmBuffers(planned: &Planned, commands: &mut Commands) {
         /// Of the block under way, of all whole blocks, and the squares of these in two halves.
         sums_of_block: Buffer<u64> = planned.zeroed(commands, scene::SUMS_OF_BLOCK)?,
         film_sums: Buffer<u64> = planned.zeroed(commands, scene::FILM_SUMS)?,

@@ -9,7 +9,7 @@ use crate::scene::geometry::Geometry;
 /// Specialization constants that change no bit of a block.
 const WITHOUT_EFFECT: [&str; 4] = ["HAS_SLOTS", "HAS_PARTS", "CHAIN_STEPS", "PARANOID"];
 
-pub fn identity(scene: &str, view: &View, plan: &ScenePlan, map: Option<&str>, facts: &DeviceFacts) -> Identity {
+pub(crate) fn identity(scene: &str, view: &View, plan: &ScenePlan, map: Option<&str>, facts: &DeviceFacts) -> Identity {
     Identity::new(scene, content(view, plan, map), &plan.settings, found(plan), Some(facts), plan.settings.math)
 }
 
@@ -32,7 +32,7 @@ fn add_scene(hash: &mut Hash, geometry: &Geometry) {
     hash.add(emitters);
 }
 
-pub fn scene_hash(geometry: &Geometry) -> String {
+pub(crate) fn scene_hash(geometry: &Geometry) -> String {
     let mut hash = Hash::default();
     add_scene(&mut hash, geometry);
     hash.finish()

@@ -11,12 +11,12 @@ use crate::records::{CellPush, DispatchSizePush};
 use crate::timings::Handled;
 
 /// Kernels that the index needs.
-pub fn modules() -> Vec<Module> {
+pub(crate) fn modules() -> Vec<Module> {
     vec![MapCount::MODULE, MapScatter::MODULE, ScanBlocks::MODULE, ScanAdd::MODULE, DispatchSize::MODULE]
 }
 
 /// The grid of a map for points of this radius and smaller ones: cells as wide, its corner a little outside of the scene.
-pub fn cells(round: Round, map: &MapPlan, radius: f32) -> CellPush {
+pub(crate) fn cells(round: Round, map: &MapPlan, radius: f32) -> CellPush {
     CellPush {
         origin: round.geometry.bounds.0 - 4.0 * radius,
         cells_per_unit: 1.0 / radius,
@@ -27,7 +27,7 @@ pub fn cells(round: Round, map: &MapPlan, radius: f32) -> CellPush {
 }
 
 /// Sorts the map, which holds so many photons where that is known, by the buckets of its cells.
-pub fn build(commands: &mut Commands, round: Round, map_plan: &MapPlan, cells_push: &CellPush, stored: Option<u32>) -> Result<()> {
+pub(crate) fn build(commands: &mut Commands, round: Round, map_plan: &MapPlan, cells_push: &CellPush, stored: Option<u32>) -> Result<()> {
     let stored = stored.map_or(0, u64::from);
     let handle = |commands: &mut Commands, stored, bytes| commands.count(Handled { stored, bytes, ..Handled::default() });
     handle(commands, stored, 0);

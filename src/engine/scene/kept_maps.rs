@@ -10,7 +10,7 @@ use crate::ledger::Fates;
 use crate::photon::MapPhoton;
 use crate::plan::scene::MapPlan;
 
-pub struct KeptMaps {
+pub(crate) struct KeptMaps {
     /// By round, and whether it is the caustic map.
     maps: HashMap<(u32, bool), KeptMap>,
     /// Maps for which there is no room are traced again.
@@ -31,12 +31,12 @@ struct KeptMap {
 }
 
 impl KeptMaps {
-    pub fn new(most_bytes: u64) -> KeptMaps {
+    pub(super) fn new(most_bytes: u64) -> KeptMaps {
         KeptMaps { maps: HashMap::new(), most_bytes, round: 0, open: [false; 2] }
     }
 
     /// Begins a map of a round; whether its photons are kept, and need not be traced.
-    pub fn begin(&mut self, round: u32, map: &MapPlan) -> bool {
+    pub(super) fn begin(&mut self, round: u32, map: &MapPlan) -> bool {
         self.round = round;
         self.open[usize::from(map.caustic_only)] = true;
         let kept = self.maps.entry((round, map.caustic_only)).or_default();
@@ -48,7 +48,7 @@ impl KeptMaps {
     }
 
     /// Keeps the photons that are in the map, if there is room.
-    pub fn keep(&mut self, commands: &mut Commands, round: Round, map: &MapPlan) -> Result<()> {
+    pub(super) fn keep(&mut self, commands: &mut Commands, round: Round, map: &MapPlan) -> Result<()> {
         let held = self.bytes();
         let kept = self.maps.get_mut(&(self.round, map.caustic_only)).expect("the map was begun");
         let count = u64::from(commands.read(&round.photons().counters, 1)?[0].min(map.capacity));
@@ -69,13 +69,13 @@ impl KeptMaps {
     }
 
     /// Photons of the round under way.
-    pub fn parts(&self, map: &MapPlan) -> impl Iterator<Item = &Buffer<MapPhoton>> {
+    pub(super) fn parts(&self, map: &MapPlan) -> impl Iterator<Item = &Buffer<MapPhoton>> {
         self.maps.get(&(self.round, map.caustic_only)).into_iter().flat_map(|map| &map.parts)
     }
 
     /// The fates of a map in the round that has run, as counted, or as they were when its photons were traced. Both numbers are of
     /// this round alone: of all its photons, and of those in whole blocks.
-    pub fn fates(&mut self, which: usize, counted: [Fates; 2]) -> [Fates; 2] {
+    pub(super) fn fates(&mut self, which: usize, counted: [Fates; 2]) -> [Fates; 2] {
         if !std::mem::take(&mut self.open[which]) {
             return counted;
         }
@@ -90,12 +90,12 @@ impl KeptMaps {
     }
 
     /// Of which all photons are kept.
-    pub fn rounds(&self) -> usize {
+    pub(super) fn rounds(&self) -> usize {
         self.maps.iter().filter(|((_, caustic_only), map)| !caustic_only && !map.is_partial).count()
     }
 
     /// Of the photons that are kept.
-    pub fn bytes(&self) -> u64 {
+    pub(super) fn bytes(&self) -> u64 {
         let photons: u64 = self.maps.values().flat_map(|map| &map.parts).map(Buffer::count).sum();
         photons * size_of::<MapPhoton>() as u64
     }

@@ -22,13 +22,13 @@ const RAYS_OF_PAIR: (u32, u32) = (4, 32);
 const PLACES: usize = 1 << 10;
 
 /// Kernels that it takes.
-pub fn modules(plan: &ScenePlan) -> Vec<Module> {
+pub(crate) fn modules(plan: &ScenePlan) -> Vec<Module> {
     plan.lights().map(|_| TryLights::MODULE).into_iter().collect()
 }
 
 /// The points at which shadow rays are cast: what is asked about, receivers or what a camera sees, and where rays of a final gather
 /// end.
-pub fn points(receivers: &[Vec<Receiver>], visible_points: &[VisiblePoint], planes: &[Vec4]) -> Vec<Receiver> {
+pub(crate) fn points(receivers: &[Vec<Receiver>], visible_points: &[VisiblePoint], planes: &[Vec4]) -> Vec<Receiver> {
     let receivers = receivers.iter().flatten();
     let is_picture = receivers.clone().next().is_none();
     let is_asked = |point: &&VisiblePoint| point.arrivals & SEEN != 0 && (is_picture || point.arrivals & SEEN_BY_GATHER != 0);
@@ -49,7 +49,7 @@ fn places(rays: &[TrialRay]) -> impl Iterator<Item = Receiver> {
 
 /// Learns how shadow rays choose lights at these points and round about, and photons at what rays from there met too: a lamp that
 /// lights no point lights what lights it.
-pub fn learn(commands: &mut Commands, round: Round, tree: LightTree, asked: &[Receiver], rays: &[TrialRay]) -> Result<LightChoice> {
+pub(crate) fn learn(commands: &mut Commands, round: Round, tree: LightTree, asked: &[Receiver], rays: &[TrialRay]) -> Result<LightChoice> {
     let (of_asked, ray_count) = what_clusters_add(commands, round, &tree, asked)?;
     let places: Vec<Receiver> = places(rays).collect();
     let (of_places, _) = what_clusters_add(commands, round, &tree, &places)?;

@@ -27,7 +27,7 @@ const SHARE_FOR_KEPT_MAPS: u64 = 4;
 /// Pixels of the window along each side of a photon's dot.
 const DOT: u32 = 2;
 
-pub struct LiveScene<'a> {
+pub(crate) struct LiveScene<'a> {
     pub run: Run<'a, SceneOnGpu<'a>>,
     geometry: &'a Geometry,
     plan: &'a ScenePlan,
@@ -37,14 +37,14 @@ pub struct LiveScene<'a> {
 
 /// Where dots of photons go.
 #[derive(Debug, Clone, Copy)]
-pub struct DotPlace {
+pub(crate) struct DotPlace {
     pub window: [u32; 2],
     pub zoom: u32,
 }
 
 impl<'a> LiveScene<'a> {
     /// Makes pipelines and buffers.
-    pub fn new(
+    pub(crate) fn new(
         gpu: &'a Gpu,
         geometry: &'a Geometry,
         camera: &Camera,
@@ -64,12 +64,12 @@ impl<'a> LiveScene<'a> {
     }
 
     /// One more round, unless all have been.
-    pub fn round(&mut self) -> Result<()> {
+    pub(crate) fn round(&mut self) -> Result<()> {
         self.run.round_to_look_at(self.cancelled)
     }
 
     /// Begins anew from another camera. Photons that are kept need not be traced again.
-    pub fn look_from(&mut self, camera: &Camera) -> Result<()> {
+    pub(crate) fn look_from(&mut self, camera: &Camera) -> Result<()> {
         let Run { world, recorder, .. } = &mut self.run;
         world.look_from(recorder, camera.clone());
         self.camera = camera.clone();
@@ -77,12 +77,12 @@ impl<'a> LiveScene<'a> {
     }
 
     /// Rounds whose photons are kept, and the bytes of these.
-    pub fn kept(&self) -> (usize, u64) {
+    pub(crate) fn kept(&self) -> (usize, u64) {
         self.run.world.kept.as_ref().map_or((0, 0), |kept| (kept.rounds(), kept.bytes()))
     }
 
     /// Records what is shown of the film: light or its error, of which `mean` is the mean of the picture.
-    pub fn show(&mut self, shows: u32, mean: f64, shown: &Buffer<glam::Vec4>) -> Result<()> {
+    pub(crate) fn show(&mut self, shows: u32, mean: f64, shown: &Buffer<glam::Vec4>) -> Result<()> {
         let Run { world, recorder, state } = &mut self.run;
         let FilmBuffers { sums_of_block, film_sums, film_squares, part_sums, part_totals, .. } = &world.resources.film;
         let shows = if shows == SHOW_ERROR || self.plan.keeps_parts() { shows } else { SHOW_ALL };
@@ -101,7 +101,7 @@ impl<'a> LiveScene<'a> {
 
     /// Records the photons of the latest round as dots on the pixels of a window, those of the global and of the caustic map in colours
     /// of their own.
-    pub fn show_photons(&mut self, colours: [u32; 2], place: DotPlace, window_pixels: &Buffer<u32>) -> Result<()> {
+    pub(crate) fn show_photons(&mut self, colours: [u32; 2], place: DotPlace, window_pixels: &Buffer<u32>) -> Result<()> {
         let Run { world, recorder, .. } = &mut self.run;
         let Sensor::Picture { width, height } = self.plan.sensor else { return Ok(()) };
         let Some(kept) = &world.kept else { return Ok(()) };

@@ -17,7 +17,7 @@ fn share_of(missed: f64, light: f64) -> f64 {
 }
 
 /// Of a run so far, from what its kernels counted.
-pub fn losses(geometry: &Geometry, plan: &ScenePlan, fates: &[Fates], film: &SceneFilm) -> Losses {
+pub(crate) fn losses(geometry: &Geometry, plan: &ScenePlan, fates: &[Fates], film: &SceneFilm) -> Losses {
     let SceneFilm { anomalies, part_totals, .. } = film;
     let area_unit = geometry.unit * geometry.unit;
     let emitted = geometry.power * area_unit;

@@ -40,7 +40,7 @@ const PIECE: usize = 1 << 20;
 
 /// What a file holds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Header {
+pub(crate) struct Header {
     pub format: u32,
     /// The version of photonmill that wrote it.
     pub program: String,
@@ -62,7 +62,7 @@ pub struct Header {
 
 /// Settings that decide which photons there are.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct PhotonSettings {
+pub(crate) struct PhotonSettings {
     pub seed: u64,
     pub photons: u32,
     pub caustic_photons: u32,
@@ -73,7 +73,7 @@ pub struct PhotonSettings {
 
 /// A map that each round has.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct MapOfRound {
+pub(crate) struct MapOfRound {
     pub name: String,
     /// Photons that a round emits.
     pub photons: u32,
@@ -88,7 +88,7 @@ pub struct MapOfRound {
 
 /// The photons that a round has left in a map.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Photons {
+pub(crate) struct Photons {
     /// Of the first.
     pub byte: u64,
     pub count: u64,
@@ -147,13 +147,13 @@ impl Header {
     }
 
     /// Of the photons of all rounds, map by map.
-    pub fn ledgers(&self) -> Vec<Ledger> {
+    pub(crate) fn ledgers(&self) -> Vec<Ledger> {
         let of_map = |map: usize| self.rounds.iter().map(|maps| maps[map].fates.ledger()).fold(Ledger::default(), |sum, of| sum.plus(&of));
         (0..self.maps.len()).map(of_map).collect()
     }
 
     /// A photon's place, metres.
-    pub fn position(&self, photon: &MapPhoton) -> DVec3 {
+    pub(crate) fn position(&self, photon: &MapPhoton) -> DVec3 {
         DVec3::from(self.centre) + self.unit_metres * photon.position.as_dvec3()
     }
 
@@ -186,10 +186,10 @@ impl Header {
 }
 
 /// Where light of each arrival came from, by the two bits of a photon.
-pub const ARRIVALS: [(u32, &str); 3] = [(ARRIVED_DIRECT, "direct"), (ARRIVED_CAUSTIC, "caustic"), (ARRIVED_INDIRECT, "indirect")];
+pub(crate) const ARRIVALS: [(u32, &str); 3] = [(ARRIVED_DIRECT, "direct"), (ARRIVED_CAUSTIC, "caustic"), (ARRIVED_INDIRECT, "indirect")];
 
 /// Writes a file, one round after the other.
-pub struct MapWriter<'a> {
+pub(crate) struct MapWriter<'a> {
     file: &'a mut File,
     header: Header,
     /// Where the next photon goes.
@@ -201,19 +201,25 @@ pub struct MapWriter<'a> {
 }
 
 impl<'a> MapWriter<'a> {
-    pub fn new(file: &'a mut File, scene: &str, geometry: &Geometry, plan: &ScenePlan, device: &str) -> std::io::Result<MapWriter<'a>> {
+    pub(crate) fn new(
+        file: &'a mut File,
+        scene: &str,
+        geometry: &Geometry,
+        plan: &ScenePlan,
+        device: &str,
+    ) -> std::io::Result<MapWriter<'a>> {
         file.write_all(MAGIC)?;
         let header = Header::new(scene, geometry, plan, device);
         Ok(MapWriter { file, header, byte: MAGIC.len() as u64, maps: Vec::new(), open: Default::default() })
     }
 
-    pub fn begin_map(&mut self) {
+    pub(crate) fn begin_map(&mut self) {
         self.open = Default::default();
         self.maps.push(Photons { byte: self.byte, count: 0, crc32: Vec::new(), fates: Fates::default() });
     }
 
     /// Photons of the map under way.
-    pub fn add(&mut self, mut photons: &[MapPhoton]) -> std::io::Result<()> {
+    pub(crate) fn add(&mut self, mut photons: &[MapPhoton]) -> std::io::Result<()> {
         let map = self.maps.last_mut().expect("a map is under way");
         while !photons.is_empty() {
             let (now, later) = photons.split_at(photons.len().min(PIECE - self.open.1));
@@ -233,7 +239,7 @@ impl<'a> MapWriter<'a> {
     }
 
     /// The map under way is whole.
-    pub fn end_map(&mut self, fates: Fates) {
+    pub(crate) fn end_map(&mut self, fates: Fates) {
         let map = self.maps.last_mut().expect("a map is under way");
         map.fates = fates;
         if self.open.1 > 0 {
@@ -242,17 +248,17 @@ impl<'a> MapWriter<'a> {
     }
 
     /// The round under way is whole.
-    pub fn end_round(&mut self) {
+    pub(crate) fn end_round(&mut self) {
         self.header.rounds.push(std::mem::take(&mut self.maps));
     }
 
     /// Whole rounds.
-    pub fn rounds(&self) -> u32 {
+    pub(crate) fn rounds(&self) -> u32 {
         self.header.rounds.len() as u32
     }
 
     /// Forgets what there is of the round under way.
-    pub fn drop_open_round(&mut self) -> std::io::Result<()> {
+    pub(crate) fn drop_open_round(&mut self) -> std::io::Result<()> {
         self.byte = self.maps.first().map_or(self.byte, |map| map.byte);
         self.maps.clear();
         self.file.set_len(self.byte)?;
@@ -260,7 +266,7 @@ impl<'a> MapWriter<'a> {
     }
 
     /// Ends the file behind its last whole round.
-    pub fn finish(mut self) -> std::io::Result<Header> {
+    pub(crate) fn finish(mut self) -> std::io::Result<Header> {
         self.drop_open_round()?;
         let header = serde_json::to_vec(&self.header).expect("a header is plain data");
         self.file.write_all(&header)?;
@@ -273,7 +279,7 @@ impl<'a> MapWriter<'a> {
 
 /// A file that is read.
 #[derive(Debug)]
-pub struct MapFile {
+pub(crate) struct MapFile {
     option: &'static str,
     path: PathBuf,
     bytes: MappedFile,
@@ -284,7 +290,7 @@ pub struct MapFile {
 
 impl MapFile {
     /// `option` names it.
-    pub fn open(option: &'static str, path: &Path) -> Result<MapFile> {
+    pub(crate) fn open(option: &'static str, path: &Path) -> Result<MapFile> {
         MapFile::read(option, path).map_err(|reason| Error::setting(option, path.display(), reason))
     }
 
@@ -321,18 +327,18 @@ impl MapFile {
         Ok(MapFile { option, path: path.to_owned(), bytes, header, hash })
     }
 
-    pub fn rounds(&self) -> u32 {
+    pub(crate) fn rounds(&self) -> u32 {
         self.header.rounds.len() as u32
     }
 
     /// Settings for a run that takes its photons from this file.
-    pub fn settings(&self, settings: &SceneSettings) -> SceneSettings {
+    pub(crate) fn settings(&self, settings: &SceneSettings) -> SceneSettings {
         let PhotonSettings { photons, caustic_photons, bounces, illumination, aim, .. } = self.header.settings;
         SceneSettings { photons, caustic_photons, bounces, illumination, aim, ..settings.clone() }
     }
 
     /// Makes a plan one whose photons are those of this file; refuses a plan that wants others.
-    pub fn plan(&self, mut plan: ScenePlan, geometry: &Geometry) -> Result<ScenePlan> {
+    pub(crate) fn plan(&self, mut plan: ScenePlan, geometry: &Geometry) -> Result<ScenePlan> {
         if scene_hash(geometry) != self.header.scene_hash {
             return Err(self.refuse(format!(
                 "holds photons of another scene ({}, {} triangles); give the file and the options that it was made with",
@@ -361,12 +367,12 @@ impl MapFile {
     }
 
     /// Fates of a round's photons in a map.
-    pub fn fates(&self, round: u32, map: &str) -> &Fates {
+    pub(crate) fn fates(&self, round: u32, map: &str) -> &Fates {
         &self.header.rounds[round as usize][self.number(map)].fates
     }
 
     /// Hands over the photons of a round, at most so many at once, each once its checksum is known to be right.
-    pub fn photons(
+    pub(crate) fn photons(
         &self,
         round: u32,
         map: &str,

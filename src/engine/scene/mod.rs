@@ -13,37 +13,37 @@
 //! resolve           all light of a pixel: to the film
 //! ```
 
-pub mod bias;
-pub mod estimate;
-pub mod fill_map;
+pub(crate) mod bias;
+pub(crate) mod estimate;
+pub(crate) mod fill_map;
 pub mod film;
-pub mod film_buffers;
+pub(crate) mod film_buffers;
 mod identity;
-pub mod index;
+pub(crate) mod index;
 mod kept_maps;
 mod light_trial;
-pub mod live;
-pub mod losses;
-pub mod map_file;
+pub(crate) mod live;
+pub(crate) mod losses;
+pub(crate) mod map_file;
 mod map_in_round;
 mod on_gpu;
 mod on_several;
 pub mod pilot;
 mod pilot_rounds;
-pub mod points;
-pub mod radius_class;
-pub mod replay;
-pub mod resources;
-pub mod trace;
-pub mod trial;
+pub(crate) mod points;
+pub(crate) mod radius_class;
+pub(crate) mod replay;
+pub(crate) mod resources;
+pub(crate) mod trace;
+pub(crate) mod trial;
 mod trial_rays;
 
 use glam::DVec3;
 
 pub use film::SceneFilm;
-pub use identity::scene_hash;
-pub use on_gpu::{constants, light, light_from, modules, task};
-pub use on_several::light_on;
+pub(crate) use identity::scene_hash;
+pub(crate) use on_gpu::{constants, light, light_from, modules, task};
+pub(crate) use on_several::light_on;
 
 use crate::engine::error::bound::FilmError;
 use crate::engine::run;
@@ -66,7 +66,7 @@ impl RunResult {
 }
 
 /// What is lit and what looks at it.
-pub struct View<'a> {
+pub(crate) struct View<'a> {
     pub geometry: &'a Geometry,
     /// For a picture.
     pub camera: Option<&'a Camera>,
@@ -76,7 +76,7 @@ pub struct View<'a> {
 
 /// One round of a run: what its stages share.
 #[derive(Clone, Copy)]
-pub struct Round<'a> {
+pub(crate) struct Round<'a> {
     pub resources: &'a SceneResources,
     pub geometry: &'a Geometry,
     pub plan: &'a ScenePlan,
@@ -85,14 +85,14 @@ pub struct Round<'a> {
 
 impl<'a> Round<'a> {
     /// Of a plan that has maps.
-    pub fn photons(self) -> &'a PhotonBuffers {
+    pub(crate) fn photons(self) -> &'a PhotonBuffers {
         self.resources.photons.as_ref().expect("maps have photons")
     }
 }
 
 /// What light is asked of.
 #[derive(Debug, Clone, Copy)]
-pub enum Target<'a> {
+pub(crate) enum Target<'a> {
     /// A camera's picture, so many pixels wide and high: radiance, W/m2/sr.
     Picture(&'a Camera, [u32; 2]),
     /// Points with the normals of their surfaces, in metres: irradiance, W/m2.
@@ -100,14 +100,14 @@ pub enum Target<'a> {
 }
 
 impl<'a> Target<'a> {
-    pub fn sensor(self) -> Sensor {
+    pub(crate) fn sensor(self) -> Sensor {
         match self {
             Target::Picture(_, [width, height]) => Sensor::Picture { width, height },
             Target::Points(points) => Sensor::Receivers { count: points.len() as u32 },
         }
     }
 
-    pub fn camera(self) -> Option<&'a Camera> {
+    pub(crate) fn camera(self) -> Option<&'a Camera> {
         match self {
             Target::Picture(camera, _) => Some(camera),
             Target::Points(_) => None,
@@ -115,7 +115,7 @@ impl<'a> Target<'a> {
     }
 
     /// Its points, the same in all rounds; none for a picture.
-    pub fn phases(self, geometry: &Geometry) -> Vec<Vec<Receiver>> {
+    pub(crate) fn phases(self, geometry: &Geometry) -> Vec<Vec<Receiver>> {
         match self {
             Target::Picture(..) => Vec::new(),
             Target::Points(points) => vec![points.iter().map(|point| receiver(geometry, *point)).collect()],
@@ -124,7 +124,7 @@ impl<'a> Target<'a> {
 }
 
 /// A point and the normal of its surface.
-pub fn receiver(geometry: &Geometry, (position, normal): (DVec3, DVec3)) -> Receiver {
+pub(crate) fn receiver(geometry: &Geometry, (position, normal): (DVec3, DVec3)) -> Receiver {
     let normal = normal.as_vec3();
     Receiver { position: geometry.to_local(position), normal, shading_normal: normal }
 }

@@ -33,7 +33,7 @@ use crate::timings::Span;
 
 /// Kernels that the plan needs, and no others. `go_on` is not among them: few camera paths outlast a dispatch, so its pipeline is
 /// made at its first use.
-pub fn modules(plan: &ScenePlan, facts: &DeviceFacts) -> Vec<Module> {
+pub(crate) fn modules(plan: &ScenePlan, facts: &DeviceFacts) -> Vec<Module> {
     let traces = if plan.maps().next().is_some() { trace::modules(plan) } else { Vec::new() };
     [of_film(plan, facts), traces].concat()
 }
@@ -63,14 +63,14 @@ fn of_film(plan: &ScenePlan, facts: &DeviceFacts) -> Vec<Module> {
 }
 
 /// Specialization constants of a plan.
-pub fn constants(plan: &ScenePlan) -> Constants {
+pub(crate) fn constants(plan: &ScenePlan) -> Constants {
     plan.constants.iter().fold(Constants::new(plan.settings.group_size), |constants, (name, value)| constants.set(name, *value))
 }
 
 /// Timestamps that a round may need.
 const TIMESTAMPS_PER_ROUND: u32 = 64;
 
-pub struct SceneOnGpu<'a> {
+pub(crate) struct SceneOnGpu<'a> {
     geometry: &'a Geometry,
     /// Of a picture.
     camera: Option<Camera>,
@@ -91,12 +91,12 @@ pub struct SceneOnGpu<'a> {
 }
 
 /// Runs all rounds of a plan; progress is reported in rounds.
-pub fn light(gpu: &Gpu, view: &View, plan: ScenePlan, control: &mut Control) -> Result<RunResult> {
+pub(crate) fn light(gpu: &Gpu, view: &View, plan: ScenePlan, control: &mut Control) -> Result<RunResult> {
     light_from(gpu, view, plan, None, control)
 }
 
 /// The same with photons from a file, for which the plan must be made ([`MapFile::plan`]).
-pub fn light_from(gpu: &Gpu, view: &View, plan: ScenePlan, map: Option<&MapFile>, control: &mut Control) -> Result<RunResult> {
+pub(crate) fn light_from(gpu: &Gpu, view: &View, plan: ScenePlan, map: Option<&MapFile>, control: &mut Control) -> Result<RunResult> {
     let started = Instant::now();
     let modules = if map.is_some() { of_film(&plan, gpu.facts()) } else { modules(&plan, gpu.facts()) };
     let mut commands = run::commands(gpu, &modules, constants(&plan), plan.settings.math, started)?;
@@ -135,7 +135,7 @@ fn can_go_on(saved: &SavedRun, plan: &ScenePlan, task: &Task<SceneFilm>) -> bool
 }
 
 /// What a run of a plan is to do.
-pub fn task<'a>(geometry: &'a Geometry, plan: &'a ScenePlan) -> Task<'a, SceneFilm> {
+pub(crate) fn task<'a>(geometry: &'a Geometry, plan: &'a ScenePlan) -> Task<'a, SceneFilm> {
     let photons_per_round = plan.traced_maps().map(|map| u64::from(map.photons)).sum();
     Task {
         identity: None,

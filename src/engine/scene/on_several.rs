@@ -12,7 +12,7 @@ use crate::scene::Scene;
 use crate::settings::stop::Stop;
 
 /// Runs on all devices, for the first of which the plan was made; `map` holds photons that need not be traced.
-pub fn light_on(
+pub(crate) fn light_on(
     gpus: &mut Vec<Gpu>,
     (scene, view): (&Scene, &View),
     plan: &ScenePlan,

@@ -34,12 +34,12 @@ const LEAST_GAIN: f64 = 1.2;
 /// What a pilot has found and chosen.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pilot {
-    pub before: Division,
+    pub(crate) before: Division,
     /// With the mean of all pixels' samples.
-    pub chosen: Division,
+    pub(crate) chosen: Division,
     /// Where these differ: those that all pixels have, and the tiles that have more.
     pub tiles: Option<(u32, TileSamples)>,
-    pub rounds: Rounds,
+    pub(crate) rounds: Rounds,
     /// Shares of the squared noise of a round before, of direct light, light over mirrors and glass, caustics and indirect light.
     pub of_parts: [f64; PART_COUNT as usize],
     /// Of the device, milliseconds; 0 where it has no clock.
@@ -62,7 +62,7 @@ impl Pilot {
 }
 
 /// Chooses the division of the work of a run with these settings; `None` where it has no goal, too.
-pub fn choose_for(
+pub(crate) fn choose_for(
     gpu: &Gpu,
     scene: &Scene,
     view: &View,
@@ -78,7 +78,7 @@ pub fn choose_for(
 }
 
 /// Chooses the division of a picture's work, for whose settings there is a plan. `None` where nothing is to be chosen, or nothing varies.
-pub fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Free, cancelled: &AtomicBool) -> Result<Option<Pilot>> {
+pub(crate) fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Free, cancelled: &AtomicBool) -> Result<Option<Pilot>> {
     let settings = &plan.settings;
     if free == Free::default() {
         return Ok(None);

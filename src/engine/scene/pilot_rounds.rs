@@ -25,13 +25,13 @@ use crate::settings::stop::{Measure, Stop};
 use crate::settings::tile_samples::TILE;
 
 /// Paths through each, as many as a block of a run has at least: they are even over it, and vary less than if each was alone.
-pub const SAMPLES: u32 = SAMPLES_PER_BLOCK;
+pub(crate) const SAMPLES: u32 = SAMPLES_PER_BLOCK;
 const SEED: u64 = 0x0070_696c_6f74;
 /// Pixels that tell enough of a map, whose light varies little from one to the next; and paths through each, to tell what varies from path
 /// to path from what varies with the photons.
-pub const PIXELS_OF_MAP: u32 = 4096;
-pub const FEW_SAMPLES: u32 = 1;
-pub const MANY_SAMPLES: u32 = 8;
+pub(crate) const PIXELS_OF_MAP: u32 = 4096;
+pub(crate) const FEW_SAMPLES: u32 = 1;
+pub(crate) const MANY_SAMPLES: u32 = 8;
 
 /// Paths of a pixel that look a map up at places of their own tell as much as so many photons, and lie evenly.
 const MOST_POWER: f64 = 1.35;
@@ -40,7 +40,7 @@ const STEADIER: f64 = 0.6;
 
 /// What a round's parts are like: the variance of a path's light, or of a map's, and the light itself, relative to all light.
 #[derive(Clone, Copy)]
-pub struct Parts {
+pub(crate) struct Parts {
     pub variance: [f64; PART_COUNT as usize],
     pub light: [f64; PART_COUNT as usize],
     /// What one pixel may have of light that its only path has missed, relative to the light of a pixel.
@@ -53,7 +53,7 @@ pub struct Parts {
 }
 
 /// What all pixels tell, relative to all light.
-pub struct OfPicture {
+pub(crate) struct OfPicture {
     /// The variance of a path, and that of each tile over their mean.
     pub paths: f64,
     pub tiles: Vec<OfTile>,
@@ -62,7 +62,7 @@ pub struct OfPicture {
 }
 
 #[derive(Clone, Copy, Default)]
-pub struct OfTile {
+pub(crate) struct OfTile {
     /// Over the mean of all tiles.
     pub variance: f64,
     /// The share of its pixels that show surfaces: paths that meet none cost little.
@@ -70,7 +70,7 @@ pub struct OfTile {
 }
 
 #[derive(Clone, Copy, Default)]
-pub struct OfMap {
+pub(crate) struct OfMap {
     /// The variance of a round with one path a pixel, and by which power of the paths it falls.
     pub of_round: f64,
     pub sample_power: f64,
@@ -82,7 +82,7 @@ pub struct OfMap {
 }
 
 /// Of a run that is planned.
-pub struct PilotRounds<'a> {
+pub(crate) struct PilotRounds<'a> {
     pub gpu: &'a Gpu,
     pub scene: &'a Scene,
     pub view: &'a View<'a>,
@@ -95,7 +95,7 @@ pub struct PilotRounds<'a> {
 
 impl PilotRounds<'_> {
     /// A few pixels, spread over the picture, with a path through each and so many shadow rays.
-    pub fn of_few(&self, shadow_rays: u32) -> Result<Parts> {
+    pub(super) fn of_few(&self, shadow_rays: u32) -> Result<Parts> {
         let PilotRounds { view, run, .. } = *self;
         let seed = bias_batches::seed(SEED, 0);
         let settings = SceneSettings { samples: SAMPLES, shadow_rays, rounds: self.size.rounds, seed, ..self.settings() };
@@ -129,7 +129,7 @@ impl PilotRounds<'_> {
     }
 
     /// Nanoseconds of a look at few pixels.
-    pub fn cost_of_few(&self, rounds: &Rounds, shadow_rays: u32) -> f64 {
+    pub(super) fn cost_of_few(&self, rounds: &Rounds, shadow_rays: u32) -> f64 {
         let share = (f64::from(self.size.pixels) / f64::from(self.run.sensor.pixels())).min(1.0);
         let at = Division { shadow_rays, samples: SAMPLES, ..Division::of(&self.settings()) };
         let [paths, global, caustic] = rounds.costs(at);
@@ -137,7 +137,7 @@ impl PilotRounds<'_> {
     }
 
     /// All pixels. `None` where nothing varies.
-    pub fn of_all(&self, shadow_rays: u32, rounds: u32) -> Result<Option<OfPicture>> {
+    pub(super) fn of_all(&self, shadow_rays: u32, rounds: u32) -> Result<Option<OfPicture>> {
         let PilotRounds { view, run, .. } = *self;
         let look = |light_of: LightOf, samples: u32| {
             let settings = SceneSettings { samples, shadow_rays, rounds, seed: bias_batches::seed(SEED, 1), ..self.settings() };
@@ -202,7 +202,7 @@ impl PilotRounds<'_> {
     }
 
     /// Settings that all rounds have, whatever the run's photons are.
-    pub fn settings(&self) -> SceneSettings {
+    pub(super) fn settings(&self) -> SceneSettings {
         let neighbours = |usual: u32| (f64::from(usual) * self.size.neighbours) as u32;
         SceneSettings {
             tiles: None,

@@ -63,7 +63,7 @@ macro_rules! camera_kernel {
 }
 
 /// Finds the visible points of a round and writes the light that needs no photons.
-pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Result<()> {
+pub(crate) fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Result<()> {
     let Round { resources, geometry, plan, number: round } = round;
     let SceneResources { camera_paths: [camera_paths, _], camera_path_counts, .. } = resources;
     let goes_on = plan.chains_go_on();

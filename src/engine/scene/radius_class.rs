@@ -28,23 +28,23 @@ const CLEARANCE_RAYS: u32 = 8;
 const CLEARANCE_WORK: u64 = 8 * 64;
 
 /// Kernels that find the classes.
-pub fn modules() -> Vec<Module> {
+pub(crate) fn modules() -> Vec<Module> {
     vec![Clearance::MODULE, RadiusClass::MODULE]
 }
 
 /// Bits of a class in the word of its point. Twin of `GLOBAL_CLASS` and `CAUSTIC_CLASS` in `glsl/gather/radius_class.glsl`.
-pub fn map_class(map: &MapPlan) -> u32 {
+pub(crate) fn map_class(map: &MapPlan) -> u32 {
     if map.caustic_only { 8 } else { 0 }
 }
 
 /// Twin of `radius_of_class` in `glsl/gather/radius_class.glsl`.
-pub fn radius_of_class(widest: f64, class: u32) -> f32 {
+pub(crate) fn radius_of_class(widest: f64, class: u32) -> f32 {
     (widest as f32 * 0.5f32.powi(class as i32)).max(RADIUS_RANGE.0 as f32)
 }
 
 /// Finds the radii of the visible points of a round. Says of each map, the global and the caustic one, which grids its points need,
 /// each by the classes that it serves.
-pub fn find(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Result<[Vec<Range<u32>>; 2]> {
+pub(crate) fn find(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Result<[Vec<Range<u32>>; 2]> {
     let Round { resources, plan, .. } = round;
     let SceneResources { scene, visible_points, radius_classes, clearances, film, .. } = resources;
     let class_counts = &film.class_counts;
@@ -66,7 +66,7 @@ pub fn find(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> R
 }
 
 /// That of points which all have the same radius.
-pub fn one_grid() -> Vec<Range<u32>> {
+pub(crate) fn one_grid() -> Vec<Range<u32>> {
     std::iter::once(0..RADIUS_CLASSES).collect()
 }
 

@@ -18,7 +18,7 @@ use crate::records::{LightPath, Tally};
 use crate::scene::geometry::Geometry;
 
 /// The photon as it left its light source and then each surface, normalised as in the kernels.
-pub fn replay(gpu: &Gpu, geometry: &Geometry, plan: &ScenePlan, name: PhotonName) -> Result<Replayed<LightPath, LightPath>> {
+pub(crate) fn replay(gpu: &Gpu, geometry: &Geometry, plan: &ScenePlan, name: PhotonName) -> Result<Replayed<LightPath, LightPath>> {
     let (domain, kind) = if name.caustic { (DOMAIN_CAUSTIC_PHOTONS, "caustic") } else { (DOMAIN_PHOTONS, "global") };
     name.check_round(plan.settings.rounds)?;
     let map = plan.maps().find(|map| map.domain == domain).ok_or_else(|| name.refused(format!("this run has no {kind} map")))?;
@@ -31,7 +31,7 @@ pub fn replay(gpu: &Gpu, geometry: &Geometry, plan: &ScenePlan, name: PhotonName
 
 /// Some photons in flight.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Flights {
+pub(crate) struct Flights {
     /// As they leave the lights, then those that are left after each flight.
     pub paths: Vec<Vec<LightPath>>,
     /// Their fates in each flight.
@@ -42,7 +42,7 @@ pub struct Flights {
 
 /// The photons (first, count) of a round of `map`, no more than it traces at once, through `flights` flights or until
 /// none is left.
-pub fn light_paths(
+pub(crate) fn light_paths(
     gpu: &Gpu,
     geometry: &Geometry,
     plan: &ScenePlan,
@@ -82,7 +82,7 @@ pub fn light_paths(
 
 impl Replayed<LightPath, LightPath> {
     /// A line per vertex: position, direction and flux after the vertex.
-    pub fn table(&self, geometry: &Geometry, plan: &ScenePlan) -> String {
+    pub(crate) fn table(&self, geometry: &Geometry, plan: &ScenePlan) -> String {
         let flux = plan.maps().find(|map| map.caustic_only == self.name.caustic).map_or(0.0, |map| map.photon_flux(geometry));
         let watts = flux * geometry.unit * geometry.unit;
         let row = |(bounce, vertex): (usize, &LightPath)| {

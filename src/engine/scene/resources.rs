@@ -15,7 +15,7 @@ use crate::settings::Builder;
 use crate::settings::scene::Effect;
 
 buffers! {
-    pub struct SceneResources(
+    pub(crate) struct SceneResources(
         planned: &Planned, commands: &mut Commands, geometry: &Geometry, plan: &ScenePlan, phases: &[Vec<Receiver>]
     ) {
         /// Written once; what the plan dropped has one empty element.
@@ -76,14 +76,14 @@ buffers! {
 impl SceneResources {
     /// Makes the buffers and records the upload of what never changes. `phases` are sets of receivers
     /// of equal length; none for a picture.
-    pub fn new(commands: &mut Commands, geometry: &Geometry, plan: &ScenePlan, phases: &[Vec<Receiver>]) -> Result<SceneResources> {
+    pub(crate) fn new(commands: &mut Commands, geometry: &Geometry, plan: &ScenePlan, phases: &[Vec<Receiver>]) -> Result<SceneResources> {
         SceneResources::made(&Planned { gpu: commands.gpu(), buffers: plan.buffers(geometry) }, commands, geometry, plan, phases)
     }
 }
 
 buffers! {
     /// Photons in flight and their map; both maps of a round use the same ones in turn.
-    pub struct PhotonBuffers(planned: &Planned, commands: &mut Commands, plan: &ScenePlan) {
+    pub(crate) struct PhotonBuffers(planned: &Planned, commands: &mut Commands, plan: &ScenePlan) {
         /// Paths entering even bounces and odd bounces.
         paths: [Buffer<LightPath>; 2] = planned.several(scene::PATHS)?,
         map: Buffer<MapPhoton> = planned.one(scene::MAP)?,
@@ -114,7 +114,7 @@ buffers! {
 
 buffers! {
     /// Survivors of a bounce, for prefix sums over them.
-    pub struct OrderBuffers(planned: &Planned) {
+    pub(crate) struct OrderBuffers(planned: &Planned) {
         survivors: Buffer<u32> = planned.one(scene::SURVIVORS)?,
         sums_of_survivors: Vec<Buffer<u32>> = planned.all(scene::SUMS_OF_SURVIVORS)?,
     }

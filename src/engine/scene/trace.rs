@@ -20,7 +20,7 @@ use crate::settings::Builder;
 use crate::timings::Handled;
 
 /// Kernels that tracing needs.
-pub fn modules(plan: &ScenePlan) -> Vec<Module> {
+pub(crate) fn modules(plan: &ScenePlan) -> Vec<Module> {
     let by_builder = match plan.builder() {
         Builder::Naive => vec![EmitScene::MODULE, TraceSceneNaive::MODULE],
         Builder::Atomic => vec![EmitScene::MODULE, TraceSceneAtomic::MODULE],
@@ -50,7 +50,7 @@ enum Start {
 /// Traces the photons (first, count) of a chunk to their end and adds their fates to the map's tallies. They go in segments of
 /// bounces where more would not fit one dispatch or one map; survivors go on in the next. `gather` is called with the photons in
 /// the map, and with their number where that is known: at the end, and before a segment for which the map might have no room.
-pub fn trace(
+pub(crate) fn trace(
     commands: &mut Commands,
     round: Round,
     map: &MapPlan,
@@ -96,7 +96,7 @@ pub fn trace(
 }
 
 /// The photons that a map holds of a round.
-pub fn stored(commands: &mut Commands, round: Round, map: &MapPlan) -> Result<Vec<MapPhoton>> {
+pub(crate) fn stored(commands: &mut Commands, round: Round, map: &MapPlan) -> Result<Vec<MapPhoton>> {
     let mut found = Vec::new();
     for chunk in map.chunks() {
         trace(commands, round, map, chunk, &mut |commands, _| Ok(found.extend(in_map(commands, round, map)?)))?;
@@ -105,7 +105,7 @@ pub fn stored(commands: &mut Commands, round: Round, map: &MapPlan) -> Result<Ve
 }
 
 /// The photons that are in the map now, without empty slots.
-pub fn in_map(commands: &mut Commands, round: Round, map_plan: &MapPlan) -> Result<impl Iterator<Item = MapPhoton> + use<>> {
+pub(crate) fn in_map(commands: &mut Commands, round: Round, map_plan: &MapPlan) -> Result<impl Iterator<Item = MapPhoton> + use<>> {
     let PhotonBuffers { counters, map, .. } = round.photons();
     let count = commands.read(counters, 1)?[0].min(map_plan.capacity);
     Ok(commands.read(map, count as usize)?.into_iter().filter(|photon| photon.plane != NONE))
@@ -234,7 +234,7 @@ fn photons_at_once(commands: &Commands, plan: &ScenePlan) -> u32 {
 const LEAST_PHOTONS: u32 = 1 << 12;
 
 /// Writes the paths of a chunk as they leave the lights.
-pub fn emit(commands: &mut Commands, round: Round, map: &MapPlan, chunk: (u32, u32)) -> Result<()> {
+pub(crate) fn emit(commands: &mut Commands, round: Round, map: &MapPlan, chunk: (u32, u32)) -> Result<()> {
     let Round { resources, geometry, .. } = round;
     let SceneResources { scene, nonfinite_values, .. } = resources;
     let next_paths = &round.photons().paths[0];
@@ -245,7 +245,7 @@ pub fn emit(commands: &mut Commands, round: Round, map: &MapPlan, chunk: (u32, u
 
 /// One flight of the paths in list `list` of a segment, which the buffer of this parity holds.
 #[derive(Debug, Clone, Copy)]
-pub struct Flight {
+pub(crate) struct Flight {
     pub bounce: u32,
     pub list: u32,
     pub parity: usize,
@@ -253,7 +253,7 @@ pub struct Flight {
     pub is_asked: bool,
 }
 
-pub fn trace_flight(commands: &mut Commands, round: Round, map: &MapPlan, flight: Flight, extent: Extent) -> Result<()> {
+pub(crate) fn trace_flight(commands: &mut Commands, round: Round, map: &MapPlan, flight: Flight, extent: Extent) -> Result<()> {
     let Round { resources, plan, .. } = round;
     let SceneResources { scene, nonfinite_values, .. } = resources;
     let Flight { bounce, list, parity, is_asked } = flight;

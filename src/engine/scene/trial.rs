@@ -56,14 +56,14 @@ pub(super) fn photons_wanted(map: &MapPlan, share: f64) -> f64 {
 }
 
 /// The plan of a run, its default radii and its choice of lights by a trial round.
-pub fn plan(gpu: &Gpu, scene: &Scene, view: &View, settings: &SceneSettings, sensor: Sensor) -> Result<ScenePlan> {
+pub(crate) fn plan(gpu: &Gpu, scene: &Scene, view: &View, settings: &SceneSettings, sensor: Sensor) -> Result<ScenePlan> {
     let limits = engine::limits(gpu.facts());
     let trial = find(gpu, scene, view, settings, sensor)?;
     ScenePlan::with_trial(scene, view.geometry, settings, sensor, &limits, trial)
 }
 
 /// What a trial finds, where one is needed. The run itself need not fit on the device.
-pub fn find(gpu: &Gpu, scene: &Scene, view: &View, settings: &SceneSettings, sensor: Sensor) -> Result<Option<Trial>> {
+pub(crate) fn find(gpu: &Gpu, scene: &Scene, view: &View, settings: &SceneSettings, sensor: Sensor) -> Result<Option<Trial>> {
     let limits = engine::limits(gpu.facts());
     let boundless = Limits { buffer_bytes: u64::MAX, memory_bytes: u64::MAX, ..limits };
     let plan = ScenePlan::new(scene, view.geometry, settings, sensor, &boundless)?;

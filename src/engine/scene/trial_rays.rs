@@ -13,7 +13,7 @@ const RAYS: u32 = 1 << 15;
 const MOST_OF_POINT: u32 = 1 << 10;
 
 /// Pairs of a ray from a point, and of the one from what it meets: the same ray again where it meets nothing.
-pub fn cast(commands: &mut Commands, round: Round, points: &[Receiver]) -> Result<Vec<TrialRay>> {
+pub(crate) fn cast(commands: &mut Commands, round: Round, points: &[Receiver]) -> Result<Vec<TrialRay>> {
     if points.is_empty() {
         return Ok(Vec::new());
     }

@@ -10,7 +10,7 @@ use crate::records::DispatchArgs;
 
 /// How many invocations or groups a dispatch has.
 #[derive(Clone, Copy)]
-pub enum Extent<'a> {
+pub(crate) enum Extent<'a> {
     /// One invocation an item; folded into rows where the device allows too few groups along x.
     Items(u64),
     /// Groups along x and y.
@@ -34,7 +34,7 @@ pub(crate) use dispatch_by_sums;
 
 impl Commands<'_> {
     /// Runs a kernel on its buffers.
-    pub fn dispatch<K: Kernel>(&mut self, kernel: K, push: &K::Push, extent: Extent) -> Result<()> {
+    pub(crate) fn dispatch<K: Kernel>(&mut self, kernel: K, push: &K::Push, extent: Extent) -> Result<()> {
         if self.gpu.options.time_dispatches {
             return self.scope(K::MODULE.name, |commands| commands.record_dispatch(kernel, push, extent));
         }

@@ -14,26 +14,26 @@ use crate::timings::{Clock, Span};
 
 /// When a run that is interrupted ends: looked at after every submission.
 #[derive(Debug, Clone, Copy)]
-pub struct Interrupt<'a> {
+pub(crate) struct Interrupt<'a> {
     pub cancelled: &'a AtomicBool,
     pub deadline: Option<Instant>,
 }
 
 impl Interrupt<'_> {
-    pub fn is_up(&self) -> bool {
+    pub(crate) fn is_up(&self) -> bool {
         self.cancelled.load(Ordering::Relaxed) || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
     }
 }
 
 impl<'gpu> Commands<'gpu> {
     /// From now on every submission fails with [`Error::Interrupted`] once it has ended, if the interrupt is up by then.
-    pub fn set_interrupt(&mut self, interrupt: Option<Interrupt<'gpu>>) {
+    pub(crate) fn set_interrupt(&mut self, interrupt: Option<Interrupt<'gpu>>) {
         self.interrupt = interrupt;
     }
 
     /// Runs everything recorded so far and waits for it. Scopes that are open go on in the next
     /// submission; the time between the two is in none.
-    pub fn submit(&mut self) -> Result<()> {
+    pub(crate) fn submit(&mut self) -> Result<()> {
         let open: Vec<String> = self.open_scopes.iter().map(|scope| scope.name.clone()).collect();
         while !self.open_scopes.is_empty() {
             self.close_scope();

@@ -10,18 +10,18 @@ use crate::timings::Handled;
 
 /// Elements on their way to the host.
 #[must_use]
-pub struct ReadBack<T>(Option<Buffer<T>>);
+pub(crate) struct ReadBack<T>(Option<Buffer<T>>);
 
 impl<T: Pod> ReadBack<T> {
     /// The elements, once the commands that copy them have run.
-    pub fn take(self) -> Vec<T> {
+    pub(crate) fn take(self) -> Vec<T> {
         self.0.map_or_else(Vec::new, |buffer| bytemuck::pod_collect_to_vec(buffer.mapped()))
     }
 }
 
 impl Commands<'_> {
     /// Sets every 32-bit word of `count` elements of a buffer, from element `first` on.
-    pub fn fill<T>(&mut self, buffer: &Buffer<T>, first: u64, count: u64, word: u32) {
+    pub(crate) fn fill<T>(&mut self, buffer: &Buffer<T>, first: u64, count: u64, word: u32) {
         self.order(&[(buffer.any(), false, true)]);
         assert!(first + count <= buffer.count(), "{}: elements {first} to {}", buffer.any().name(), first + count);
         let element = size_of::<T>() as u64;
@@ -32,12 +32,12 @@ impl Commands<'_> {
     }
 
     /// Sets all of a buffer to zero.
-    pub fn clear<T>(&mut self, buffer: &Buffer<T>) {
+    pub(crate) fn clear<T>(&mut self, buffer: &Buffer<T>) {
         self.fill(buffer, 0, buffer.count(), 0);
     }
 
     /// Copies host data to the start of a buffer.
-    pub fn upload<T: Pod>(&mut self, buffer: &Buffer<T>, content: &[T]) -> Result<()> {
+    pub(crate) fn upload<T: Pod>(&mut self, buffer: &Buffer<T>, content: &[T]) -> Result<()> {
         if content.is_empty() {
             return Ok(());
         }
@@ -50,14 +50,14 @@ impl Commands<'_> {
     }
 
     /// A buffer on the device with this content.
-    pub fn uploaded<T: Pod>(&mut self, name: &str, content: &[T]) -> Result<Buffer<T>> {
+    pub(crate) fn uploaded<T: Pod>(&mut self, name: &str, content: &[T]) -> Result<Buffer<T>> {
         let buffer = self.gpu.buffer(name, content.len() as u64, Memory::Device)?;
         self.upload(&buffer, content)?;
         Ok(buffer)
     }
 
     /// Copies the first `count` elements of a buffer into another.
-    pub fn copy<T>(&mut self, from: &Buffer<T>, to: &Buffer<T>, count: u64) {
+    pub(crate) fn copy<T>(&mut self, from: &Buffer<T>, to: &Buffer<T>, count: u64) {
         for buffer in [from, to] {
             assert!(count <= buffer.count(), "{}: {count} elements of {}", buffer.any().name(), buffer.count());
         }
@@ -71,14 +71,14 @@ impl Commands<'_> {
     }
 
     /// Runs everything recorded so far and returns the first `count` elements of a buffer.
-    pub fn read<T: Pod>(&mut self, buffer: &Buffer<T>, count: usize) -> Result<Vec<T>> {
+    pub(crate) fn read<T: Pod>(&mut self, buffer: &Buffer<T>, count: usize) -> Result<Vec<T>> {
         let read_back = self.copy_out(buffer, count)?;
         self.submit()?;
         Ok(read_back.take())
     }
 
     /// Records a copy of the first `count` elements of a buffer to the host; after the next submission they can be taken.
-    pub fn copy_out<T: Pod>(&mut self, buffer: &Buffer<T>, count: usize) -> Result<ReadBack<T>> {
+    pub(crate) fn copy_out<T: Pod>(&mut self, buffer: &Buffer<T>, count: usize) -> Result<ReadBack<T>> {
         if count == 0 {
             return Ok(ReadBack(None));
         }

@@ -5,12 +5,12 @@ use crate::output::svg::{Axis, Chart, Series, decades, log_log};
 use crate::output::words;
 
 /// A file for each series.
-pub fn all(scale: &Scale) -> impl Iterator<Item = (String, Vec<u8>)> {
+pub(crate) fn all(scale: &Scale) -> impl Iterator<Item = (String, Vec<u8>)> {
     let measured = scale.series.iter().filter(|series| !series.steps.is_empty());
     measured.map(|series| (format!("scale-{}.svg", series.over), draw(series).as_file()))
 }
 
-pub fn draw(series: &scale::Series) -> Chart {
+pub(crate) fn draw(series: &scale::Series) -> Chart {
     let lines = series.growth.iter().enumerate().map(|(number, growth)| {
         let label = format!("{}: power {:.3} \u{b1} {:.3}", growth.pass, growth.power.value, growth.power.error);
         let points = scale::times_of(&series.steps, &growth.pass).into_iter().map(|(size, ms)| (size, ms.max(1e-6)));

@@ -16,7 +16,7 @@ use crate::settings::{Builder, Preset, RoomSettings};
 
 /// What is measured, by its name.
 #[derive(Debug, Clone, Copy)]
-pub struct Experiment {
+pub(crate) struct Experiment {
     pub name: &'static str,
     pub title: &'static str,
     measure: Measure,
@@ -33,7 +33,7 @@ const fn passes(name: &'static str, title: &'static str, measure: fn(&Lab) -> Re
 }
 
 /// The last takes all the time that is left.
-pub const ALL: [Experiment; 8] = [
+pub(crate) const ALL: [Experiment; 8] = [
     passes("open-box", "open box, 15 bounces, every builder", open_box),
     passes("builders", "the paper's workload, 2 and 15 bounces, every builder", builders),
     passes("table-1", "last row of table 1", table_1),
@@ -44,13 +44,13 @@ pub const ALL: [Experiment; 8] = [
     Experiment { name: "compaction", title: "fastest builder by photon count and survival", measure: Measure::Compaction },
 ];
 
-pub fn by_name(name: &str) -> Option<Experiment> {
+pub(crate) fn by_name(name: &str) -> Option<Experiment> {
     ALL.into_iter().find(|experiment| experiment.name == name)
 }
 
 impl Experiment {
     /// Adds what it finds to the bench.
-    pub fn run(self, lab: &mut Lab, bench: &mut Bench) -> Result<()> {
+    pub(crate) fn run(self, lab: &mut Lab, bench: &mut Bench) -> Result<()> {
         match self.measure {
             Measure::Passes(measure) => bench.passes.extend(measure(lab)?),
             Measure::Compaction => bench.compaction = Some(compaction(lab)?),

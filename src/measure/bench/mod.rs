@@ -4,15 +4,15 @@
 //! they cannot do without ([`pass`]), [`experiments`] runs the workloads, and [`scale`] follows cost and memory over
 //! photons and triangles.
 
-pub mod chart;
-pub mod experiments;
-pub mod page;
-pub mod pass;
-pub mod rates;
-pub mod room;
-pub mod scale;
-pub mod scene;
-pub mod table;
+pub(crate) mod chart;
+pub(crate) mod experiments;
+pub(crate) mod page;
+pub(crate) mod pass;
+pub(crate) mod rates;
+pub(crate) mod room;
+pub(crate) mod scale;
+pub(crate) mod scene;
+pub(crate) mod table;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -33,7 +33,7 @@ use scale::Scale;
 /// How large the workloads are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Size {
+pub(crate) enum Size {
     /// Seconds on a software device.
     Small,
     /// Minutes in all; on a software device smaller ones.
@@ -42,7 +42,7 @@ pub enum Size {
 
 /// What is asked for.
 #[derive(Debug, Clone, Serialize)]
-pub struct Request {
+pub(crate) struct Request {
     /// What repeats it.
     pub command: String,
     pub size: Size,
@@ -61,7 +61,7 @@ pub struct Request {
 
 /// Everything that was found.
 #[derive(Debug, Serialize)]
-pub struct Bench {
+pub(crate) struct Bench {
     pub photonmill: &'static str,
     pub request: Request,
     pub device: String,
@@ -77,7 +77,7 @@ pub struct Bench {
 }
 
 /// What experiments share.
-pub struct Lab<'a> {
+pub(crate) struct Lab<'a> {
     pub gpu: &'a Gpu,
     pub rates: Rates,
     pub scene: Option<&'a Scene>,
@@ -89,12 +89,12 @@ pub struct Lab<'a> {
 
 impl Lab<'_> {
     /// Whether workloads are cut to what a processor does.
-    pub fn is_cpu(&self) -> bool {
+    pub(crate) fn is_cpu(&self) -> bool {
         self.gpu.facts().kind == "cpu"
     }
 
     /// The number for a small run, for a processor, and for a card.
-    pub fn choose<T>(&self, small: T, on_cpu: T, full: T) -> T {
+    pub(crate) fn choose<T>(&self, small: T, on_cpu: T, full: T) -> T {
         match (self.size, self.is_cpu()) {
             (Size::Small, _) => small,
             (Size::Full, true) => on_cpu,
@@ -103,23 +103,23 @@ impl Lab<'_> {
     }
 
     /// Of a picture in which the scene matters more than its points.
-    pub fn image_size(&self) -> (u32, u32) {
+    pub(crate) fn image_size(&self) -> (u32, u32) {
         self.choose((32, 32), (128, 128), (512, 512))
     }
 
     /// Fails once the bench is interrupted.
-    pub fn go_on(&self) -> Result<()> {
+    pub(crate) fn go_on(&self) -> Result<()> {
         if self.cancelled.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(()) }
     }
 
-    pub fn is_late(&self) -> bool {
+    pub(crate) fn is_late(&self) -> bool {
         Instant::now() >= self.deadline
     }
 }
 
 /// Measures the device, then the experiments that are asked for. Experiments that were complete when it was
 /// interrupted are kept.
-pub fn run(gpu: &Gpu, request: Request, cancelled: &AtomicBool, tell: &mut dyn FnMut(&str)) -> Result<Bench> {
+pub(crate) fn run(gpu: &Gpu, request: Request, cancelled: &AtomicBool, tell: &mut dyn FnMut(&str)) -> Result<Bench> {
     room::check_clock(gpu)?;
     let deadline = Instant::now() + request.budget;
     tell("limits of the device");
@@ -172,7 +172,7 @@ fn measure(lab: &mut Lab, bench: &mut Bench) -> Result<()> {
 }
 
 impl Bench {
-    pub fn json(&self) -> Vec<u8> {
+    pub(crate) fn json(&self) -> Vec<u8> {
         let mut text = serde_json::to_vec_pretty(self).expect("a bench is plain data");
         text.push(b'\n');
         text
@@ -180,7 +180,7 @@ impl Bench {
 }
 
 /// Writes the report and its charts.
-pub fn write(folder: &Folder, bench: &Bench) -> Result<()> {
+pub(crate) fn write(folder: &Folder, bench: &Bench) -> Result<()> {
     let mut files = vec![
         (folder.file("index.html"), page::html(bench).into_bytes()),
         (folder.file("bench.json"), bench.json()),

@@ -9,7 +9,7 @@ use crate::measure::compaction;
 use crate::output::page::{chart, page, table};
 use crate::output::words::duration;
 
-pub fn html(bench: &Bench) -> String {
+pub(crate) fn html(bench: &Bench) -> String {
     let title = format!("Speed of photonmill on {}", bench.device);
     let content = html! {
         header {

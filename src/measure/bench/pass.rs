@@ -13,7 +13,7 @@ use crate::timings::{Clock, Spread, Timings};
 /// nothing is kept from one dispatch to the next, and the arithmetic of its formulas. Atomics, order of access and
 /// divergence cost more, and are what the fraction of the limit shows.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
-pub struct Cost {
+pub(crate) struct Cost {
     pub bytes: f64,
     /// Sums, products and comparisons of floats; quotients, roots and angles count as [`SLOW_OPERATION`] each.
     pub float_operations: f64,
@@ -22,17 +22,17 @@ pub struct Cost {
 }
 
 /// Of a record.
-pub fn bytes<T>() -> f64 {
+pub(crate) fn bytes<T>() -> f64 {
     size_of::<T>() as f64
 }
 
 /// Of a prefix sum: down its levels and up again.
-pub fn scan_dispatches(items: u32, group_size: u32) -> f64 {
+pub(crate) fn scan_dispatches(items: u32, group_size: u32) -> f64 {
     2.0 * block_sum_counts(u64::from(items) + 1, group_size).len() as f64 - 1.0
 }
 
 /// Sums and products that a quotient, a root or an angle is made of, roughly.
-pub const SLOW_OPERATION: f64 = 8.0;
+pub(crate) const SLOW_OPERATION: f64 = 8.0;
 
 impl Add for Cost {
     type Output = Cost;
@@ -49,7 +49,7 @@ impl Add for Cost {
 /// What bounds a pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Bound {
+pub(crate) enum Bound {
     Bytes,
     Floats,
     Integers,
@@ -58,7 +58,7 @@ pub enum Bound {
 
 /// The roofline (Williams, Waterman and Patterson 2009): the least time that the scarcest of a device's means allows.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Limit {
+pub(crate) struct Limit {
     pub ms: f64,
     pub by: Bound,
 }
@@ -66,7 +66,7 @@ pub struct Limit {
 impl Cost {
     /// By the best rates that were measured: a device that was disturbed can do no less for it. `dispatches` wait for
     /// each other and share the bytes, so that those of each may fit a cache.
-    pub fn limit(&self, dispatches: f64, rates: &Rates) -> Limit {
+    pub(crate) fn limit(&self, dispatches: f64, rates: &Rates) -> Limit {
         let ms = |amount: f64, rate: f64| 1e3 * amount / rate;
         [
             (ms(self.bytes, rates.most_bytes(self.bytes / dispatches)), Bound::Bytes),
@@ -83,7 +83,7 @@ impl Cost {
 
 /// What a pass does in a round.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Work {
+pub(crate) struct Work {
     /// In the plural.
     pub item: &'static str,
     pub items: f64,
@@ -94,7 +94,7 @@ pub struct Work {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Pass {
+pub(crate) struct Pass {
     pub workload: String,
     /// As the timing table has it, without the round.
     pub name: String,
@@ -110,7 +110,7 @@ pub struct Pass {
 }
 
 impl Pass {
-    pub fn new(workload: &str, name: &str, ms: Spread, work: Option<Work>, rates: &Rates) -> Pass {
+    pub(crate) fn new(workload: &str, name: &str, ms: Spread, work: Option<Work>, rates: &Rates) -> Pass {
         let seconds = 1e-3 * ms.median;
         let limit = work.map(|work| work.cost.limit(work.dispatches, rates));
         Pass {
@@ -150,7 +150,7 @@ fn runs_of(timings: &Timings) -> BTreeMap<&str, Vec<f64>> {
 
 /// Device milliseconds of each round from number `first` on for every scope within it, in the order of the timing table.
 /// Scopes that differ by a number at the end (`bounce 3`) are one.
-pub fn rounds_of(timings: &Timings, rounds: u32, first: u32) -> Vec<(String, Vec<f64>)> {
+pub(crate) fn rounds_of(timings: &Timings, rounds: u32, first: u32) -> Vec<(String, Vec<f64>)> {
     let runs = runs_of(timings);
     let mut scopes: Vec<(String, Vec<f64>)> = Vec::new();
     for row in timings.rows() {
@@ -175,12 +175,12 @@ pub fn rounds_of(timings: &Timings, rounds: u32, first: u32) -> Vec<(String, Vec
 }
 
 /// Sum of the outermost scopes: all of a round.
-pub fn sum_of_outermost(scopes: &[(String, Vec<f64>)]) -> f64 {
+pub(crate) fn sum_of_outermost(scopes: &[(String, Vec<f64>)]) -> f64 {
     scopes.iter().filter(|(name, _)| !name.contains('/')).map(|(_, values)| median(values.clone())).sum()
 }
 
 /// Not a number for no value at all.
-pub fn median(values: Vec<f64>) -> f64 {
+pub(crate) fn median(values: Vec<f64>) -> f64 {
     Spread::of(values).map_or(f64::NAN, |spread| spread.median)
 }
 

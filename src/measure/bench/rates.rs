@@ -15,7 +15,7 @@ use crate::timings::{Clock, Spread};
 
 /// Rates of a device, each a second.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Rates {
+pub(crate) struct Rates {
     /// Dispatches of one work group that wait for each other, in one submission.
     pub dispatches: Spread,
     /// Of the largest, far larger than caches, down to one that caches may hold.
@@ -36,7 +36,7 @@ pub struct Rates {
 
 /// Bytes a second, read and written, of a copy that moves so many in all.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct CopyRate {
+pub(crate) struct CopyRate {
     pub moved_bytes: u64,
     #[serde(flatten)]
     pub rate: Spread,
@@ -44,7 +44,7 @@ pub struct CopyRate {
 
 impl Rates {
     /// The most bytes a second at which so many can be moved: a device that moves more of them as fast can do that.
-    pub fn most_bytes(&self, moved: f64) -> f64 {
+    pub(crate) fn most_bytes(&self, moved: f64) -> f64 {
         let [largest, smaller @ ..] = &self.copies;
         let as_large = smaller.iter().filter(|copy| copy.moved_bytes as f64 >= moved);
         as_large.map(|copy| copy.rate.max).fold(largest.rate.max, f64::max)
@@ -52,7 +52,7 @@ impl Rates {
 }
 
 /// Products of integers in a block of Philox4x32-10.
-pub const PHILOX_PRODUCTS: u32 = 20;
+pub(crate) const PHILOX_PRODUCTS: u32 = 20;
 /// Sums and products of a step of `measure_float.comp`.
 const FLOAT_OPERATIONS: u32 = 16;
 const STEPS: u32 = 1024;
@@ -94,7 +94,7 @@ impl Amounts {
 const REPEATS: usize = 11;
 
 /// Measures a device. A card that idled is warmed up first, by time.
-pub fn measure(gpu: &Gpu, size: Size) -> Result<Rates> {
+pub(crate) fn measure(gpu: &Gpu, size: Size) -> Result<Rates> {
     let Amounts { blocks: block_count, items, accesses, warm_up } = Amounts::of(gpu, size);
     let mut commands = Commands::new(gpu, Constants::new(GROUP_SIZE), Instant::now())?;
     let blocks = &gpu.buffer::<[u32; 4]>("blocks", u64::from(block_count), Memory::Device)?;

@@ -22,7 +22,7 @@ use crate::timings::Spread;
 
 /// What photons did in a round, on average over all.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Counts {
+pub(crate) struct Counts {
     pub emitted: f64,
     /// Paths that entered a bounce.
     pub flights: f64,
@@ -33,7 +33,7 @@ pub struct Counts {
 }
 
 impl Counts {
-    pub fn of(fates: &Fates, rounds: u32) -> Counts {
+    pub(crate) fn of(fates: &Fates, rounds: u32) -> Counts {
         let sum = |count: &dyn Fn(usize) -> u64| (0..fates.bounces.len()).map(count).sum::<u64>() as f64 / f64::from(rounds.max(1));
         let bounces = &fates.bounces;
         Counts {
@@ -46,7 +46,7 @@ impl Counts {
 }
 
 /// A run under the clock.
-pub struct Timed {
+pub(crate) struct Timed {
     pub passes: Vec<Pass>,
     pub counts: Counts,
     /// Of a round, all passes together.
@@ -61,7 +61,7 @@ pub struct Timed {
 
 impl Timed {
     /// Of a run's rounds from number `first` on, beside the work that each pass needs.
-    pub fn of<Plan, Film>(
+    pub(crate) fn of<Plan, Film>(
         run: &run::RunResult<Plan, Film>,
         (rounds, first): (u32, u32),
         workload: &str,
@@ -84,24 +84,24 @@ impl Timed {
 }
 
 /// Rounds that count.
-pub const REPEATS: u32 = 7;
+pub(crate) const REPEATS: u32 = 7;
 /// Rounds before them: the first fills caches.
-pub const DROPPED: u32 = 1;
+pub(crate) const DROPPED: u32 = 1;
 
 /// Fails where nothing can be timed, or the run was interrupted.
-pub fn check_clock(gpu: &Gpu) -> Result<()> {
+pub(crate) fn check_clock(gpu: &Gpu) -> Result<()> {
     if gpu.facts().timestamp_bits == 0 {
         return Err(Error::setting("--device", &gpu.facts().name, "has no timestamps, so its passes cannot be timed; choose another"));
     }
     Ok(())
 }
 
-pub fn run_once(gpu: &Gpu, settings: &RoomSettings, cancelled: &AtomicBool) -> Result<RunResult> {
+pub(crate) fn run_once(gpu: &Gpu, settings: &RoomSettings, cancelled: &AtomicBool) -> Result<RunResult> {
     room::on_gpu(gpu, &open_box(settings), settings, &mut Control::quiet(cancelled))?.finished()
 }
 
 /// Times the passes of a builder: [`REPEATS`] rounds of one run, after [`DROPPED`] others.
-pub fn time(gpu: &Gpu, rates: &Rates, settings: &RoomSettings, cancelled: &AtomicBool) -> Result<Timed> {
+pub(crate) fn time(gpu: &Gpu, rates: &Rates, settings: &RoomSettings, cancelled: &AtomicBool) -> Result<Timed> {
     let rounds = DROPPED + REPEATS;
     gpu.forget_peaks();
     let outcome = run_once(gpu, &RoomSettings { rounds, ..settings.clone() }, cancelled)?;
@@ -109,7 +109,7 @@ pub fn time(gpu: &Gpu, rates: &Rates, settings: &RoomSettings, cancelled: &Atomi
 }
 
 /// Times a run as it is, all rounds; a first one is dropped.
-pub fn time_run(gpu: &Gpu, rates: &Rates, settings: &RoomSettings, cancelled: &AtomicBool) -> Result<Timed> {
+pub(crate) fn time_run(gpu: &Gpu, rates: &Rates, settings: &RoomSettings, cancelled: &AtomicBool) -> Result<Timed> {
     run_once(gpu, settings, cancelled)?;
     gpu.forget_peaks();
     let outcome = run_once(gpu, settings, cancelled)?;
@@ -162,7 +162,7 @@ fn products(rng: Rng, draws: f64) -> f64 {
 /// What a pass of the paper's line cannot do without in a round.
 ///
 /// `found` photons lie within the radius of a point; `None` for what nobody has counted.
-pub fn work(pass: &str, plan: &RoomPlan, counts: &Counts, found: f64) -> Option<Work> {
+pub(crate) fn work(pass: &str, plan: &RoomPlan, counts: &Counts, found: f64) -> Option<Work> {
     let settings = &plan.settings;
     let slots = counts.emitted * f64::from(settings.bounces);
     let (cells, points) = (f64::from(plan.grid.cells()), plan.points.len() as f64);

@@ -19,7 +19,7 @@ use crate::timings::Spread;
 
 /// A size and what it cost.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Step {
+pub(crate) struct Step {
     /// Photons of the run, or triangles of the scene.
     pub size: u64,
     /// Of the whole run, or of a round of the scene.
@@ -30,14 +30,14 @@ pub struct Step {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct PassTime {
+pub(crate) struct PassTime {
     pub pass: String,
     pub ms: Spread,
 }
 
 /// Cost over size of one pass.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Growth {
+pub(crate) struct Growth {
     pub pass: String,
     /// Of sizes from this one on: smaller ones cost what a launch does.
     pub from: u64,
@@ -49,7 +49,7 @@ pub struct Growth {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Series {
+pub(crate) struct Series {
     /// What is counted.
     pub over: &'static str,
     pub steps: Vec<Step>,
@@ -57,12 +57,12 @@ pub struct Series {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Scale {
+pub(crate) struct Scale {
     pub series: Vec<Series>,
 }
 
 /// Sizes for which no time was left are named in `left_out`.
-pub fn measure(lab: &mut Lab, left_out: &mut Vec<String>) -> Result<Scale> {
+pub(crate) fn measure(lab: &mut Lab, left_out: &mut Vec<String>) -> Result<Scale> {
     let photons = if lab.is_cpu() { lab.choose(3..=6, 3..=7, 3..=7) } else { lab.choose(5..=8, 5..=8, 5..=10) };
     let triangles = if lab.is_cpu() { lab.choose(1..=4, 1..=6, 1..=6) } else { 1..=6 };
     let photons = steps(lab, left_out, "photons", photons, of_photons)?;
@@ -112,7 +112,7 @@ impl Series {
 }
 
 /// Sizes and milliseconds of a pass.
-pub fn times_of(steps: &[Step], pass: &str) -> Vec<(f64, f64)> {
+pub(crate) fn times_of(steps: &[Step], pass: &str) -> Vec<(f64, f64)> {
     let time = |step: &Step| Some((step.size as f64, step.passes.iter().find(|known| known.pass == pass)?.ms.median));
     steps.iter().filter_map(time).collect()
 }
@@ -192,11 +192,11 @@ fn of_triangles(lab: &Lab, size: u64) -> Result<Step> {
     })
 }
 
-pub const BALL_ROOM: &str = "a ball in a room";
+pub(crate) const BALL_ROOM: &str = "a ball in a room";
 
 /// The Cornell box with a diffuse ball in place of its blocks, of about so many triangles in all: 12, and s (s - 2) of a
 /// ball of s meridians.
-pub fn ball_room(triangles: u32) -> Scene {
+pub(crate) fn ball_room(triangles: u32) -> Scene {
     let mut scene = built_in::by_name("cornell").expect("it is built in");
     scene.name = BALL_ROOM.to_owned();
     scene.meshes.retain(|mesh| !mesh.name.ends_with("block"));
@@ -209,7 +209,7 @@ pub fn ball_room(triangles: u32) -> Scene {
 
 /// A slope and its standard error.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Slope {
+pub(crate) struct Slope {
     pub value: f64,
     pub error: f64,
 }

@@ -25,12 +25,12 @@ use crate::settings::Builder;
 use crate::settings::scene::{Effect, SceneSettings};
 
 /// A built-in scene.
-pub fn named(name: &str) -> PreparedScene {
+pub(crate) fn named(name: &str) -> PreparedScene {
     PreparedScene::new(built_in::by_name(name).expect("it is built in"))
 }
 
 /// A scene, what looks at it, and how.
-pub struct Job<'a> {
+pub(crate) struct Job<'a> {
     pub name: &'a str,
     pub scene: &'a PreparedScene,
     pub size: (u32, u32),
@@ -39,7 +39,7 @@ pub struct Job<'a> {
 
 impl Job<'_> {
     /// What the first camera sees, and how that is found without a trial round: radii are those by the scene's area.
-    pub fn prepare(&self, gpu: &Gpu, settings: &SceneSettings) -> Result<(Prepared, ScenePlan)> {
+    pub(crate) fn prepare(&self, gpu: &Gpu, settings: &SceneSettings) -> Result<(Prepared, ScenePlan)> {
         let prepared = self.scene.prepare_with(settings, Target::Picture(&self.scene.scene.first_camera(), self.size.into()))?;
         let plan = prepared.plan_within(&engine::limits(gpu.facts()))?;
         Ok((prepared, plan))
@@ -48,7 +48,7 @@ impl Job<'_> {
 
 /// What a map of the first round holds.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Survey {
+pub(crate) struct Survey {
     /// Entries of the map.
     pub stored: f64,
     /// Entries within the radius of a visible point and on its plane, on average over those that ask.
@@ -57,7 +57,7 @@ pub struct Survey {
 }
 
 /// Traces the first round's photons of a map and looks at it from the host: it reads buffers that a run keeps to itself.
-pub fn survey(gpu: &Gpu, job: &Job, map: impl Fn(&ScenePlan) -> Option<&MapPlan>) -> Result<Option<Survey>> {
+pub(crate) fn survey(gpu: &Gpu, job: &Job, map: impl Fn(&ScenePlan) -> Option<&MapPlan>) -> Result<Option<Survey>> {
     let (prepared, plan) = job.prepare(gpu, &job.settings)?;
     let geometry = &*prepared.geometry;
     let Some(map) = map(&plan) else { return Ok(None) };
@@ -98,7 +98,7 @@ const SAMPLES: usize = 256;
 
 /// Times the passes of a scene: [`REPEATS`] rounds of one run, after [`DROPPED`] others. Radii stay. On a
 /// card the fastest of `RUNS` counts: its clock may fall for a second or so by what others do on the same machine.
-pub fn time(gpu: &Gpu, rates: &Rates, job: &Job, cancelled: &AtomicBool) -> Result<Timed> {
+pub(crate) fn time(gpu: &Gpu, rates: &Rates, job: &Job, cancelled: &AtomicBool) -> Result<Timed> {
     let runs = if gpu.facts().kind == "cpu" { 1 } else { RUNS };
     let timed = (0..runs).map(|_| time_once(gpu, rates, job, cancelled)).collect::<Result<Vec<Timed>>>()?;
     Ok(timed.into_iter().min_by(|a, b| a.round_ms.total_cmp(&b.round_ms)).expect("there was a run"))
@@ -244,7 +244,7 @@ impl Model<'_> {
 }
 
 /// Radius, metres, at which a map of so many entries spread over a scene's surfaces gives so many an estimate.
-pub fn radius_for(geometry: &Geometry, survey: &Survey, radius: f64, wanted: f64) -> f64 {
+pub(crate) fn radius_for(geometry: &Geometry, survey: &Survey, radius: f64, wanted: f64) -> f64 {
     let by_area = (wanted * geometry.area / (PI * survey.stored.max(1.0))).sqrt() * geometry.unit;
     if survey.per_estimate > 0.0 { radius * (wanted / survey.per_estimate).sqrt() } else { by_area }
 }

@@ -7,7 +7,7 @@ use super::scale::{Growth, PassTime, Series};
 use crate::output::words::lower_case;
 use crate::timings::Spread;
 
-pub fn text(bench: &Bench) -> String {
+pub(crate) fn text(bench: &Bench) -> String {
     let mut text = format!("{}, driver {}, Vulkan {}\n{}\n\n", bench.device, bench.driver, bench.vulkan, bench.request.command);
     rates(&mut text, &bench.rates);
     passes(&mut text, &bench.passes);

@@ -27,7 +27,7 @@ const TOP: i32 = 16;
 
 /// Photons to the right, survival upwards, a scene on top; in each cell the fastest builder, its speed-up over one atomic per thread, and,
 /// in small letters, the builders that are not significantly slower.
-pub fn draw(map: &Map) -> Chart {
+pub(crate) fn draw(map: &Map) -> Chart {
     let (sizes, rows) = (map.sizes(), map.rows());
     let width = LEFT + FIELD.0 * sizes.len() as i32 + 16;
     let height = TOP + FIELD.1 * rows.len() as i32 + 56;

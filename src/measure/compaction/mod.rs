@@ -1,7 +1,7 @@
 //! The paper's question on today's devices: which builder stores survivors fastest, by photon count and survival. All
 //! builders trace the same photons, which is checked, so that a difference in time has one cause.
 
-pub mod chart;
+pub(crate) mod chart;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -32,7 +32,7 @@ use crate::timings::Spread;
 
 /// What is asked for.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Request {
+pub(crate) struct Request {
     /// Shares of the paths that every bounce in a closed room lets go on.
     pub survivals: Vec<f32>,
     /// Photons, fewest first.
@@ -46,7 +46,7 @@ pub struct Request {
 
 impl Request {
     /// Powers of four from 2^12 up to `most` photons, survival from 5 to 95 %.
-    pub fn up_to(most: u32, budget: Duration) -> Request {
+    pub(crate) fn up_to(most: u32, budget: Duration) -> Request {
         let sizes = (6..=14).map(|power| 1 << (2 * power)).filter(|photons| *photons <= most.max(1 << 12)).collect();
         Request { survivals: vec![0.05, 0.25, 0.5, 0.75, 0.95], sizes, bounces: 15, turns: 3, budget }
     }
@@ -54,7 +54,7 @@ impl Request {
 
 /// The fastest builder by photon count and survival.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Map {
+pub(crate) struct Map {
     pub device: String,
     pub driver: String,
     pub bounces: u32,
@@ -65,7 +65,7 @@ pub struct Map {
 
 /// One number of photons at one survival.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Cell {
+pub(crate) struct Cell {
     /// Name of the scene; `None`: the closed room.
     pub scene: Option<String>,
     /// Share of the paths that a bounce lets go on; of a scene over all bounces.
@@ -82,7 +82,7 @@ pub struct Cell {
 /// How far builders were compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Agreed {
+pub(crate) enum Agreed {
     /// Every photon stored, to the bit.
     Photons,
     /// Fates of all photons, bounce by bounce; the photons themselves are too many to be brought together.
@@ -91,7 +91,7 @@ pub enum Agreed {
 
 /// What a builder took.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Timed {
+pub(crate) struct Timed {
     pub builder: Builder,
     /// Milliseconds of the device to trace and store all photons.
     pub ms: Spread,
@@ -109,7 +109,13 @@ enum Place<'a> {
 }
 
 /// Measures all builders at all sizes, in a closed room of each survival and in a scene.
-pub fn measure(gpu: &Gpu, request: &Request, scene: Option<&Scene>, cancelled: &AtomicBool, tell: &mut dyn FnMut(&str)) -> Result<Map> {
+pub(crate) fn measure(
+    gpu: &Gpu,
+    request: &Request,
+    scene: Option<&Scene>,
+    cancelled: &AtomicBool,
+    tell: &mut dyn FnMut(&str),
+) -> Result<Map> {
     let began = Instant::now();
     let facts = gpu.facts();
     let mut map =
@@ -314,38 +320,38 @@ fn global_map(plan: &ScenePlan) -> &MapPlan {
 }
 
 impl Cell {
-    pub fn of(&self, builder: Builder) -> &Timed {
+    pub(crate) fn of(&self, builder: Builder) -> &Timed {
         self.builders.iter().find(|timed| timed.builder == builder).expect("every builder was timed")
     }
 
     /// The fastest builder, and those not significantly slower: their fastest run is no slower than its slowest.
-    pub fn winners(&self) -> impl Iterator<Item = Builder> {
+    pub(crate) fn winners(&self) -> impl Iterator<Item = Builder> {
         let slowest = self.builders[0].ms.max;
         self.builders.iter().filter(move |timed| timed.ms.min <= slowest).map(|timed| timed.builder)
     }
 
     /// How many times longer the paper's modified builder takes than the fastest.
-    pub fn gain(&self) -> f64 {
+    pub(crate) fn gain(&self) -> f64 {
         self.of(Builder::Atomic).ms.median / self.builders[0].ms.median
     }
 }
 
 impl Map {
-    pub fn sizes(&self) -> Vec<u32> {
+    pub(crate) fn sizes(&self) -> Vec<u32> {
         let mut sizes: Vec<u32> = self.cells.iter().map(|cell| cell.photons).collect();
         sizes.dedup();
         sizes
     }
 
     /// The cells of each row, a room's survivals first, then the scene: as many as sizes.
-    pub fn rows(&self) -> Vec<Vec<&Cell>> {
+    pub(crate) fn rows(&self) -> Vec<Vec<&Cell>> {
         let sizes = self.sizes();
         let rows = self.cells.len() / sizes.len().max(1);
         (0..rows).map(|row| self.cells.iter().skip(row).step_by(rows).collect()).collect()
     }
 
     /// A line for each cell: the fastest builder, those not significantly slower, and every builder's time relative to it.
-    pub fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         let mut text = format!(
             "{:>12} {:>9} {:>14} {:>8} {:>10}  {}\n",
             "photons", "survival", "survivors", "compared", "best, ms", "time relative to the best"

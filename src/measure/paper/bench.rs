@@ -14,7 +14,7 @@ use crate::text::counted;
 
 /// What the times were measured on.
 #[derive(Debug, Clone)]
-pub struct Device {
+pub(crate) struct Device {
     pub name: String,
     pub driver: String,
     pub has_timestamps: bool,
@@ -22,7 +22,7 @@ pub struct Device {
     pub is_cpu: bool,
 }
 
-pub struct Bench<'a> {
+pub(crate) struct Bench<'a> {
     gpu: Option<&'a Gpu>,
     cancelled: &'a AtomicBool,
     /// Told one line an experiment.
@@ -33,23 +33,23 @@ pub struct Bench<'a> {
 
 /// A case is not repeated once its runs have taken this long. Four runs of 7 s fit, three of which count, as an interval
 /// needs them.
-pub const PATIENCE: Duration = Duration::from_secs(24);
+pub(crate) const PATIENCE: Duration = Duration::from_secs(24);
 
 impl<'a> Bench<'a> {
-    pub fn new(gpu: Option<&'a Gpu>, cancelled: &'a AtomicBool, progress: &'a mut dyn FnMut(&str)) -> Bench<'a> {
+    pub(crate) fn new(gpu: Option<&'a Gpu>, cancelled: &'a AtomicBool, progress: &'a mut dyn FnMut(&str)) -> Bench<'a> {
         Bench { gpu, cancelled, progress, begun: 0, expected: 0 }
     }
 
-    pub fn has_gpu(&self) -> bool {
+    pub(crate) fn has_gpu(&self) -> bool {
         self.gpu.is_some()
     }
 
     /// The builder that stands for `builder` here.
-    pub fn available(&self, builder: Builder) -> Builder {
+    pub(crate) fn available(&self, builder: Builder) -> Builder {
         if self.has_gpu() { builder } else { Builder::Cpu }
     }
 
-    pub fn device(&self) -> Option<Device> {
+    pub(crate) fn device(&self) -> Option<Device> {
         self.gpu.map(Gpu::facts).map(|facts| Device {
             name: facts.name.clone(),
             driver: facts.driver.clone(),
@@ -59,12 +59,12 @@ impl<'a> Bench<'a> {
     }
 
     /// Sets how many experiments there will be.
-    pub fn expect(&mut self, experiments: usize) {
+    pub(crate) fn expect(&mut self, experiments: usize) {
         self.expected = experiments;
     }
 
     /// Begins an experiment, unless the user has had enough.
-    pub fn begin(&mut self, title: &str) -> Result<()> {
+    pub(crate) fn begin(&mut self, title: &str) -> Result<()> {
         if self.cancelled.load(Ordering::Relaxed) {
             return Err(Error::Interrupted);
         }
@@ -74,14 +74,14 @@ impl<'a> Bench<'a> {
     }
 
     /// One run to its last photon.
-    pub fn run(&self, settings: &RoomSettings) -> Result<RunResult> {
+    pub(crate) fn run(&self, settings: &RoomSettings) -> Result<RunResult> {
         room::run(self.gpu, &open_box(settings), settings, &mut Control::quiet(self.cancelled))?.finished()
     }
 
     /// `repeats` runs of every case after one that is dropped, as it makes pipelines and fills caches; in turn, so that a
     /// clock that drifts touches all alike. A case that is slow is repeated less, and one whose first run alone is slow
     /// keeps that.
-    pub fn repeat_interleaved(&self, cases: &[RoomSettings], repeats: usize) -> Result<Vec<Vec<RunResult>>> {
+    pub(crate) fn repeat_interleaved(&self, cases: &[RoomSettings], repeats: usize) -> Result<Vec<Vec<RunResult>>> {
         let mut outcomes = vec![Vec::new(); cases.len()];
         let mut spent = vec![Duration::ZERO; cases.len()];
         for turn in 0..=repeats {
@@ -103,7 +103,7 @@ impl<'a> Bench<'a> {
 }
 
 /// The host's processor, as Linux calls it; elsewhere its architecture.
-pub fn processor() -> String {
+pub(crate) fn processor() -> String {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let listed = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = listed.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": ").map(|(_, name)| name.trim().to_owned()));

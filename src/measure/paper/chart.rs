@@ -11,7 +11,7 @@ use crate::output::words;
 use crate::settings::Gather;
 
 /// Time against photons, both logarithmic, of table 1.
-pub fn totals(found: &Reproduction) -> Option<Chart> {
+pub(crate) fn totals(found: &Reproduction) -> Option<Chart> {
     let published = published::TABLE_1.map(|(rounds, ms)| (f64::from(rounds * published::PHOTONS), ms));
     let names = ["here, brute force", "here, grid", "here, grid, large rounds"];
     let here = series(&found.request).into_iter().zip(names).zip(1..).map(|(((photons, gather), name), colour)| {
@@ -32,7 +32,7 @@ struct Row {
 }
 
 /// Both passes of every builder at the paper's size, each beside what the paper measured.
-pub fn running_times(found: &Reproduction) -> Option<Chart> {
+pub(crate) fn running_times(found: &Reproduction) -> Option<Chart> {
     let row = |implementation: Implementation, pass: Pass| {
         let time = found.running_time(published::PHOTONS, published::BOUNCES, implementation, pass)?;
         let grid = if pass == Pass::Rendering(Gather::Grid) { ", grid" } else { "" };

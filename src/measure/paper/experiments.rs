@@ -15,18 +15,18 @@ use crate::timings::{Clock, Spread};
 
 /// Who builds the photon map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Implementation {
+pub(crate) struct Implementation {
     pub builder: Builder,
     /// Threads of the CPU builder.
     pub threads: usize,
 }
 
 impl Implementation {
-    pub fn of(builder: Builder) -> Implementation {
+    pub(crate) fn of(builder: Builder) -> Implementation {
         Implementation { builder, threads: 1 }
     }
 
-    pub fn name(self) -> String {
+    pub(crate) fn name(self) -> String {
         match self.threads {
             1 => self.builder.name().to_owned(),
             threads => format!("{} x{threads}", self.builder.name()),
@@ -34,7 +34,7 @@ impl Implementation {
     }
 
     /// The same in the paper's words.
-    pub fn described(self) -> String {
+    pub(crate) fn described(self) -> String {
         match self.builder {
             Builder::Naive => "naive (slots)".to_owned(),
             Builder::Atomic => "modified (atomic)".to_owned(),
@@ -46,7 +46,7 @@ impl Implementation {
 
 /// One combination of section 4.3's comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Case {
+pub(crate) struct Case {
     pub photons: u32,
     pub bounces: u32,
     pub implementation: Implementation,
@@ -55,7 +55,7 @@ pub struct Case {
 
 /// The paper's two passes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Pass {
+pub(crate) enum Pass {
     /// Emission and bounces: the photon map.
     Map,
     /// Density estimation at every point of the mesh, building the grid included where there is one.
@@ -63,14 +63,14 @@ pub enum Pass {
 }
 
 impl Pass {
-    pub const ALL: [Pass; 3] = [Pass::Map, Pass::Rendering(Gather::Brute), Pass::Rendering(Gather::Grid)];
+    pub(crate) const ALL: [Pass; 3] = [Pass::Map, Pass::Rendering(Gather::Brute), Pass::Rendering(Gather::Grid)];
 
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         if self == Pass::Map { "map" } else { "rendering" }
     }
 
     /// `None` for the map pass, which comes before any gathering.
-    pub fn gather(self) -> Option<Gather> {
+    pub(crate) fn gather(self) -> Option<Gather> {
         match self {
             Pass::Map => None,
             Pass::Rendering(gather) => Some(gather),
@@ -80,7 +80,7 @@ impl Pass {
 
 /// One pass of one case, measured.
 #[derive(Debug, Clone)]
-pub struct RunningTime {
+pub(crate) struct RunningTime {
     pub photons: u32,
     pub bounces: u32,
     pub implementation: Implementation,
@@ -96,7 +96,7 @@ pub struct RunningTime {
 
 /// A whole run, for table 1.
 #[derive(Debug, Clone)]
-pub struct TotalTime {
+pub(crate) struct TotalTime {
     pub photons_per_round: u32,
     pub rounds: u32,
     pub gather: Gather,
@@ -109,21 +109,21 @@ pub struct TotalTime {
 
 /// An experiment that was not run because it would take too long, and its predicted time.
 #[derive(Debug, Clone)]
-pub struct LeftOut {
+pub(crate) struct LeftOut {
     pub what: String,
     pub predicted_ms: f64,
 }
 
 /// A rendering pass that is predicted to take longer is left out.
-pub const LONGEST_PASS_MS: f64 = 20_000.0;
+pub(crate) const LONGEST_PASS_MS: f64 = 20_000.0;
 /// A row that is shorter is run once before it counts, as it makes pipelines.
 const SHORT_TOTAL_MS: f64 = 1_000.0;
 /// Runs that count at the large size, at most.
-pub const LARGE_REPEATS: usize = 3;
+pub(crate) const LARGE_REPEATS: usize = 3;
 const BOUNCES: [u32; 2] = [published::BOUNCES, 15];
 
 /// Experiments that [`running_times`] and [`totals`] will announce, unless some are left out.
-pub fn count(bench: &Bench, request: &Request) -> usize {
+pub(crate) fn count(bench: &Bench, request: &Request) -> usize {
     cases(bench, request).len() + series(request).len() * published::TABLE_1.len()
 }
 
@@ -147,7 +147,7 @@ impl Case {
 }
 
 /// What repeats an experiment.
-pub fn command(request: &RenderRequest) -> String {
+pub(crate) fn command(request: &RenderRequest) -> String {
     command_line("", &request.brief(), &[])
 }
 
@@ -180,7 +180,7 @@ fn sizes(request: &Request) -> [(u32, u32); 4] {
 }
 
 /// Both passes of every case. Builders are measured in turn, the GPU's apart from the CPU's, during which a card idles.
-pub fn running_times(bench: &mut Bench, found: &mut Reproduction) -> Result<()> {
+pub(crate) fn running_times(bench: &mut Bench, found: &mut Reproduction) -> Result<()> {
     let all = cases(bench, &found.request);
     let alike = |a: &Case, b: &Case| {
         (a.photons, a.bounces, a.gather, a.implementation.builder == Builder::Cpu)
@@ -241,17 +241,17 @@ fn predicted(case: &Case, found: &Reproduction) -> Option<f64> {
 }
 
 /// (photons of a round, gather) of the rows of table 1.
-pub fn series(request: &Request) -> [(u32, Gather); 3] {
+pub(crate) fn series(request: &Request) -> [(u32, Gather); 3] {
     [(published::PHOTONS, Gather::Brute), (published::PHOTONS, Gather::Grid), (request.large, Gather::Grid)]
 }
 
-pub fn row_of_table_1(builder: Builder, photons: u32, rounds: u32, gather: Gather) -> RenderRequest {
+pub(crate) fn row_of_table_1(builder: Builder, photons: u32, rounds: u32, gather: Gather) -> RenderRequest {
     let (preset, variant) = (Some(Preset::Rounds), Some(Variant::Of(builder)));
     RenderRequest { preset, variant, photons: Some(photons), rounds: Some(rounds), gather: Some(gather), ..RenderRequest::default() }
 }
 
 /// Whole runs of table 1's rounds.
-pub fn totals(bench: &mut Bench, found: &mut Reproduction) -> Result<()> {
+pub(crate) fn totals(bench: &mut Bench, found: &mut Reproduction) -> Result<()> {
     for (photons, gather) in series(&found.request) {
         // Wall time of a round, by the latest row.
         let mut a_round = None;
@@ -287,18 +287,18 @@ pub fn totals(bench: &mut Bench, found: &mut Reproduction) -> Result<()> {
 }
 
 impl Reproduction {
-    pub fn running_time(&self, photons: u32, bounces: u32, implementation: Implementation, pass: Pass) -> Option<&RunningTime> {
+    pub(crate) fn running_time(&self, photons: u32, bounces: u32, implementation: Implementation, pass: Pass) -> Option<&RunningTime> {
         let wanted = (photons, bounces, implementation, pass);
         self.running_times.iter().find(|time| (time.photons, time.bounces, time.implementation, time.pass) == wanted)
     }
 
     /// (photons, bounces) that were measured, in order.
-    pub fn sizes(&self) -> [(u32, u32); 4] {
+    pub(crate) fn sizes(&self) -> [(u32, u32); 4] {
         sizes(&self.request)
     }
 
     /// Builders that were measured, in order.
-    pub fn implementations(&self) -> Vec<Implementation> {
+    pub(crate) fn implementations(&self) -> Vec<Implementation> {
         let mut implementations = Vec::new();
         for time in &self.running_times {
             if !implementations.contains(&time.implementation) {
@@ -309,14 +309,14 @@ impl Reproduction {
     }
 
     /// Rows of table 1 with one size of round and one gather.
-    pub fn totals_of(&self, photons_per_round: u32, gather: Gather) -> impl Iterator<Item = &TotalTime> {
+    pub(crate) fn totals_of(&self, photons_per_round: u32, gather: Gather) -> impl Iterator<Item = &TotalTime> {
         self.totals.iter().filter(move |total| (total.photons_per_round, total.gather) == (photons_per_round, gather))
     }
 }
 
 impl RunningTime {
     /// What the paper measured for the same: two bounces, brute force.
-    pub fn published_ms(&self) -> Option<f64> {
+    pub(crate) fn published_ms(&self) -> Option<f64> {
         let comparable = self.photons == published::PHOTONS
             && self.bounces == published::BOUNCES
             && self.implementation.threads == 1
@@ -333,22 +333,22 @@ impl RunningTime {
 }
 
 impl TotalTime {
-    pub fn photons(&self) -> u64 {
+    pub(crate) fn photons(&self) -> u64 {
         u64::from(self.photons_per_round) * u64::from(self.rounds)
     }
 
     /// Photons and milliseconds, for charts and fits.
-    pub fn point(&self) -> (f64, f64) {
+    pub(crate) fn point(&self) -> (f64, f64) {
         (self.photons() as f64, self.best_ms())
     }
 
     /// The device's time, else the host's.
-    pub fn best_ms(&self) -> f64 {
+    pub(crate) fn best_ms(&self) -> f64 {
         self.gpu_ms.unwrap_or(self.wall_ms)
     }
 
     /// What the paper measured for the same rounds.
-    pub fn published_ms(&self) -> Option<f64> {
+    pub(crate) fn published_ms(&self) -> Option<f64> {
         let is_same = |rounds: u32| (self.photons_per_round, self.rounds) == (published::PHOTONS, rounds);
         published::TABLE_1.into_iter().find_map(|(rounds, ms)| is_same(rounds).then_some(ms))
     }

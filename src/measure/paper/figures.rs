@@ -14,11 +14,11 @@ use crate::scene::open_box::open_box;
 use crate::settings::{Preset, RoomSettings};
 use crate::text::counted;
 
-pub const COUNT: usize = 4;
+pub(crate) const COUNT: usize = 4;
 /// Every figure is computed with the seeds from 1 to this; those of seed 1 are shown.
-pub const SEEDS: u64 = 5;
+pub(crate) const SEEDS: u64 = 5;
 
-pub struct Figure {
+pub(crate) struct Figure {
     pub number: usize,
     pub title: &'static str,
     /// What the paper's figure shows.
@@ -32,7 +32,7 @@ pub struct Figure {
 }
 
 /// The light of one run.
-pub struct Frame {
+pub(crate) struct Frame {
     pub label: String,
     pub command: String,
     pub settings: RoomSettings,
@@ -40,7 +40,7 @@ pub struct Frame {
 }
 
 /// One picture of a figure.
-pub struct Panel {
+pub(crate) struct Panel {
     pub label: String,
     /// Pixels along each side.
     pub side: usize,
@@ -56,7 +56,7 @@ struct Exhibit {
     frames: Vec<(String, RenderRequest)>,
 }
 
-pub fn make(bench: &mut Bench, figures: &mut Vec<Figure>) -> Result<()> {
+pub(crate) fn make(bench: &mut Bench, figures: &mut Vec<Figure>) -> Result<()> {
     for (number, Exhibit { title, published, caption, frames }) in (1..).zip(exhibits()) {
         bench.begin(&format!("figure {number}: {title}"))?;
         let with_seed = |seed: u64| frames.iter().map(|exhibited| frame(bench, exhibited, seed)).collect::<Result<Vec<Frame>>>();
@@ -73,7 +73,7 @@ pub fn make(bench: &mut Bench, figures: &mut Vec<Figure>) -> Result<()> {
 
 impl Figure {
     /// A number that follows from the figure's frames, over all seeds; it is positive.
-    pub fn over_seeds(&self, of: impl Fn(&[Frame]) -> f64) -> Interval {
+    pub(crate) fn over_seeds(&self, of: impl Fn(&[Frame]) -> f64) -> Interval {
         let seeds = std::iter::once(&self.frames).chain(&self.repeats);
         Interval::of_geometric_mean(&seeds.map(|frames| of(frames)).collect::<Vec<f64>>())
     }
@@ -81,13 +81,13 @@ impl Figure {
 
 impl Panel {
     /// `figure2b.png` is the second picture of figure 2.
-    pub fn file_name(number: usize, place: usize) -> String {
+    pub(crate) fn file_name(number: usize, place: usize) -> String {
         format!("figure{number}{}.png", letter(place))
     }
 }
 
 /// The letter of a panel.
-pub fn letter(place: usize) -> char {
+pub(crate) fn letter(place: usize) -> char {
     ('a'..='z').nth(place).expect("a figure has at most six panels")
 }
 

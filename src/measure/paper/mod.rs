@@ -1,16 +1,16 @@
 //! The paper's figures, running times and table, measured on this machine and compared with the published numbers, as
 //! images, CSV and one page.
 
-pub mod bench;
-pub mod chart;
-pub mod experiments;
-pub mod figures;
-pub mod page;
-pub mod published;
+pub(crate) mod bench;
+pub(crate) mod chart;
+pub(crate) mod experiments;
+pub(crate) mod figures;
+pub(crate) mod page;
+pub(crate) mod published;
 #[cfg(test)]
 mod sample;
-pub mod tables;
-pub mod verdicts;
+pub(crate) mod tables;
+pub(crate) mod verdicts;
 
 use crate::error::{Error, Result};
 use crate::output::destination::{Folder, write_all};
@@ -20,7 +20,7 @@ use figures::{Figure, Panel};
 
 /// What is measured besides the paper's own settings.
 #[derive(Debug, Clone, Copy)]
-pub struct Request {
+pub(crate) struct Request {
     /// Photons of a round at the size that fills the device.
     pub large: u32,
     /// Runs that count, at most.
@@ -32,7 +32,7 @@ pub struct Request {
 }
 
 /// Everything that was found.
-pub struct Reproduction {
+pub(crate) struct Reproduction {
     /// `None` without Vulkan.
     pub device: Option<Device>,
     /// The host's processor.
@@ -49,7 +49,7 @@ pub struct Reproduction {
 }
 
 /// Runs every experiment; one that is ended from outside leaves what was finished before it.
-pub fn reproduce(bench: &mut Bench, request: Request) -> Result<Reproduction> {
+pub(crate) fn reproduce(bench: &mut Bench, request: Request) -> Result<Reproduction> {
     let mut found = Reproduction {
         device: bench.device(),
         cpu: bench::processor(),
@@ -79,7 +79,7 @@ fn run_all(bench: &mut Bench, found: &mut Reproduction) -> Result<()> {
 }
 
 /// Writes pictures, tables and the page.
-pub fn write(folder: &Folder, found: &Reproduction) -> Result<()> {
+pub(crate) fn write(folder: &Folder, found: &Reproduction) -> Result<()> {
     let panels = |figure: &Figure| {
         let file = |(place, panel): (usize, &Panel)| (folder.file(&Panel::file_name(figure.number, place)), panel.png.clone());
         figure.panels.iter().enumerate().map(file).collect::<Vec<_>>()

@@ -9,7 +9,7 @@ use crate::timings::{Clock, Spread};
 
 const LARGE: u32 = 65_536;
 
-pub fn reproduction() -> Reproduction {
+pub(crate) fn reproduction() -> Reproduction {
     Reproduction {
         device: Some(Device { name: "a device".to_owned(), driver: "its driver".to_owned(), has_timestamps: true, is_cpu: true }),
         cpu: "a processor".to_owned(),

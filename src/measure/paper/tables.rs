@@ -58,16 +58,16 @@ impl Finding {
     }
 }
 
-pub fn running_times(times: &[RunningTime]) -> Vec<u8> {
+pub(crate) fn running_times(times: &[RunningTime]) -> Vec<u8> {
     csv_table(&RUNNING_TIMES, times)
 }
 
-pub fn totals(totals: &[TotalTime]) -> Vec<u8> {
+pub(crate) fn totals(totals: &[TotalTime]) -> Vec<u8> {
     csv_table(&TOTALS, totals)
 }
 
 /// Every finding, one row for each number behind it.
-pub fn findings(verdicts: &[Verdict]) -> Vec<u8> {
+pub(crate) fn findings(verdicts: &[Verdict]) -> Vec<u8> {
     let rows: Vec<Finding> = verdicts
         .iter()
         .flat_map(|Verdict { topic, standing, evidence, .. }| {

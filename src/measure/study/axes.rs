@@ -10,7 +10,7 @@ use crate::settings::{Builder, Gather, Math, Sums};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Axis {
+pub(crate) enum Axis {
     /// Runs that an error ends, with nothing set.
     Default,
     Builder,
@@ -33,7 +33,7 @@ pub enum Axis {
 }
 
 impl Axis {
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Axis::Default => "default settings",
             Axis::Builder => "builder",
@@ -58,7 +58,7 @@ impl Axis {
 }
 
 #[derive(Debug, Clone, PartialEq)]
-pub struct Configuration {
+pub(crate) struct Configuration {
     pub label: String,
     /// Without a scene: of the paper's box.
     pub request: RenderRequest,
@@ -66,23 +66,23 @@ pub struct Configuration {
 
 /// What is measured in turn, so that a clock that drifts touches all alike: the base, then its alternatives.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Group {
+pub(crate) struct Group {
     pub axis: Axis,
     pub configurations: Vec<Configuration>,
 }
 
 impl Configuration {
     /// Rounds that sums and random numbers allow.
-    pub fn most_rounds(&self) -> u32 {
+    pub(crate) fn most_rounds(&self) -> u32 {
         if self.is_of_paper() { self.request.room_settings().most_rounds() } else { 1 << 20 }
     }
 
-    pub fn request_of(&self, rounds: u32, seed: u64) -> RenderRequest {
+    pub(crate) fn request_of(&self, rounds: u32, seed: u64) -> RenderRequest {
         RenderRequest { rounds: Some(rounds), seed: Some(seed), ..self.request.clone() }
     }
 
     /// Whether it is of the paper's box.
-    pub fn is_of_paper(&self) -> bool {
+    pub(crate) fn is_of_paper(&self) -> bool {
         self.request.scene.is_empty()
     }
 }
@@ -138,7 +138,7 @@ fn bounce_counts<const COUNT: usize>(bounces: [u32; COUNT]) -> [(String, u32); C
 }
 
 /// Irradiance of the walls by the paper's line.
-pub fn of_paper(mesh: u32, photons: u32) -> Vec<Group> {
+pub(crate) fn of_paper(mesh: u32, photons: u32) -> Vec<Group> {
     let (radius, bounces, rng) = (Some(0.025), Some(30), Some(Rng::Philox));
     let base = RenderRequest { mesh: Some(mesh), photons: Some(photons), radius, bounces, rng, ..RenderRequest::default() };
     let mut sweep = Sweep::new(base, "atomic, grid, radius 0.025 m, 30 bounces, philox");
@@ -163,7 +163,7 @@ pub fn of_paper(mesh: u32, photons: u32) -> Vec<Group> {
 
 /// The paper's figure 4 and table 1: rounds of 5000 photons, at its two radii and another, and by the line of scenes,
 /// whose radius may shrink.
-pub fn of_the_papers_rounds(mesh: u32) -> Vec<Group> {
+pub(crate) fn of_the_papers_rounds(mesh: u32) -> Vec<Group> {
     let base = RenderRequest { mesh: Some(mesh), radius: Some(0.025), ..RenderRequest::default() };
     let mut sweep = Sweep::new(base, "radius 0.025 m");
     sweep.each(Axis::Paper, [("radius 0.05 m", 0.05), ("radius 0.0125 m", 0.0125)], |s, radius| s.radius = Some(radius));
@@ -189,7 +189,7 @@ const REMOVABLE: [Effect; 5] =
 /// Whatever the scene of triangles of a request may be lit by: `kept` are the effects that it calls for, `radius` that of its global
 /// map in metres, if it has one, `has_few_triangles` says whether a list of them may be tested from end to end, and
 /// `is_picture` whether a camera looks.
-pub fn of_scene(base: RenderRequest, kept: &[Effect], radius: Option<f64>, has_few_triangles: bool, is_picture: bool) -> Vec<Group> {
+pub(crate) fn of_scene(base: RenderRequest, kept: &[Effect], radius: Option<f64>, has_few_triangles: bool, is_picture: bool) -> Vec<Group> {
     let photons = base.settings(None).photons;
     let mut sweep = Sweep::new(base, "persistent, shrinking radius, shadow rays");
     sweep.each(Axis::Builder, BUILDERS, |s, builder| s.variant = Some(Variant::Of(builder)));

@@ -8,7 +8,7 @@ use crate::output::svg::{Axis, Chart, Series, around, log_log};
 use crate::output::words;
 
 /// A chart for each axis, one of everything, and one of what matters, by names fit for files.
-pub fn all(study: &Study, part: &Part) -> Vec<(String, Chart)> {
+pub(crate) fn all(study: &Study, part: &Part) -> Vec<(String, Chart)> {
     let main = main(study, part).map(|drawn| ("main".to_owned(), drawn));
     let overview = overview(part).map(|drawn| ("overview".to_owned(), drawn));
     let of_axes = part
@@ -19,7 +19,7 @@ pub fn all(study: &Study, part: &Part) -> Vec<(String, Chart)> {
 }
 
 /// The default, the base, and the best choice, of the first part beside the paper's and other programs' points.
-pub fn main(study: &Study, part: &Part) -> Option<Chart> {
+pub(crate) fn main(study: &Study, part: &Part) -> Option<Chart> {
     let base = part.base()?;
     let is_first = study.parts.first().is_some_and(|first| first.quantity == part.quantity);
     let papers = study.parts.iter().flat_map(|part| &part.comparisons).find(|comparison| comparison.axis == axes::Axis::Paper);
@@ -47,14 +47,14 @@ fn of_the_paper(base: &Curve) -> Vec<(f64, f64)> {
 }
 
 /// The curves with their bands; nothing where no time is known.
-pub fn of_axis(curves: &[Curve]) -> Option<Chart> {
+pub(crate) fn of_axis(curves: &[Curve]) -> Option<Chart> {
     let (x, y) = scales(curves.iter().flat_map(|curve| curve.points.iter().map(place)))?;
     let series = curves.iter().enumerate().map(|(number, curve)| with_band(curve, curve.label.clone(), number));
     Some(log_log(&x, &y, &series.collect::<Vec<_>>()))
 }
 
 /// Every point, and those that no other beats.
-pub fn overview(part: &Part) -> Option<Chart> {
+pub(crate) fn overview(part: &Part) -> Option<Chart> {
     let (x, y) = scales(part.points().map(|(_, point)| place(point)))?;
     let places = |points: Vec<(&Curve, &Point)>| points.into_iter().map(|(_, point)| place(point)).collect();
     let all = Series { dot: 2, ..Series::dots("all points", 0, places(part.points().collect())) };

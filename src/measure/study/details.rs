@@ -11,7 +11,7 @@ use crate::output::page::{chart, table};
 use crate::output::words::{count, duration, times};
 use crate::text::percent;
 
-pub fn of_builders(map: &Map) -> Markup {
+pub(crate) fn of_builders(map: &Map) -> Markup {
     let is_scene = map.cells.iter().all(|cell| cell.scene.is_some());
     html! {
         details {
@@ -31,7 +31,7 @@ pub fn of_builders(map: &Map) -> Markup {
     }
 }
 
-pub fn of_part(part: &Part) -> Markup {
+pub(crate) fn of_part(part: &Part) -> Markup {
     html! {
         details {
             summary { h2 { "All measurements: " (part.quantity) } }
@@ -120,7 +120,7 @@ fn row(point: &Point) -> Markup {
     }
 }
 
-pub fn how(study: &Study) -> Markup {
+pub(crate) fn how(study: &Study) -> Markup {
     html! {
         details {
             summary { h2 { "How this was measured" } }

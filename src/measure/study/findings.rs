@@ -13,7 +13,7 @@ use crate::text::{counted, percent};
 const ASKED: [f64; 10] = [0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 0.0005];
 
 /// 'from a to b', or that nothing is known.
-pub fn between(estimate: Interval, show: impl Fn(f64) -> String) -> String {
+pub(crate) fn between(estimate: Interval, show: impl Fn(f64) -> String) -> String {
     // Beyond that it is no knowledge.
     if estimate.low > 0.0 && estimate.high < 100.0 * estimate.low {
         format!("{} to {}", show(estimate.low), show(estimate.high))
@@ -24,24 +24,24 @@ pub fn between(estimate: Interval, show: impl Fn(f64) -> String) -> String {
 
 impl Part {
     /// What the others are compared with: of the comparisons that it was measured in, the one that took it furthest.
-    pub fn base(&self) -> Option<&Curve> {
+    pub(crate) fn base(&self) -> Option<&Curve> {
         let mut bases = self.comparisons.iter().filter_map(Comparison::base);
         let first = bases.next()?;
         let further = |best: &'_ Curve, next: &'_ Curve| next.label == best.label && next.points.len() > best.points.len();
         Some(bases.fold(first, |best, next| if further(best, next) { next } else { best }))
     }
 
-    pub fn curves(&self) -> impl Iterator<Item = (Axis, &Curve)> {
+    pub(crate) fn curves(&self) -> impl Iterator<Item = (Axis, &Curve)> {
         let of_default = self.default.iter().map(|curve| (Axis::Default, curve));
         of_default.chain(self.comparisons.iter().flat_map(|comparison| comparison.curves.iter().map(|curve| (comparison.axis, curve))))
     }
 
-    pub fn points(&self) -> impl Iterator<Item = (&Curve, &Point)> {
+    pub(crate) fn points(&self) -> impl Iterator<Item = (&Curve, &Point)> {
         self.curves().flat_map(|(_, curve)| curve.points.iter().map(move |point| (curve, point)))
     }
 
     /// Points that no other beats in both error and time, the fastest first.
-    pub fn pareto_front(&self) -> Vec<(&Curve, &Point)> {
+    pub(crate) fn pareto_front(&self) -> Vec<(&Curve, &Point)> {
         let mut all: Vec<(&Curve, &Point)> = self.points().collect();
         all.sort_by(|(_, a), (_, b)| a.ms().value.total_cmp(&b.ms().value));
         let mut best = f64::INFINITY;
@@ -54,7 +54,7 @@ impl Part {
     }
 
     /// What each choice changes, in the order of the axes.
-    pub fn choices(&self) -> Vec<Choice<'_>> {
+    pub(crate) fn choices(&self) -> Vec<Choice<'_>> {
         let count: usize = self.comparisons.iter().map(|comparison| comparison.others().count()).sum();
         // So that all of them together are as sure as one.
         let confidence = 1.0 - (1.0 - CONFIDENCE) / count.max(1) as f64;
@@ -70,20 +70,20 @@ impl Part {
     }
 
     /// The choice that saves most time for the same error, by as much as is certain.
-    pub fn best_choice(&self) -> Option<Choice<'_>> {
+    pub(crate) fn best_choice(&self) -> Option<Choice<'_>> {
         let faster = self.choices().into_iter().filter_map(|choice| Some((choice.effect.certain_gain()?, choice)));
         faster.min_by(|one, other| one.0.total_cmp(&other.0)).map(|(_, choice)| choice)
     }
 
     /// A sentence for each choice that was left out.
-    pub fn not_measured(&self) -> Vec<String> {
+    pub(crate) fn not_measured(&self) -> Vec<String> {
         let sentence =
             |(axis, curve): (_, &Curve)| Some(format!("{} was not measured: {}.", named(axis, &curve.label), curve.left_out.as_ref()?));
         self.curves().filter_map(sentence).collect()
     }
 
     /// Sentences made of this part's numbers, the most asked for first.
-    pub fn sentences(&self) -> Vec<String> {
+    pub(crate) fn sentences(&self) -> Vec<String> {
         let Some(base) = self.base() else { return Vec::new() };
         let least = self.least_error;
         let mut sentences: Vec<String> =
@@ -126,11 +126,11 @@ impl Part {
 }
 
 impl Comparison {
-    pub fn base(&self) -> Option<&Curve> {
+    pub(crate) fn base(&self) -> Option<&Curve> {
         self.curves.first().filter(|curve| !curve.points.is_empty())
     }
 
-    pub fn others(&self) -> impl Iterator<Item = &Curve> {
+    pub(crate) fn others(&self) -> impl Iterator<Item = &Curve> {
         self.curves.iter().skip(1).filter(|curve| !curve.points.is_empty())
     }
 }
@@ -141,7 +141,7 @@ fn steps(least: f64) -> impl Iterator<Item = f64> + Clone {
 }
 
 /// The smallest error that all runs of two curves reach on their way, else that their means do.
-pub fn common_error(one: &Curve, other: &Curve, least: f64) -> Option<f64> {
+pub(crate) fn common_error(one: &Curve, other: &Curve, least: f64) -> Option<f64> {
     let by_means = |error: &f64| one.time_to(*error).is_some() && other.time_to(*error).is_some();
     steps(least).find(|error| one.crosses(*error) && other.crosses(*error)).or_else(|| steps(least).find(by_means))
 }
@@ -151,7 +151,7 @@ const NEXT_TO_NOTHING: f64 = 1.02;
 
 /// What a choice changes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Effect {
+pub(crate) enum Effect {
     /// The time to this error over the base's, and that it is significantly more or less.
     Differs(f64, Interval),
     Undecided(f64, Interval),
@@ -173,7 +173,7 @@ impl Effect {
     }
 
     /// From what buys most to what noise hides.
-    pub fn rank(self) -> (u32, f64) {
+    pub(crate) fn rank(self) -> (u32, f64) {
         match self {
             Effect::Apart([own, base]) if own.0 < base.0 => (0, own.0 / base.0),
             Effect::Differs(_, longer) => (1, longer.value),
@@ -185,14 +185,14 @@ impl Effect {
 }
 
 /// A choice and its effect.
-pub struct Choice<'a> {
+pub(crate) struct Choice<'a> {
     pub axis: Axis,
     pub curve: &'a Curve,
     pub effect: Effect,
 }
 
 impl Choice<'_> {
-    pub fn name(&self) -> String {
+    pub(crate) fn name(&self) -> String {
         named(self.axis, &self.curve.label)
     }
 
@@ -218,7 +218,7 @@ impl Choice<'_> {
 }
 
 /// A configuration with its axis, unless its label names that already.
-pub fn named(axis: Axis, label: &str) -> String {
+pub(crate) fn named(axis: Axis, label: &str) -> String {
     if label.contains(axis.name()) { label.to_owned() } else { format!("{}: {label}", axis.name()) }
 }
 
@@ -237,7 +237,7 @@ fn effect(curve: &Curve, base: &Curve, least: f64, confidence: f64) -> Effect {
     if is_slower || is_faster { Effect::Differs(error, longer) } else { Effect::Undecided(error, longer) }
 }
 
-pub fn ratio(value: f64) -> String {
+pub(crate) fn ratio(value: f64) -> String {
     format!("{}\u{a0}\u{d7}", number(value))
 }
 
@@ -312,7 +312,7 @@ fn then_and_now(base: &Curve) -> Vec<String> {
 }
 
 /// A row of the tables of equal time and equal error.
-pub struct Row {
+pub(crate) struct Row {
     pub name: String,
     /// The value, or why there is none.
     pub value: Result<Interval, String>,
@@ -356,7 +356,7 @@ fn beyond(curve: &Curve, error: f64) -> String {
 }
 
 /// Errors after the longest time that nine in ten of all curves were measured at.
-pub fn equal_time(part: &Part) -> Option<(f64, Vec<Row>)> {
+pub(crate) fn equal_time(part: &Part) -> Option<(f64, Vec<Row>)> {
     let mut longest: Vec<f64> = part.curves().map(|(_, curve)| curve).filter(|curve| curve.points.len() > 1).map(Curve::longest).collect();
     longest.sort_by(f64::total_cmp);
     let ms = longest.get(longest.len() / 10)?.min(part.base()?.longest());
@@ -364,7 +364,7 @@ pub fn equal_time(part: &Part) -> Option<(f64, Vec<Row>)> {
 }
 
 /// Times to the smallest error that half of all curves reach.
-pub fn equal_error(part: &Part) -> Option<(f64, Vec<Row>)> {
+pub(crate) fn equal_error(part: &Part) -> Option<(f64, Vec<Row>)> {
     let base = part.base()?;
     let reach = |error: f64| part.curves().filter(|(_, curve)| curve.time_to(error).is_some()).count();
     let most = part.curves().count();
@@ -373,7 +373,7 @@ pub fn equal_error(part: &Part) -> Option<(f64, Vec<Row>)> {
 }
 
 /// Every point; errors are relative.
-pub fn csv(study: &Study) -> Vec<u8> {
+pub(crate) fn csv(study: &Study) -> Vec<u8> {
     struct Row<'a> {
         part: &'a Part,
         axis: Axis,
@@ -417,7 +417,7 @@ pub fn csv(study: &Study) -> Vec<u8> {
     csv_table(&columns, &rows)
 }
 
-pub fn clock(point: &Point) -> &'static str {
+pub(crate) fn clock(point: &Point) -> &'static str {
     if point.gpu_ms.iter().all(Option::is_some) { "gpu" } else { "wall" }
 }
 

@@ -5,18 +5,18 @@
 //! as a page, CSV, JSON and SVG. Points that are finished are kept ([`store`]), so that a study that was cut off goes on
 //! where it ended.
 
-pub mod axes;
-pub mod chart;
-pub mod details;
-pub mod findings;
-pub mod page;
+pub(crate) mod axes;
+pub(crate) mod chart;
+pub(crate) mod details;
+pub(crate) mod findings;
+pub(crate) mod page;
 pub mod peers;
-pub mod point;
-pub mod reference;
-pub mod store;
-pub mod strip;
-pub mod subject;
-pub mod summary;
+pub(crate) mod point;
+pub(crate) mod reference;
+pub(crate) mod store;
+pub(crate) mod strip;
+pub(crate) mod subject;
+pub(crate) mod summary;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -68,7 +68,7 @@ pub struct Request {
 }
 
 /// srand48 takes 32 bits, and each run has a seed of its own.
-pub const MAX_SEED: u64 = u32::MAX as u64 - 1000;
+pub(crate) const MAX_SEED: u64 = u32::MAX as u64 - 1000;
 /// Of all runs of a choice, a gigabyte in all.
 const MAX_HELD: u64 = 1 << 27;
 
@@ -126,16 +126,16 @@ pub struct Study {
     pub driver: String,
     /// A software device, whose 'GPU' is the CPU.
     pub is_cpu: bool,
-    pub parts: Vec<Part>,
+    pub(crate) parts: Vec<Part>,
     /// The fastest builder by photon count: of the open box by survival too, of another scene as it is.
-    pub compaction: Option<compaction::Map>,
+    pub(crate) compaction: Option<compaction::Map>,
     /// False if it was ended before its last point.
     pub complete: bool,
 }
 
 /// One quantity and everything that was measured of it.
 #[derive(Debug, Serialize)]
-pub struct Part {
+pub(crate) struct Part {
     pub quantity: String,
     /// Where the reference comes from and how well it is known.
     pub reference: String,
@@ -152,7 +152,7 @@ pub struct Part {
 
 /// Curves that were measured in turn: the base, then its alternatives along an axis.
 #[derive(Debug, Serialize)]
-pub struct Comparison {
+pub(crate) struct Comparison {
     pub axis: Axis,
     pub curves: Vec<Curve>,
 }
@@ -341,7 +341,7 @@ const COMPACTION_SHARE: u32 = 8;
 const MOST_COMPACTED: u32 = 1 << 26;
 
 /// Most that [`Request::most_rounds`] may be.
-pub const MOST_ROUNDS: u32 = 1 << 20;
+pub(crate) const MOST_ROUNDS: u32 = 1 << 20;
 
 /// Writes the page and its data.
 pub fn write(folder: &Folder, study: &Study) -> Result<()> {

@@ -10,7 +10,7 @@ use crate::output::page::{chart, page, picture, software_notice, table};
 use crate::output::words::duration;
 use crate::text::{counted, percent};
 
-pub fn html(study: &Study) -> String {
+pub(crate) fn html(study: &Study) -> String {
     let title = format!("What accuracy costs in time: {}", study.title);
     let (main, others) = study.parts.split_first().map_or((None, &[][..]), |(main, others)| (Some(main), others));
     let content = html! {

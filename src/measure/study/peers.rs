@@ -16,7 +16,7 @@ pub struct Peer {
 }
 
 /// The programs of a file that were run on a scene: on the paper's box, or on the scene of pictures that has the name of the scene's file.
-pub fn read(path: &Path, scene: &str) -> Result<Vec<Peer>> {
+pub(crate) fn read(path: &Path, scene: &str) -> Result<Vec<Peer>> {
     let refuse = |why: String| Error::setting("--peers", path.display(), why);
     let text = std::fs::read_to_string(path).map_err(|error| refuse(format!("cannot be read: {}", error.kind())))?;
     let found: Value = serde_json::from_str(&text).map_err(|error| refuse(format!("is not JSON: {error}")))?;

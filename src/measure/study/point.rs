@@ -10,7 +10,7 @@ use crate::measure::line_fit::LineFit;
 
 /// What one run left.
 #[derive(Debug, Clone)]
-pub struct Shot {
+pub(crate) struct Shot {
     /// As many as the reference has.
     pub values: Vec<f64>,
     /// All rounds on the device; `None` for the CPU builder and where there are no timestamps.
@@ -28,7 +28,7 @@ fn root(square: f64) -> f64 {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Point {
+pub(crate) struct Point {
     /// Repeats the first run; the others have the seeds that follow its own.
     pub command: String,
     pub rounds: u32,
@@ -46,7 +46,7 @@ pub struct Point {
 }
 
 impl Point {
-    pub fn of(shots: &[(Shot, Duration)], reference: &Reference, command: String, rounds: u32) -> Point {
+    pub(crate) fn of(shots: &[(Shot, Duration)], reference: &Reference, command: String, rounds: u32) -> Point {
         let (first, _) = &shots[0];
         let count = shots.len() as f64;
         let size = reference.mean_square();
@@ -67,27 +67,27 @@ impl Point {
         }
     }
 
-    pub fn spent(&self) -> Duration {
+    pub(crate) fn spent(&self) -> Duration {
         Duration::from_secs_f64(self.seconds.iter().sum())
     }
 
     /// Relative root mean square error.
-    pub fn error(&self) -> Interval {
+    pub(crate) fn error(&self) -> Interval {
         Interval::of_squares(&self.squared_errors).map(root)
     }
 
     /// What independent runs differ by, relative to the reference.
-    pub fn noise(&self) -> f64 {
+    pub(crate) fn noise(&self) -> f64 {
         root(self.squared_noise)
     }
 
     /// What all runs have in common. Below its upper end nothing can be told from noise.
-    pub fn bias(&self) -> Interval {
+    pub(crate) fn bias(&self) -> Interval {
         Interval::of_squares(&self.squared_errors).map(|square| root(square - self.squared_noise))
     }
 
     /// Of all rounds: on the device where it has a clock, else the host's. The middle one, the shortest and the longest.
-    pub fn ms(&self) -> Interval {
+    pub(crate) fn ms(&self) -> Interval {
         let all = sorted((0..self.wall_ms.len()).map(|run| self.ms_of(run)));
         Interval { value: all[all.len() / 2], low: all[0], high: all[all.len() - 1] }
     }
@@ -97,7 +97,7 @@ impl Point {
         if self.gpu_ms.iter().all(Option::is_some) { self.gpu_ms[run].unwrap_or(0.0) } else { self.wall_ms[run] }
     }
 
-    pub fn wall(&self) -> f64 {
+    pub(crate) fn wall(&self) -> f64 {
         sorted(self.wall_ms.iter().copied())[self.wall_ms.len() / 2]
     }
 }
@@ -121,7 +121,7 @@ fn around(value: f64, logs: &[Option<f64>], confidence: f64) -> Interval {
 
 /// A configuration at all its numbers of rounds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Curve {
+pub(crate) struct Curve {
     pub label: String,
     pub points: Vec<Point>,
     /// Why it was not measured.
@@ -130,7 +130,7 @@ pub struct Curve {
 
 impl Curve {
     /// Of no point yet.
-    pub fn new(label: &str) -> Curve {
+    pub(crate) fn new(label: &str) -> Curve {
         Curve { label: label.to_owned(), points: Vec::new(), left_out: None }
     }
 
@@ -144,7 +144,7 @@ impl Curve {
     }
 
     /// The same, with the interval that the single runs give.
-    pub fn time_to(&self, error: f64) -> Option<Interval> {
+    pub(crate) fn time_to(&self, error: f64) -> Option<Interval> {
         let mean: Vec<(f64, f64)> = self.points.iter().map(|point| (point.ms().value, point.error().value)).collect();
         let value = Curve::crossing(&mean, error)?;
         Some(around(value, &self.logs_of_time_to(error), CONFIDENCE))
@@ -162,12 +162,12 @@ impl Curve {
     }
 
     /// How many times longer than `other` this takes to an error, run by run, with an interval of this confidence.
-    pub fn times_longer(&self, other: &Curve, error: f64, confidence: f64) -> Option<Interval> {
+    pub(crate) fn times_longer(&self, other: &Curve, error: f64, confidence: f64) -> Option<Interval> {
         self.time_ratio(error, other, error, confidence)
     }
 
     /// How many times longer half an error takes.
-    pub fn halving(&self, error: f64) -> Option<Interval> {
+    pub(crate) fn halving(&self, error: f64) -> Option<Interval> {
         self.time_ratio(0.5 * error, self, error, CONFIDENCE)
     }
 
@@ -180,18 +180,18 @@ impl Curve {
     }
 
     /// Whether every run by itself, and their mean, crossed an error.
-    pub fn crosses(&self, error: f64) -> bool {
+    pub(crate) fn crosses(&self, error: f64) -> bool {
         self.time_to(error).is_some() && self.logs_of_time_to(error).iter().all(Option::is_some)
     }
 
     /// Relative error after a time, where that lies between two points.
-    pub fn error_after(&self, ms: f64) -> Option<Interval> {
+    pub(crate) fn error_after(&self, ms: f64) -> Option<Interval> {
         let at = |error: fn(Interval) -> f64| self.value_at(ms, |point| point.ms().value, |point| error(point.error()));
         Some(Interval { value: at(|error| error.value)?, low: at(|error| error.low)?, high: at(|error| error.high)? })
     }
 
     /// What follows from a power law between two points: their `y` where their `x` has this value.
-    pub fn value_at(&self, value: f64, x: impl Fn(&Point) -> f64, y: impl Fn(&Point) -> f64) -> Option<f64> {
+    pub(crate) fn value_at(&self, value: f64, x: impl Fn(&Point) -> f64, y: impl Fn(&Point) -> f64) -> Option<f64> {
         self.points.windows(2).find_map(|pair| {
             let ([x0, x1], [y0, y1]) = ([&pair[0], &pair[1]].map(&x), [&pair[0], &pair[1]].map(&y));
             let share = (value / x0).ln() / (x1 / x0).ln();
@@ -201,17 +201,17 @@ impl Curve {
     }
 
     /// The smallest error that was measured.
-    pub fn best_error(&self) -> f64 {
+    pub(crate) fn best_error(&self) -> f64 {
         self.points.iter().map(|point| point.error().value).fold(f64::INFINITY, f64::min)
     }
 
-    pub fn longest(&self) -> f64 {
+    pub(crate) fn longest(&self) -> f64 {
         self.points.iter().map(|point| point.ms().value).fold(0.0, f64::max)
     }
 
     /// Slope of the error over photons on logarithmic scales, by least squares through the points whose noise is above
     /// `least` and at least nine tenths of their error: -1/2 where only noise counts.
-    pub fn noise_slope(&self, least: f64) -> Option<f64> {
+    pub(crate) fn noise_slope(&self, least: f64) -> Option<f64> {
         let noisy: Vec<(f64, f64)> = self
             .points
             .iter()

@@ -21,7 +21,7 @@ use crate::verify::judge::radiosity::{Law, Radiosity};
 
 /// Values and their standard errors; places where `counts` is false are left out.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Reference {
+pub(crate) struct Reference {
     pub method: String,
     pub values: Vec<f64>,
     /// Of chance alone: 0 where no chance is in it.
@@ -33,39 +33,39 @@ pub struct Reference {
 
 impl Reference {
     /// Mean of a function of the place, over all that count.
-    pub fn mean_over(&self, f: impl Fn(usize) -> f64) -> f64 {
+    pub(crate) fn mean_over(&self, f: impl Fn(usize) -> f64) -> f64 {
         let counted = (0..self.values.len()).filter(|place| self.counts[*place]);
         let (sum, count) = counted.fold((0.0, 0usize), |(sum, count), place| (sum + f(place), count + 1));
         sum / count.max(1) as f64
     }
 
     /// Of the values, without what their own noise adds.
-    pub fn mean_square(&self) -> f64 {
+    pub(crate) fn mean_square(&self) -> f64 {
         self.mean_over(|place| self.values[place].powi(2) - self.standard_errors[place].powi(2)).max(f64::MIN_POSITIVE)
     }
 
     /// Of what is off, without what the reference's own noise adds.
-    pub fn squared_error(&self, found: &[f64]) -> f64 {
+    pub(crate) fn squared_error(&self, found: &[f64]) -> f64 {
         self.mean_over(|place| (found[place] - self.values[place]).powi(2) - self.standard_errors[place].powi(2))
     }
 
     /// Smallest relative error that this can judge. Its noise is taken out of what it judges, in squares, and what that leaves is a quarter of
     /// the square at most, as the noise is known to a few percent; of other errors of its own nothing is known.
-    pub fn least_error(&self) -> f64 {
+    pub(crate) fn least_error(&self) -> f64 {
         let noise = self.mean_over(|place| self.standard_errors[place].powi(2)) / self.mean_square();
         let rest = (self.relative_error.powi(2) - noise).max(0.0);
         (0.25 * noise + 4.0 * rest).sqrt()
     }
 
     /// With the relative error that its own noise makes at the places that count.
-    pub fn with_own_error(self) -> Reference {
+    pub(crate) fn with_own_error(self) -> Reference {
         let noise = self.mean_over(|place| self.standard_errors[place].powi(2));
         Reference { relative_error: (noise / self.mean_square()).sqrt(), ..self }
     }
 
     /// Irradiance of the walls of the paper's box at the middle of each texel, of all reflections, W/m2, by radiosity in
     /// f64. Its error is taken to be the difference from half as many cells.
-    pub fn walls(settings: &RoomSettings, mesh: u32) -> Result<Reference> {
+    pub(crate) fn walls(settings: &RoomSettings, mesh: u32) -> Result<Reference> {
         let key = format!("walls {RADIOSITY_VERSION} {:?} {} {} {mesh}", settings.emission, settings.reflectance, settings.light_radius);
         cached(&key, || {
             let law = match settings.emission {
@@ -93,7 +93,7 @@ impl Reference {
     }
 
     /// Irradiance of a square of floor in closed form, and its points and normals, for scenes that have one.
-    pub fn floor(name: &str, size: u32) -> Option<(Vec<(DVec3, DVec3)>, Reference)> {
+    pub(crate) fn floor(name: &str, size: u32) -> Option<(Vec<(DVec3, DVec3)>, Reference)> {
         // The furnace's floor goes from 0 to 1 m; planes are around the origin.
         let place = |i: u32| (f64::from(i) + 0.5) / f64::from(size) - if name == "furnace" { 0.0 } else { 0.5 };
         let points: Vec<DVec3> = (0..size * size).map(|k| DVec3::new(place(k % size), 0.0, place(k / size))).collect();
@@ -110,7 +110,7 @@ impl Reference {
 
     /// Radiance of a picture, three channels a pixel, W/m2/sr, by path tracing in f64. Pixels in which a light is seen
     /// straight are left out: their light is known beforehand and would drown the rest.
-    pub fn picture(
+    pub(crate) fn picture(
         scene: &Scene,
         camera: &Camera,
         (width, height): (u32, u32),
@@ -171,7 +171,7 @@ const CELLS: usize = 16;
 const ORDERS: usize = 40;
 
 /// Middles of all texels in the order of the film's walls, with the number of their wall.
-pub fn wall_points(mesh: u32) -> Vec<(usize, DVec3)> {
+pub(crate) fn wall_points(mesh: u32) -> Vec<(usize, DVec3)> {
     let scene = crate::scene::open_box::open_box(&RoomSettings::default());
     let walls = scene.walls().zip(0..WALL_NAMES.len());
     walls
@@ -180,7 +180,7 @@ pub fn wall_points(mesh: u32) -> Vec<(usize, DVec3)> {
 }
 
 /// Of a text that may be too long to hold.
-pub fn digest(text: std::fmt::Arguments) -> String {
+pub(crate) fn digest(text: std::fmt::Arguments) -> String {
     let mut hash = Hash(Sha256::new());
     hash.write_fmt(text).expect("hashing cannot fail");
     format!("{:x}", hash.0.finalize())
@@ -207,7 +207,7 @@ fn cached(key: &str, make: impl FnOnce() -> Result<Reference>) -> Result<Referen
 }
 
 /// Writes a file; it stands as it was until the new one is whole.
-pub fn replace_file(path: &Path, content: &[u8]) -> io::Result<File> {
+pub(crate) fn replace_file(path: &Path, content: &[u8]) -> io::Result<File> {
     let folder = path.parent().expect("the file lies in a folder");
     std::fs::create_dir_all(folder)?;
     let mut file = tempfile::NamedTempFile::new_in(folder)?;

@@ -15,7 +15,7 @@ use crate::gpu::DeviceFacts;
 use crate::output::destination::Folder;
 use crate::scene::Scene;
 
-pub struct Store {
+pub(crate) struct Store {
     file: std::fs::File,
     /// Held for as long as this is.
     _lock: std::fs::File,
@@ -36,7 +36,7 @@ const NAME: &str = "points.jsonl";
 const LOCK: &str = "study.lock";
 
 impl Store {
-    pub fn open(folder: &Folder, scene: &Scene, request: &Request, device: &DeviceFacts) -> Result<Store> {
+    pub(crate) fn open(folder: &Folder, scene: &Scene, request: &Request, device: &DeviceFacts) -> Result<Store> {
         let path = folder.path().join(NAME);
         let refuse = |error: io::Error| refused(&path, error.kind().to_string());
         std::fs::create_dir_all(folder.path()).map_err(refuse)?;
@@ -76,11 +76,11 @@ impl Store {
     }
 
     /// The point of a command, as it was measured along an axis.
-    pub fn find(&self, axis: Axis, command: &str) -> Option<Point> {
+    pub(crate) fn find(&self, axis: Axis, command: &str) -> Option<Point> {
         self.points.get(&(axis, command.to_owned())).cloned()
     }
 
-    pub fn keep(&mut self, axis: Axis, point: &Point) -> Result<()> {
+    pub(crate) fn keep(&mut self, axis: Axis, point: &Point) -> Result<()> {
         let line = serde_json::to_string(&(axis, point)).expect("a point is plain data") + "\n";
         let written = self.file.write_all(line.as_bytes()).and_then(|()| self.file.flush());
         written.map_err(|error| refused(&self.path, error.kind().to_string()))

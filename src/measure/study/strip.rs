@@ -16,11 +16,11 @@ use crate::gpu::Gpu;
 use crate::output::colour::{ColourPicture, Format, Tone};
 
 /// Errors that runs are ended by, the largest first.
-pub const ASKED: [f64; 5] = [0.2, 0.1, 0.05, 0.02, 0.01];
+pub(crate) const ASKED: [f64; 5] = [0.2, 0.1, 0.05, 0.02, 0.01];
 
 /// A picture of the strip.
 #[derive(Debug)]
-pub struct Frame {
+pub(crate) struct Frame {
     /// What was asked for; of pictures without a pilot, the first of [`ASKED`] that they are no worse than.
     pub asked: f64,
     pub rounds: u32,
@@ -34,7 +34,7 @@ pub struct Frame {
 }
 
 #[derive(Debug)]
-pub struct Strip {
+pub(crate) struct Strip {
     pub frames: Vec<Frame>,
     pub reference: Vec<u8>,
     /// The difference that has the full colour, over the mean.
@@ -42,7 +42,7 @@ pub struct Strip {
 }
 
 /// Curve of the runs that each error ends, as far as the time goes.
-pub fn measure_defaults(
+pub(crate) fn measure_defaults(
     gpu: &Gpu,
     subject: &Subject,
     request: &Request,
@@ -90,7 +90,7 @@ pub fn measure_defaults(
 const LEAST_TIME: Duration = Duration::from_secs(2);
 
 /// The pictures of a part: of its runs with default settings, else of its base. Their runs are repeated, as no point holds its picture.
-pub fn strip(gpu: &Gpu, subject: &Subject, part: &Part, request: &Request, cancelled: &AtomicBool) -> Result<Option<Strip>> {
+pub(crate) fn strip(gpu: &Gpu, subject: &Subject, part: &Part, request: &Request, cancelled: &AtomicBool) -> Result<Option<Strip>> {
     let reference = &subject.reference;
     let right = subject.picture(&reference.values);
     let stops = right.usual_exposure();

@@ -31,7 +31,7 @@ use crate::settings::{Builder, RoomSettings};
 use crate::timings::Timings;
 use crate::verify::judge::radiosity::inward;
 
-pub struct Subject {
+pub(crate) struct Subject {
     pub quantity: String,
     pub reference: Reference,
     pub groups: Vec<Group>,
@@ -48,7 +48,7 @@ pub struct Subject {
 }
 
 /// What a pilot has chosen for an error.
-pub struct Chosen {
+pub(crate) struct Chosen {
     settings: SceneSettings,
     /// Milliseconds of the pilot, of the device and of the host.
     gpu_ms: f64,
@@ -72,7 +72,13 @@ const FEW_TRIANGLES: usize = 256;
 
 impl Subject {
     /// Quantities of a scene; making their references may take a while.
-    pub fn all(gpu: &Gpu, scene: &Scene, request: &Request, cancelled: &AtomicBool, tell: &mut dyn FnMut(&str)) -> Result<Vec<Subject>> {
+    pub(crate) fn all(
+        gpu: &Gpu,
+        scene: &Scene,
+        request: &Request,
+        cancelled: &AtomicBool,
+        tell: &mut dyn FnMut(&str),
+    ) -> Result<Vec<Subject>> {
         let Request { scene: name, size, photons, reference_samples, .. } = request.clone();
         let view = RenderRequest::of_words(&request.view).expect("they are options of a request");
         let view = RenderRequest { scene: name.clone(), ..view };
@@ -137,7 +143,7 @@ impl Subject {
     }
 
     /// What repeats a run.
-    pub fn command(&self, configuration: &Configuration, rounds: u32, seed: u64) -> String {
+    pub(crate) fn command(&self, configuration: &Configuration, rounds: u32, seed: u64) -> String {
         let request = configuration.request_of(rounds, seed).brief();
         if !configuration.is_of_paper() {
             return self.command_of(request);
@@ -158,12 +164,12 @@ impl Subject {
     }
 
     /// What repeats a run with nothing set but its error.
-    pub fn command_to(&self, error: f64, seed: u64) -> String {
+    pub(crate) fn command_to(&self, error: f64, seed: u64) -> String {
         self.command_of(RenderRequest { error: Some(Percent::of_share(error)), seed: Some(seed), ..self.view.clone() })
     }
 
     /// What a pilot chooses for an error.
-    pub fn choose(&self, gpu: &Gpu, error: f64, cancelled: &AtomicBool) -> Result<Chosen> {
+    pub(crate) fn choose(&self, gpu: &Gpu, error: f64, cancelled: &AtomicBool) -> Result<Chosen> {
         let began = Instant::now();
         let stop = Stop { error: Some(error), ..Stop::default() };
         let settings = SceneSettings { rounds: MOST_ROUNDS, stop, ..SceneSettings::default() };
@@ -178,7 +184,7 @@ impl Subject {
     }
 
     /// A run to its error, the pilot's time included, and its rounds; `None` if it was longer than `most`.
-    pub fn run_to_error(
+    pub(crate) fn run_to_error(
         &self,
         gpu: &Gpu,
         chosen: &Chosen,
@@ -197,7 +203,7 @@ impl Subject {
     }
 
     /// Values as a picture, linear: as the camera sees them, or of the walls or the floor.
-    pub fn picture(&self, values: &[f64]) -> ColourPicture {
+    pub(crate) fn picture(&self, values: &[f64]) -> ColourPicture {
         let of_greys = |width: u32, height: u32, values: Vec<f64>| ColourPicture {
             width,
             height,
@@ -219,23 +225,23 @@ impl Subject {
     }
 
     /// Whether runs with nothing set are measured too: the paper's box has no pilot.
-    pub fn has_default(&self) -> bool {
+    pub(crate) fn has_default(&self) -> bool {
         !self.is_of_paper()
     }
 
     /// The points that are probed, as `photonmill probe --points` reads them; `None` for a picture.
-    pub fn points_file(&self) -> Option<String> {
+    pub(crate) fn points_file(&self) -> Option<String> {
         let line = |(p, n): &(DVec3, DVec3)| format!("{} {} {} {} {} {}\n", p.x, p.y, p.z, n.x, n.y, n.z);
         if self.receivers.is_empty() { None } else { Some(self.receivers.iter().map(line).collect()) }
     }
 
     /// Whether it is lit by the paper's line.
-    pub fn is_of_paper(&self) -> bool {
+    pub(crate) fn is_of_paper(&self) -> bool {
         self.groups.iter().flat_map(|group| &group.configurations).any(Configuration::is_of_paper)
     }
 
     /// One run.
-    pub fn run(&self, gpu: &Gpu, configuration: &Configuration, rounds: u32, seed: u64, cancelled: &AtomicBool) -> Result<Shot> {
+    pub(crate) fn run(&self, gpu: &Gpu, configuration: &Configuration, rounds: u32, seed: u64, cancelled: &AtomicBool) -> Result<Shot> {
         let mut control = Control::quiet(cancelled);
         let request = configuration.request_of(rounds, seed);
         let shot = if configuration.is_of_paper() {
@@ -321,7 +327,7 @@ const BOX_PIXELS: u32 = 240;
 const WARM_UP: &str = "--warm-up";
 
 /// The file beside the page that the commands read points from.
-pub const POINTS: &str = "points.txt";
+pub(crate) const POINTS: &str = "points.txt";
 
 fn shot(values: Vec<f64>, timings: &Timings, ledger: Ledger) -> Shot {
     let round = timings.row("round");

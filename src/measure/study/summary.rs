@@ -7,7 +7,7 @@ use crate::measure::interval::CONFIDENCE;
 use crate::output::words::{duration, times};
 use crate::text::percent;
 
-pub fn sentences(study: &Study, part: &Part) -> [String; 3] {
+pub(crate) fn sentences(study: &Study, part: &Part) -> [String; 3] {
     [cost(study, part), first_change(part), doubts(part)]
 }
 

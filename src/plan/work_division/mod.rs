@@ -18,9 +18,9 @@ mod variance;
 
 use serde::{Deserialize, Serialize};
 
-pub use rounds::{ErrorParts, Rounds};
-pub use search::{MOST_PHOTONS, MOST_SAMPLES, best};
-pub use variance::{FOUND_BIAS, MapVariance, USUAL_BIAS, USUAL_UNCERTAINTY, Variance, of_samples};
+pub(crate) use rounds::{ErrorParts, Rounds};
+pub(crate) use search::{MOST_PHOTONS, MOST_SAMPLES, best};
+pub(crate) use variance::{FOUND_BIAS, MapVariance, USUAL_BIAS, USUAL_UNCERTAINTY, Variance, of_samples};
 
 use super::radius::over_usual;
 use crate::settings::scene::SceneSettings;
@@ -28,7 +28,7 @@ use crate::settings::scene::SceneSettings;
 /// What each round does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Division {
+pub(crate) struct Division {
     /// Paths through a pixel, and shadow rays from each visible point.
     pub samples: u32,
     pub shadow_rays: u32,
@@ -41,35 +41,35 @@ pub struct Division {
 }
 
 impl Division {
-    pub fn of(settings: &SceneSettings) -> Division {
+    pub(crate) fn of(settings: &SceneSettings) -> Division {
         let &SceneSettings { samples, shadow_rays, photons, caustic_photons, neighbours, caustic_neighbours, .. } = settings;
         Division { samples, shadow_rays, photons, caustic_photons, neighbours, caustic_neighbours }
     }
 
-    pub fn set(self, settings: &SceneSettings) -> SceneSettings {
+    pub(crate) fn set(self, settings: &SceneSettings) -> SceneSettings {
         let Division { samples, shadow_rays, photons, caustic_photons, neighbours, caustic_neighbours } = self;
         SceneSettings { samples, shadow_rays, photons, caustic_photons, neighbours, caustic_neighbours, ..settings.clone() }
     }
 
-    pub fn global(self) -> PhotonsOfMap {
+    pub(crate) fn global(self) -> PhotonsOfMap {
         PhotonsOfMap { photons: self.photons, neighbours: over_usual(self.neighbours, false) }
     }
 
-    pub fn caustic(self) -> PhotonsOfMap {
+    pub(crate) fn caustic(self) -> PhotonsOfMap {
         PhotonsOfMap { photons: self.caustic_photons, neighbours: over_usual(self.caustic_neighbours, true) }
     }
 }
 
 /// Photons of a round, and those of them within the first radius over the usual ones.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct PhotonsOfMap {
+pub(crate) struct PhotonsOfMap {
     pub photons: u32,
     pub neighbours: f64,
 }
 
 impl PhotonsOfMap {
     /// The square of the radius over the usual one.
-    pub fn over_usual(self) -> f64 {
+    pub(crate) fn over_usual(self) -> f64 {
         self.neighbours * USUAL_PHOTONS / f64::from(self.photons)
     }
 }
@@ -79,7 +79,7 @@ const USUAL_PHOTONS: f64 = 131_072.0;
 
 /// What is to be chosen, as nobody has set it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Free {
+pub(crate) struct Free {
     pub samples: bool,
     pub shadow_rays: bool,
     pub photons: bool,
@@ -89,6 +89,6 @@ pub struct Free {
 }
 
 impl Free {
-    pub const ALL: Free =
+    pub(crate) const ALL: Free =
         Free { samples: true, shadow_rays: true, photons: true, caustic_photons: true, neighbours: true, caustic_neighbours: true };
 }

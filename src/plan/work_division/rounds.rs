@@ -16,7 +16,7 @@ const BOUND_OF_NOISE: f64 = 1.2;
 
 /// What an error is made of.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct ErrorParts {
+pub(crate) struct ErrorParts {
     /// The square of the noise of paths, of the global and of the caustic map.
     pub noise: [f64; 3],
     pub bias: f64,
@@ -43,7 +43,7 @@ impl ErrorParts {
 
 /// What is known of a picture's rounds.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rounds {
+pub(crate) struct Rounds {
     pub variance: Variance,
     pub cost: Cost,
     pub alpha: f64,
@@ -60,12 +60,12 @@ pub struct Rounds {
 
 impl Rounds {
     /// Nanoseconds of a round.
-    pub fn cost(&self, division: Division) -> f64 {
+    pub(crate) fn cost(&self, division: Division) -> f64 {
         self.cost.round + self.costs(division).iter().sum::<f64>()
     }
 
     /// Those of paths, of global and of caustic photons.
-    pub fn costs(&self, division: Division) -> [f64; 3] {
+    pub(crate) fn costs(&self, division: Division) -> [f64; 3] {
         let Cost { paths, shadow_rays, lookups, discs, photons, .. } = self.cost;
         let mut of_path = paths + f64::from(division.shadow_rays) * shadow_rays;
         let mut of_photons = [0.0; 2];
@@ -84,7 +84,7 @@ impl Rounds {
     }
 
     /// The bound of the error after so many rounds.
-    pub fn error(&self, division: Division, rounds: f64) -> f64 {
+    pub(crate) fn error(&self, division: Division, rounds: f64) -> f64 {
         self.bound(&self.parts(division, rounds))
     }
 
@@ -94,7 +94,7 @@ impl Rounds {
         (BOUND_OF_NOISE * noise.iter().sum::<f64>() + of_bias + unseen * unseen).sqrt()
     }
 
-    pub fn parts(&self, division: Division, rounds: f64) -> ErrorParts {
+    pub(crate) fn parts(&self, division: Division, rounds: f64) -> ErrorParts {
         self.first_round(division).after(rounds, self.alpha)
     }
 
@@ -117,7 +117,7 @@ impl Rounds {
     }
 
     /// Rounds after which the error is so small, if ever, and their nanoseconds.
-    pub fn until(&self, division: Division, error: f64) -> (f64, f64) {
+    pub(crate) fn until(&self, division: Division, error: f64) -> (f64, f64) {
         let (mut less, mut more) = (self.least_rounds(division), MOST_ROUNDS);
         let first = self.first_round(division);
         let is_small = |rounds: f64| self.bound(&first.after(rounds, self.alpha)) <= error;
@@ -133,7 +133,7 @@ impl Rounds {
     }
 
     /// The error after so many seconds.
-    pub fn after(&self, division: Division, seconds: f64) -> f64 {
+    pub(crate) fn after(&self, division: Division, seconds: f64) -> f64 {
         let rounds = 1e9 * seconds / self.cost(division);
         let few = (self.least_rounds(division) / rounds).max(1.0);
         // Fewer rounds than an error takes: it is not known.
@@ -145,7 +145,7 @@ impl Rounds {
     }
 
     /// Rounds that a goal takes.
-    pub fn expected(&self, division: Division, stop: &Stop) -> u32 {
+    pub(crate) fn expected(&self, division: Division, stop: &Stop) -> u32 {
         let in_time = stop.seconds.map_or(f64::INFINITY, |seconds| 1e9 * seconds / self.cost(division));
         let of_error = stop.error.map_or(f64::INFINITY, |error| self.until(division, error).0);
         in_time.min(of_error).clamp(1.0, MOST_ROUNDS).ceil() as u32
@@ -153,7 +153,7 @@ impl Rounds {
 
     /// What is to be small: the seconds until an error. Where there are fewer, those that the error after them would take if its square
     /// fell as time goes by, and of no error those for all there is.
-    pub fn loss(&self, division: Division, stop: &Stop) -> f64 {
+    pub(crate) fn loss(&self, division: Division, stop: &Stop) -> f64 {
         let wanted = stop.error.unwrap_or(1.0);
         let (rounds, nanoseconds) = self.until(division, wanted);
         // A run of few blocks cannot end when its error is smaller than expected.

@@ -9,9 +9,9 @@ use crate::settings::stop::Stop;
 
 /// More shadow rays of one path tell little that other paths do not.
 const MOST_SHADOW_RAYS: u32 = 16;
-pub const MOST_SAMPLES: u32 = 256;
+pub(crate) const MOST_SAMPLES: u32 = 256;
 const LEAST_PHOTONS: u32 = 1 << 12;
-pub const MOST_PHOTONS: u32 = 1 << 22;
+pub(crate) const MOST_PHOTONS: u32 = 1 << 22;
 /// From an eighth of the usual ones to 16 times as many, and of the caustic map from a sixth to 32 times.
 const CHOICE_OF_NEIGHBOURS: [u32; 8] = [3, 6, 12, 24, 48, 96, 192, 384];
 /// Each third of what may be chosen begins a search.
@@ -19,7 +19,7 @@ const BEGINS_APART: usize = 3;
 const CHOICE_OF_CAUSTIC_NEIGHBOURS: [u32; 9] = [1, 2, 3, 6, 12, 24, 48, 96, 192];
 
 /// The division whose loss is least: what is free in powers of two, up to so many samples and photons.
-pub fn best(rounds: &Rounds, before: Division, free: Free, stop: &Stop, (most_samples, most_photons): (u32, u32)) -> Division {
+pub(crate) fn best(rounds: &Rounds, before: Division, free: Free, stop: &Stop, (most_samples, most_photons): (u32, u32)) -> Division {
     let powers = |is_free: bool, least: u32, most: u32, own: u32| match is_free {
         true => std::iter::successors(Some(least), |power| Some(2 * power)).take_while(|power| *power <= most).collect(),
         false => vec![own],

@@ -5,7 +5,7 @@ use crate::settings::scene::SAMPLES_PER_BLOCK;
 
 /// What light of a round varies by, relative to the square of all light.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Variance {
+pub(crate) struct Variance {
     /// Of one path of [`SAMPLES_PER_BLOCK`] through each pixel, and of one shadow ray of each.
     pub path: f64,
     pub shadow_ray: f64,
@@ -15,7 +15,7 @@ pub struct Variance {
 
 /// The same of a map at its first radius.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct MapVariance {
+pub(crate) struct MapVariance {
     /// With these photons and a path; none without a map.
     pub of_round: f64,
     pub at: PhotonsOfMap,
@@ -33,7 +33,7 @@ pub struct MapVariance {
 
 impl MapVariance {
     /// The first radius's square over that of the usual photons and neighbours; one that is given is taken for that.
-    pub fn squared_radius(&self, of: PhotonsOfMap) -> f64 {
+    pub(crate) fn squared_radius(&self, of: PhotonsOfMap) -> f64 {
         self.widest.map_or(1.0, |widest| widest.min(of.over_usual()))
     }
 
@@ -45,7 +45,7 @@ impl MapVariance {
     /// Weighs the square of a bias that was found for this map's photons, and how well it is known, against that of the usual one, of which
     /// `share` is left in a run. One that is too small makes a run much longer, and one that is too large a little: so it is taken for half
     /// a deviation more.
-    pub fn learn_bias(&mut self, found: f64, uncertainty: f64, share: f64) {
+    pub(crate) fn learn_bias(&mut self, found: f64, uncertainty: f64, share: f64) {
         let at_usual = share * self.squared_radius(self.at).powf(-2.0 * BIAS_POWER);
         // The interval reaches two deviations to either side.
         let [found, deviation] = [found * found, 0.5 * uncertainty].map(|square| at_usual * square);
@@ -58,7 +58,7 @@ impl MapVariance {
     }
 
     /// The variance of the first round's light.
-    pub fn of_first_round(&self, of: PhotonsOfMap, samples: u32) -> f64 {
+    pub(crate) fn of_first_round(&self, of: PhotonsOfMap, samples: u32) -> f64 {
         let hits = |of: PhotonsOfMap| f64::from(of.photons) * self.squared_radius(of);
         match self.of_round {
             0.0 => 0.0,
@@ -73,32 +73,32 @@ impl MapVariance {
 
 impl Variance {
     /// From what a path with 1 shadow ray and with `many` had.
-    pub fn of_paths(with_one: f64, with_many: f64, many: u32) -> Variance {
+    pub(crate) fn of_paths(with_one: f64, with_many: f64, many: u32) -> Variance {
         let shadow_ray = ((with_one - with_many) / (1.0 - of_samples(many))).clamp(0.0, with_one);
         Variance { path: with_one - shadow_ray, shadow_ray, ..Variance::default() }
     }
 
     /// Of a round's paths.
-    pub fn of_paths_in_round(&self, division: Division) -> f64 {
+    pub(crate) fn of_paths_in_round(&self, division: Division) -> f64 {
         let of_a_path = self.path + self.shadow_ray * of_samples(division.shadow_rays);
         of_a_path / f64::from(SAMPLES_PER_BLOCK) * of_samples(division.samples) / of_samples(SAMPLES_PER_BLOCK)
     }
 }
 
 /// The variance of the mean of so many samples of a pixel over that of one: many lie more evenly than few.
-pub fn of_samples(count: u32) -> f64 {
+pub(crate) fn of_samples(count: u32) -> f64 {
     f64::from(count).powf(-SAMPLE_POWER)
 }
 
 /// The bias of light from the global and the caustic map at the usual first radius, relative to it, where nothing is known: of ten scenes
 /// 0.3 to 3 % and 4 to 90 %; and the spread of its square.
-pub const USUAL_BIAS: [f64; 2] = [0.015, 0.12];
+pub(crate) const USUAL_BIAS: [f64; 2] = [0.015, 0.12];
 const USUAL_SPREAD: f64 = 2.0;
 /// The square of a run's bias over that of a pilot's, whose radii fit the density of a caustic's photons worse.
-pub const FOUND_BIAS: [f64; 2] = [1.0, 0.5];
+pub(crate) const FOUND_BIAS: [f64; 2] = [1.0, 0.5];
 /// How well its square is known, over the variance of the light: a Student's quantile of what some 1000 discs tell that have no photon in
 /// common, at two radii.
-pub const USUAL_UNCERTAINTY: f64 = 0.2;
+pub(crate) const USUAL_UNCERTAINTY: f64 = 0.2;
 /// The power of the squared radius that it goes by: 1 where light is smooth, less along edges and in corners.
 pub(super) const BIAS_POWER: f64 = 0.45;
 /// By which the variance of even samples falls: 1 at random, and up to 3 where light is smooth (Owen 1997). Between 1 and 1.4 in ten scenes.

@@ -80,7 +80,7 @@ impl Geometry {
     }
 
     /// The emitters where photons choose them by other shares, and by how much more than now a photon of relative flux 1 then carries.
-    pub fn emitters_by(&self, shares: &[f64]) -> (Vec<Emitter>, f64) {
+    pub(crate) fn emitters_by(&self, shares: &[f64]) -> (Vec<Emitter>, f64) {
         let mut emitters = self.emitters.clone();
         let mut before = 0;
         for (emitter, choices) in emitters.iter_mut().zip(deal(shares)) {
@@ -142,7 +142,7 @@ impl Geometry {
     }
 
     /// Of a triangle that shines, or the piece of it that an emitter is.
-    pub fn lamp_corners(&self, light: &Emitter) -> [Vec3; 3] {
+    pub(crate) fn lamp_corners(&self, light: &Emitter) -> [Vec3; 3] {
         let Triangle { a, b, c, .. } = self.triangles[light.triangle as usize];
         let piece = Piece { corner: light.position.as_dvec3().truncate(), width: f64::from(light.position.z) };
         if piece == Piece::WHOLE { [a, b, c] } else { piece.corners([a, b, c].map(Vec3::as_dvec3)).map(DVec3::as_vec3) }
@@ -242,20 +242,20 @@ impl Geometry {
     }
 
     /// Whether the environment is a picture.
-    pub fn has_sky_picture(&self) -> bool {
+    pub(crate) fn has_sky_picture(&self) -> bool {
         self.emitters.last().is_some_and(|emitter| emitter.kind == EMITTER_ENVIRONMENT && emitter.triangle != NONE)
     }
 
     /// Radiance of the brightest thing that a camera can see, W/m2/sr, or the irradiance a sixteenth of the scene's
     /// unit from a point or spot light: what a narrow spot lights is far brighter than its power over the scene's area.
-    pub fn brightest(&self) -> f64 {
+    pub(crate) fn brightest(&self) -> f64 {
         let small = self.emitters.iter().filter(|emitter| matches!(emitter.kind, EMITTER_POINT | EMITTER_SPOT));
         let irradiance = small.map(|emitter| 2f64.powi(8) * f64::from(emitter.strength.max_element()));
         self.shown_radiances().map(|radiance| f64::from(radiance.max_element())).chain(irradiance).fold(0.0, f64::max)
     }
 
     /// Radiance of the brightest surface or sky that a path can meet, W/m2/sr, the root of the sum of its channels' squares.
-    pub fn brightest_shown(&self) -> f64 {
+    pub(crate) fn brightest_shown(&self) -> f64 {
         self.shown_radiances().map(|radiance| f64::from(radiance.length())).fold(0.0, f64::max)
     }
 

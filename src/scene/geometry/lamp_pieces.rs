@@ -13,7 +13,7 @@ use crate::scene::work;
 
 /// A piece of a triangle: a quarter of it, or of another piece.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Piece {
+pub(crate) struct Piece {
     /// Weights of the triangle's second and third corner at the piece's first.
     pub corner: DVec2,
     /// Of its edges over the triangle's: a power of two, negative in a piece that is turned by half a turn.
@@ -32,7 +32,7 @@ const LEAST_TEXELS: f64 = 0.25;
 const LEAST_WIDTH: f64 = 1.0 / 16_384.0;
 
 impl Piece {
-    pub const WHOLE: Piece = Piece { corner: DVec2::ZERO, width: 1.0 };
+    pub(super) const WHOLE: Piece = Piece { corner: DVec2::ZERO, width: 1.0 };
 
     fn quarters(self) -> [Piece; 4] {
         let half = 0.5 * self.width;
@@ -41,7 +41,7 @@ impl Piece {
     }
 
     /// What the piece's corners have, from what those of its triangle have.
-    pub fn corners(self, [a, b, c]: [DVec3; 3]) -> [DVec3; 3] {
+    pub(super) fn corners(self, [a, b, c]: [DVec3; 3]) -> [DVec3; 3] {
         let (ab, ac) = (b - a, c - a);
         let first = a + self.corner.x * ab + self.corner.y * ac;
         [first, first + self.width * ab, first + self.width * ac]
@@ -50,7 +50,7 @@ impl Piece {
 
 /// How bright a texture is over a part of it.
 #[derive(Debug, Clone, Copy)]
-pub struct Brightness {
+pub(crate) struct Brightness {
     pub mean: DVec3,
     /// No sample is brighter.
     pub most: f64,
@@ -82,7 +82,7 @@ struct Level {
 }
 
 /// A texture that something shines by, with sums over its blocks.
-pub struct Shining<'a> {
+pub(crate) struct Shining<'a> {
     texture: &'a Texture,
     /// From cells of two texels a side to one of all texels.
     levels: Vec<Level>,
@@ -90,7 +90,7 @@ pub struct Shining<'a> {
 }
 
 impl<'a> Shining<'a> {
-    pub fn new(texture: &'a Texture) -> Shining<'a> {
+    pub(super) fn new(texture: &'a Texture) -> Shining<'a> {
         work::add(|| texture.texels.count());
         let mut levels: Vec<Level> = Vec::new();
         let (mut columns, mut rows) = (texture.width as usize, texture.height as usize);
@@ -216,7 +216,7 @@ fn wrapped(wrap: Wrap, low: f64, high: f64, size: u32) -> Vec<(usize, usize)> {
 }
 
 /// A triangle that shines by a texture.
-pub struct Lamp<'a> {
+pub(crate) struct Lamp<'a> {
     pub shining: &'a Shining<'a>,
     pub uvs: [DVec2; 3],
     /// Of the whole triangle, texture left out.
@@ -270,14 +270,14 @@ impl Ord for Open {
 }
 
 /// Pieces of each lamp, with the brightness of each.
-pub struct Cut {
+pub(crate) struct Cut {
     pub pieces: Vec<Vec<(Piece, Brightness)>>,
     /// Pieces with spots much brighter than their mean, of which there were too many to cut all.
     pub left: usize,
 }
 
 /// Cuts lamps where their brightness differs most, those first that shine most; a lamp that needs no cut is whole.
-pub fn cut(lamps: &[Lamp]) -> Cut {
+pub(crate) fn cut(lamps: &[Lamp]) -> Cut {
     let open = |lamp: usize, piece: Piece, brightness: Brightness| {
         let priority = lamps[lamp].flux * piece.width * piece.width * (brightness.most - brightness.mean.max_element());
         Open { priority, lamp, piece, brightness }

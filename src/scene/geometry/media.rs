@@ -24,7 +24,7 @@ pub(super) struct Media {
 }
 
 impl Media {
-    pub fn of(scene: &Scene, offsets: &Offsets) -> Result<Media> {
+    pub(super) fn of(scene: &Scene, offsets: &Offsets) -> Result<Media> {
         let (by_size, hidden_solid) = match solids::order(scene) {
             solids::Order::Entry => (None, None),
             solids::Order::Size(order) => (Some(order), None),

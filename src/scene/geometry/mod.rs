@@ -31,7 +31,7 @@ use crate::records::{
 };
 
 #[derive(Debug, Clone)]
-pub struct Geometry {
+pub(crate) struct Geometry {
     pub centre: DVec3,
     /// Metres in a normalised length of 1.
     pub unit: f64,
@@ -89,23 +89,23 @@ pub struct Geometry {
 /// emitter has 24 bits.
 const MAX_TRIANGLES: usize = 1 << 28;
 /// With the 256 linear values of 8-bit codes before them.
-pub const MAX_TEXELS: usize = TEXEL_BUFFERS * TEXELS_PER_BUFFER as usize;
+pub(crate) const MAX_TEXELS: usize = TEXEL_BUFFERS * TEXELS_PER_BUFFER as usize;
 /// As many as `glsl/material/textures.glsl` looks into, so that none is larger than 128 MiB, the least that devices promise.
-pub const TEXEL_BUFFERS: usize = 4;
+pub(crate) const TEXEL_BUFFERS: usize = 4;
 /// Metres: a place that is rounded by more than that is said.
-pub const PLACE_ERROR: f64 = 1e-4;
+pub(crate) const PLACE_ERROR: f64 = 1e-4;
 
 fn refuse(scene: &Scene, object: &str, reason: String) -> Error {
     Error::Scene { path: (&scene.name).into(), object: object.into(), reason }
 }
 
 impl Geometry {
-    pub fn new(scene: &Scene) -> Result<Geometry> {
+    pub(crate) fn new(scene: &Scene) -> Result<Geometry> {
         Geometry::new_with(scene, &mut |_, _| {})
     }
 
     /// The same, with reports of how far it has come.
-    pub fn new_with(scene: &Scene, progress: Progress) -> Result<Geometry> {
+    pub(crate) fn new_with(scene: &Scene, progress: Progress) -> Result<Geometry> {
         let refuse = |reason: String| refuse(scene, "the scene", reason);
         let count = scene.triangle_count();
         if count == 0 {
@@ -177,23 +177,23 @@ impl Geometry {
     }
 
     /// The texels in the buffers that hold them.
-    pub fn texel_parts(&self) -> [&[u32]; TEXEL_BUFFERS] {
+    pub(crate) fn texel_parts(&self) -> [&[u32]; TEXEL_BUFFERS] {
         let mut parts = self.texels.chunks(TEXELS_PER_BUFFER as usize);
         std::array::from_fn(|_| parts.next().unwrap_or(&[]))
     }
 
     /// The planes as kernels have them: behind them, as bits, the number of the first one of points in the air.
-    pub fn plane_words(&self) -> Vec<Vec4> {
+    pub(crate) fn plane_words(&self) -> Vec<Vec4> {
         let last = Vec4::new(f32::from_bits(self.first_sensor_plane), 0.0, 0.0, 0.0);
         [self.planes.as_slice(), &[last]].concat()
     }
 
     /// A normalised position in metres of the scene.
-    pub fn to_world(&self, position: Vec3) -> DVec3 {
+    pub(crate) fn to_world(&self, position: Vec3) -> DVec3 {
         position.as_dvec3() * self.unit + self.centre
     }
 
-    pub fn to_local(&self, position: DVec3) -> Vec3 {
+    pub(crate) fn to_local(&self, position: DVec3) -> Vec3 {
         ((position - self.centre) / self.unit).as_vec3()
     }
 }
@@ -262,7 +262,7 @@ fn texture_record(texture: &Texture) -> TextureInfo {
 }
 
 /// A unit vector in 2 x 16 bits (Cigolle et al. 2014). Twin of `glsl/math/directions.glsl`.
-pub fn pack_normal(n: Vec3) -> u32 {
+pub(crate) fn pack_normal(n: Vec3) -> u32 {
     let sign = |x: f32| if x >= 0.0 { 1.0 } else { -1.0 };
     let flat = Vec2::new(n.x, n.y) / (n.x.abs() + n.y.abs() + n.z.abs());
     let folded = if n.z >= 0.0 { flat } else { (1.0 - flat.yx().abs()) * Vec2::new(sign(flat.x), sign(flat.y)) };
@@ -273,7 +273,7 @@ pub fn pack_normal(n: Vec3) -> u32 {
 }
 
 /// What [`pack_normal`] packed.
-pub fn unpack_normal(code: u32) -> Vec3 {
+pub(crate) fn unpack_normal(code: u32) -> Vec3 {
     let o = Vec2::new((code & 0xffff) as f32 - 32767.0, (code >> 16) as f32 - 32767.0) / 32767.0;
     let sign = |x: f32| if x >= 0.0 { 1.0 } else { -1.0 };
     let z = 1.0 - o.x.abs() - o.y.abs();

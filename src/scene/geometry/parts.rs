@@ -49,7 +49,7 @@ pub(super) struct Part<'a> {
 }
 
 impl Parts {
-    pub fn of(scene: &Scene, kinds: &[Kind], offsets: &Offsets, frame: Frame, progress: Progress) -> Parts {
+    pub(super) fn of(scene: &Scene, kinds: &[Kind], offsets: &Offsets, frame: Frame, progress: Progress) -> Parts {
         let mut sources: Vec<(u32, u32)> = Vec::with_capacity(scene.triangle_count());
         for (mesh, of) in (0..).zip(&scene.meshes) {
             sources.extend((0..of.triangles.len() as u32).map(|triangle| (mesh, triangle)));
@@ -94,7 +94,7 @@ impl Parts {
     }
 
     /// The number behind those of the planes in which something lies that is there.
-    pub fn first_sensor_plane(&self, scene: &Scene) -> u32 {
+    pub(super) fn first_sensor_plane(&self, scene: &Scene) -> u32 {
         let is_seen = |(_, (mesh, _)): &(&u32, &(u32, u32))| !scene.materials[scene.meshes[*mesh as usize].material].is_not_there();
         let of_surfaces = self.planes.of_triangles.iter().zip(&self.sources).filter(is_seen).map(|(plane, _)| plane & !HIDDEN);
         of_surfaces.max().map_or(0, |last| last + 1)
@@ -109,7 +109,7 @@ pub(super) struct Leaves<'a> {
 }
 
 impl Leaves<'_> {
-    pub fn each<T: Send>(&self, of: impl Fn(Part) -> T + Sync) -> Vec<T> {
+    pub(super) fn each<T: Send>(&self, of: impl Fn(Part) -> T + Sync) -> Vec<T> {
         let Parts { sources, corners, planes, weights, .. } = self.parts;
         let whole_count = corners.len() - weights.len();
         let part = |place: &u32| {
@@ -130,14 +130,14 @@ impl Leaves<'_> {
 
 impl Part<'_> {
     /// Colours where no mesh has any.
-    pub const WHITE: TriangleColours = TriangleColours { a: Vec3::ONE, b: Vec3::ONE, c: Vec3::ONE, alphas: Vec3::ONE };
+    pub(super) const WHITE: TriangleColours = TriangleColours { a: Vec3::ONE, b: Vec3::ONE, c: Vec3::ONE, alphas: Vec3::ONE };
 
-    pub fn record(&self) -> Triangle {
+    pub(super) fn record(&self) -> Triangle {
         let [a, b, c] = self.corners;
         Triangle { a, b, c, material: self.mesh.material as u32, plane: self.plane }
     }
 
-    pub fn normals(&self) -> TriangleNormals {
+    pub(super) fn normals(&self) -> TriangleNormals {
         let flat = TriangleNormals { a: NONE, b: NONE, c: NONE };
         if self.mesh.normals.is_empty() {
             return flat;
@@ -152,14 +152,14 @@ impl Part<'_> {
         TriangleNormals { a, b, c }
     }
 
-    pub fn colours(&self) -> TriangleColours {
+    pub(super) fn colours(&self) -> TriangleColours {
         let [a, b, c] = self.of_vertices(|vertex| self.mesh.colours.get(vertex).copied().unwrap_or(DVec3::ONE)).map(DVec3::as_vec3);
         let alphas = self.of_vertices(|vertex| self.mesh.alphas.get(vertex).copied().unwrap_or(1.0));
         TriangleColours { a, b, c, alphas: DVec3::from(alphas).as_vec3() }
     }
 
     /// Texture coordinates as transformed.
-    pub fn uvs(&self, scene: &Scene) -> TriangleUvs {
+    pub(super) fn uvs(&self, scene: &Scene) -> TriangleUvs {
         let of = |used: Option<TextureUse>| -> [Vec2; 3] {
             let Some(TextureUse { uv_set, transform, texture }) = used else { return [Vec2::ZERO; 3] };
             let uvs = self.own_uvs(uv_set).map(|uv| transform.apply(uv));
@@ -172,7 +172,7 @@ impl Part<'_> {
     }
 
     /// Of the whole triangle; zero where the mesh has none.
-    pub fn own_uvs(&self, set: usize) -> [DVec2; 3] {
+    pub(super) fn own_uvs(&self, set: usize) -> [DVec2; 3] {
         self.mesh.triangles[self.triangle].map(|vertex| self.mesh.uvs[set].get(vertex as usize).copied().unwrap_or_default())
     }
 
@@ -182,7 +182,7 @@ impl Part<'_> {
     }
 
     /// The same, from what the corners of the whole triangle have.
-    pub fn at_corners<T: Copy + Add<Output = T> + Mul<f64, Output = T>>(&self, values: [T; 3]) -> [T; 3] {
+    pub(super) fn at_corners<T: Copy + Add<Output = T> + Mul<f64, Output = T>>(&self, values: [T; 3]) -> [T; 3] {
         let [a, b, c] = values;
         self.weights.map_or(values, |weights| weights.map(|of| a * of.x + b * of.y + c * of.z))
     }

@@ -12,12 +12,12 @@ use crate::text::{counted, in_metres, some_of};
 
 impl Geometry {
     /// How far single precision moves a place, metres.
-    pub fn place_error(&self, position: DVec3) -> f64 {
+    pub(crate) fn place_error(&self, position: DVec3) -> f64 {
         (self.to_world(self.to_local(position)) - position).abs().max_element()
     }
 
     /// That some places, of points or of a camera, are moved so far that it shows.
-    pub fn place_warning(&self, what: &str, positions: impl IntoIterator<Item = DVec3>) -> Option<String> {
+    pub(crate) fn place_warning(&self, what: &str, positions: impl IntoIterator<Item = DVec3>) -> Option<String> {
         let most = positions.into_iter().map(|position| self.place_error(position)).fold(0.0, f64::max);
         (most > PLACE_ERROR).then(|| {
             format!("{what}: off by up to {} in single precision, so far from the middle of the scene; go nearer to it", in_metres(most))
@@ -38,7 +38,7 @@ impl Geometry {
     }
 
     /// A line for triangles that are left out, for each pair of meshes that overlap in one plane, and for what is too many to be treated as it should.
-    pub fn warnings(&self, scene: &Scene) -> Vec<String> {
+    pub(crate) fn warnings(&self, scene: &Scene) -> Vec<String> {
         const MOST: usize = 5;
         let names = LazyCell::new(|| scene.mesh_names());
         let name = |mesh: u32| &names[mesh as usize];

@@ -39,7 +39,7 @@ pub(super) struct Parts<'a> {
 }
 
 /// Kind and content.
-pub type Chunk = ([u8; 4], Vec<u8>);
+pub(crate) type Chunk = ([u8; 4], Vec<u8>);
 
 pub(super) fn parts(content: &[u8]) -> Result<Parts<'_>, String> {
     if content.is_empty() {

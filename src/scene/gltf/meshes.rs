@@ -351,7 +351,7 @@ fn normal_matrix(to_world: &DMat4) -> DMat3 {
 }
 
 /// Of the triangles that vertices make in their order.
-pub fn triangles_of(mode: Mode, indices: &[u32]) -> Vec<[u32; 3]> {
+pub(crate) fn triangles_of(mode: Mode, indices: &[u32]) -> Vec<[u32; 3]> {
     match mode {
         Mode::TriangleStrip => {
             let turned = |(k, window): (usize, &[u32])| {

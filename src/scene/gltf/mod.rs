@@ -15,14 +15,14 @@ mod lights;
 mod malformed;
 mod materials;
 mod members;
-pub mod meshes;
-pub mod source;
+pub(crate) mod meshes;
+pub(crate) mod source;
 mod tangents;
 mod textures;
 mod transforms;
 mod unread;
 mod uri;
-pub mod writer;
+pub(crate) mod writer;
 
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -102,7 +102,7 @@ const MAX_TEXELS: u64 = super::geometry::MAX_TEXELS as u64 - 256;
 const MAX_DEPTH: usize = 512;
 
 /// Reads a file.
-pub fn load(path: &Path, reading: Reading, progress: Progress) -> Result<Scene> {
+pub(crate) fn load(path: &Path, reading: Reading, progress: Progress) -> Result<Scene> {
     progress("reading the file", 0.0);
     let refuse = |reason: String| Error::Scene { path: path.to_owned(), object: "the file".into(), reason: one_line(&reason) };
     let content = read_file(path).map_err(refuse)?;

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 use super::accessor::{integer, kind_of, largest, stored};
 use super::compressed;
 use super::malformed;
-pub use super::malformed::Chunk;
+pub(crate) use super::malformed::Chunk;
 use super::members::{index, items};
 use super::{one_line, read_file, uri};
 use crate::error::{Error, Result};
@@ -22,7 +22,7 @@ const BINARY_CHUNK: [u8; 4] = *b"BIN\0";
 const JSON_CHUNK: [u8; 4] = *b"JSON";
 
 /// A file as it was written.
-pub struct File {
+pub(crate) struct File {
     pub path: PathBuf,
     pub json: Value,
     /// Whether it is a `.glb` file.
@@ -38,7 +38,7 @@ pub struct File {
 }
 
 /// The elements of an accessor one after another, numbers as they are stored, sparse replacements made.
-pub struct Elements {
+pub(crate) struct Elements {
     pub bytes: Vec<u8>,
     /// Bytes of one element.
     pub size: usize,
@@ -49,14 +49,14 @@ pub struct Elements {
 }
 
 /// A file that another names.
-pub struct Beside {
+pub(crate) struct Beside {
     /// Its path from the other's folder.
     pub name: String,
     pub content: std::result::Result<Vec<u8>, String>,
 }
 
 impl File {
-    pub fn open(path: &Path) -> Result<File> {
+    pub(crate) fn open(path: &Path) -> Result<File> {
         let refuse = |reason: String| Error::Scene { path: path.to_owned(), object: "the file".into(), reason: one_line(&reason) };
         let content = read_file(path).map_err(refuse)?;
         let is_binary = content.starts_with(b"glTF");
@@ -81,7 +81,7 @@ impl File {
     }
 
     /// Files that buffers and images name, each once.
-    pub fn beside(&self) -> Vec<Beside> {
+    pub(crate) fn beside(&self) -> Vec<Beside> {
         let of = |list: &str| items(&self.json[list]).filter_map(|member| member["uri"].as_str());
         let mut uris: Vec<&str> = of("buffers").chain(of("images")).filter(|uri| !uri.contains(':') && !uri.is_empty()).collect();
         uris.sort_unstable();
@@ -94,7 +94,7 @@ impl File {
     }
 
     /// The elements of an accessor that `what` has.
-    pub fn elements(&self, accessor: usize, what: &str) -> Result<Elements> {
+    pub(crate) fn elements(&self, accessor: usize, what: &str) -> Result<Elements> {
         let json = &self.json["accessors"][accessor];
         let refuse = |reason: &str| self.refuse(what, format!("has the accessor {accessor}, which {reason}"));
         let kind = kind_of(&json["componentType"]).ok_or_else(|| refuse("has no numbers that glTF knows"))?;
@@ -155,13 +155,13 @@ impl File {
 
 impl Elements {
     /// A number of an element as it is stored; matrices have gaps and are not asked for.
-    pub fn number(&self, element: usize, component: usize) -> f64 {
+    pub(crate) fn number(&self, element: usize, component: usize) -> f64 {
         let width = self.size / self.components;
         stored(&self.bytes[element * self.size + component * width..][..width], self.kind)
     }
 
     /// What whole numbers are divided by where they stand for shares.
-    pub fn largest(&self) -> f64 {
+    pub(crate) fn largest(&self) -> f64 {
         largest(self.kind)
     }
 }
@@ -193,7 +193,7 @@ fn unpack(path: &Path, json: &mut Value, binary: &mut Option<Vec<u8>>) -> Result
 }
 
 /// A `.glb` file of these parts; each is filled up to a multiple of four bytes.
-pub fn binary_file(json: &Value, binary: &[u8], other_chunks: &[Chunk]) -> Vec<u8> {
+pub(crate) fn binary_file(json: &Value, binary: &[u8], other_chunks: &[Chunk]) -> Vec<u8> {
     let text = serde_json::to_vec(json).expect("a document is plain data");
     let mut content = b"glTF\x02\0\0\0\0\0\0\0".to_vec();
     let mut add = |kind: [u8; 4], bytes: &[u8], filling: u8| {

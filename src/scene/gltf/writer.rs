@@ -17,7 +17,7 @@ const LIGHTS: &str = "KHR_lights_punctual";
 
 /// A document, and the bytes that are added to one of its buffers.
 #[derive(Default)]
-pub struct Writer {
+pub(crate) struct Writer {
     pub json: Value,
     pub bytes: Vec<u8>,
     pub buffer: usize,
@@ -27,7 +27,7 @@ pub struct Writer {
 
 impl Writer {
     /// Adds a member to a list, which need not be there, as glTF forbids empty ones.
-    pub fn push(&mut self, list: &str, member: Value) -> usize {
+    pub(crate) fn push(&mut self, list: &str, member: Value) -> usize {
         let list = &mut self.json[list];
         if !list.is_array() {
             *list = json!([]);
@@ -43,19 +43,19 @@ impl Writer {
         known.unwrap_or_else(|| self.push(list, member))
     }
 
-    pub fn use_extension(&mut self, name: &str) {
+    pub(crate) fn use_extension(&mut self, name: &str) {
         self.push_once("extensionsUsed", json!(name));
         let names = self.json["extensionsUsed"].as_array_mut().expect("one was added");
         names.sort_by(|a, b| a.as_str().cmp(&b.as_str()));
     }
 
     /// Fills the bytes up, so that numbers of any kind can follow.
-    pub fn fill(&mut self) {
+    pub(crate) fn fill(&mut self) {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
     }
 
     /// Adds bytes, and gives where they begin in the buffer.
-    pub fn append(&mut self, bytes: &[u8]) -> usize {
+    pub(crate) fn append(&mut self, bytes: &[u8]) -> usize {
         self.fill();
         let place = self.start + self.bytes.len();
         self.bytes.extend_from_slice(bytes);
@@ -63,7 +63,7 @@ impl Writer {
     }
 
     /// A view of bytes, so many from one element to the next, for a target of the graphics card.
-    pub fn view(&mut self, bytes: &[u8], stride: Option<usize>, target: Option<u32>) -> usize {
+    pub(crate) fn view(&mut self, bytes: &[u8], stride: Option<usize>, target: Option<u32>) -> usize {
         let mut view = json!({"buffer": self.buffer, "byteOffset": self.append(bytes), "byteLength": bytes.len()});
         for (name, value) in [("byteStride", stride.map(|stride| json!(stride))), ("target", target.map(|target| json!(target)))] {
             value.into_iter().for_each(|value| view[name] = value);
@@ -77,13 +77,13 @@ impl Writer {
     }
 
     /// An accessor of vectors, one a vertex.
-    pub fn vectors<const N: usize>(&mut self, vectors: impl IntoIterator<Item = [f32; N]>) -> usize {
+    pub(crate) fn vectors<const N: usize>(&mut self, vectors: impl IntoIterator<Item = [f32; N]>) -> usize {
         let bytes: Vec<u8> = vectors.into_iter().flatten().flat_map(f32::to_le_bytes).collect();
         self.accessor(&bytes, ARRAY_BUFFER, DataType::F32, &format!("VEC{N}"), bytes.len() / (4 * N))
     }
 
     /// An accessor of triangles' vertices, in 16 bits each where that is enough.
-    pub fn triangles(&mut self, triangles: &[[u32; 3]], is_short: bool) -> usize {
+    pub(crate) fn triangles(&mut self, triangles: &[[u32; 3]], is_short: bool) -> usize {
         let indices = triangles.as_flattened();
         let (bytes, kind): (Vec<u8>, DataType) = match is_short {
             true => (indices.iter().flat_map(|index| (*index as u16).to_le_bytes()).collect(), DataType::U16),
@@ -93,14 +93,14 @@ impl Writer {
     }
 
     /// A texture of a picture's file.
-    pub fn texture(&mut self, uri: String, sampler: Value) -> usize {
+    pub(crate) fn texture(&mut self, uri: String, sampler: Value) -> usize {
         let sampler = self.push_once("samplers", sampler);
         let source = self.push("images", json!({"uri": uri}));
         self.push("textures", json!({"source": source, "sampler": sampler}))
     }
 
     /// A material, or what is nearest to it among those of glTF. `place`: the numbers of a texture and of its set of coordinates.
-    pub fn material(&mut self, material: &Material, place: impl Fn(TextureUse) -> (usize, usize)) -> Value {
+    pub(crate) fn material(&mut self, material: &Material, place: impl Fn(TextureUse) -> (usize, usize)) -> Value {
         let of_texture = |used: TextureUse| texture_use(used, place(used));
         let Material { coverage, normal_map, base_colour, .. } = *material;
         let layers = layers(material);
@@ -182,7 +182,7 @@ impl Writer {
     }
 
     /// A camera that sees what is not nearer than that, and its node.
-    pub fn camera(&mut self, camera: &Camera, near: f64) {
+    pub(crate) fn camera(&mut self, camera: &Camera, near: f64) {
         let rotation = DQuat::from_mat3(&DMat3::from_cols(camera.right, camera.up, -camera.forward)).normalize();
         let written = match camera.projection {
             Projection::Perspective { vertical_view } => {
@@ -198,7 +198,7 @@ impl Writer {
     }
 
     /// A light in photometric units, and its node; none of those that glTF does not know.
-    pub fn light(&mut self, light: &Light) {
+    pub(crate) fn light(&mut self, light: &Light) {
         // The loader calls lights by their kind as well.
         let name = light.name.strip_prefix("light '").and_then(|name| name.strip_suffix('\'')).unwrap_or(&light.name);
         let towards = |direction: DVec3| DQuat::from_rotation_arc(DVec3::NEG_Z, direction).normalize().to_array();
@@ -231,7 +231,7 @@ impl Writer {
 }
 
 /// How a texture is looked up.
-pub fn sampler(texture: &Texture) -> Value {
+pub(crate) fn sampler(texture: &Texture) -> Value {
     let [wrap_s, wrap_t] = texture.wrap.map(|wrap| match wrap {
         Wrap::Repeat => REPEAT,
         Wrap::MirroredRepeat => MIRRORED_REPEAT,

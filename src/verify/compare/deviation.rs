@@ -7,7 +7,7 @@ use super::pair::{Pair, Value};
 
 /// Means are over pixels and channels.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Deviation {
+pub(crate) struct Deviation {
     pub mean_a: f64,
     pub mean_b: f64,
     /// Root mean square error.
@@ -19,7 +19,7 @@ pub struct Deviation {
 
 /// Relative to the reference.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Relative {
+pub(crate) struct Relative {
     /// Over the reference's mean.
     pub rmse: f64,
     /// The mean over the reference's, minus 1.
@@ -33,7 +33,7 @@ pub struct Relative {
 
 /// The channel of a pixel that differs most.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Largest {
+pub(crate) struct Largest {
     pub deviation: f64,
     pub x: u32,
     pub y: u32,
@@ -46,7 +46,7 @@ pub struct Largest {
 const EPSILON: f64 = 0.01;
 
 impl Deviation {
-    pub fn of(pair: &Pair) -> Deviation {
+    pub(crate) fn of(pair: &Pair) -> Deviation {
         let mut count = 0.0;
         let (mut sum_a, mut sum_b, mut squares) = (0.0, 0.0, 0.0);
         let mut largest: Option<(f64, Value)> = None;
@@ -78,7 +78,7 @@ impl Deviation {
     }
 
     /// Whether the RMSE is above a share of the reference's mean. Any error is above every share of 0.
-    pub fn is_above(&self, share: f64) -> bool {
+    pub(crate) fn is_above(&self, share: f64) -> bool {
         self.relative.map_or(self.rmse > 0.0, |relative| relative.rmse > share)
     }
 }

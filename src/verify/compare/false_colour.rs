@@ -8,7 +8,7 @@ use crate::output::colour;
 
 /// What colours stand for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Show {
+pub(crate) enum Show {
     #[default]
     Difference,
     Z,
@@ -24,7 +24,7 @@ const NONE: [u8; 3] = [128; 3];
 
 impl Show {
     /// What the first and the last colour mean.
-    pub fn scale(self) -> String {
+    pub(crate) fn scale(self) -> String {
         match self {
             Show::Difference => {
                 let [least, most] = DIFFERENCES.map(|share| 100.0 * share);
@@ -38,7 +38,7 @@ impl Show {
 
 impl Comparison<'_> {
     /// Of each pixel the channel that is furthest apart, as a PNG; none where the numbers do not exist.
-    pub fn false_colour(&self, show: Show) -> Option<Vec<u8>> {
+    pub(crate) fn false_colour(&self, show: Show) -> Option<Vec<u8>> {
         let pixels = 0..self.pair.is_compared.len();
         let shares: Vec<f64> = match show {
             Show::Difference => {

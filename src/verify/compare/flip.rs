@@ -14,7 +14,7 @@ use super::picture::Values;
 use crate::output::colour::{luminance, srgb_code};
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Flip {
+pub(crate) struct Flip {
     /// Over the pixels that are compared.
     pub mean: f64,
     /// Of the display that the eye is thought to see: 0.7 m from one that has 3840 pixels in 0.7 m.
@@ -38,7 +38,7 @@ const SHOWN_AS: f64 = 0.85;
 
 impl Flip {
     /// None of a linear reference that is black.
-    pub fn of(pair: &Pair) -> Option<Flip> {
+    pub(crate) fn of(pair: &Pair) -> Option<Flip> {
         let exposures = match pair.b.values {
             Values::Display => Vec::new(),
             Values::Linear => exposures(pair)?,

@@ -7,7 +7,7 @@ use super::picture::{Picture, Values};
 use crate::error::{Error, Result};
 
 /// Both pictures have the same size and the same kind of values, and at least one pixel is finite in both.
-pub struct Pair<'a> {
+pub(crate) struct Pair<'a> {
     pub a: &'a Picture,
     /// The reference.
     pub b: &'a Picture,
@@ -18,7 +18,7 @@ pub struct Pair<'a> {
 
 /// Pixels of which a channel is NaN or infinite, and which are not compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct LeftOut {
+pub(crate) struct LeftOut {
     /// Of the first picture, of the reference, and of one or the other.
     pub a: usize,
     pub b: usize,
@@ -27,7 +27,7 @@ pub struct LeftOut {
 
 /// A channel of a pixel, in both pictures.
 #[derive(Debug, Clone, Copy)]
-pub struct Value {
+pub(crate) struct Value {
     pub pixel: usize,
     pub channel: usize,
     pub a: f64,
@@ -35,7 +35,7 @@ pub struct Value {
 }
 
 impl<'a> Pair<'a> {
-    pub fn new(a: &'a Picture, b: &'a Picture) -> Result<Pair<'a>> {
+    pub(crate) fn new(a: &'a Picture, b: &'a Picture) -> Result<Pair<'a>> {
         let refuse = |reason: String| Error::Picture { path: a.path.clone(), reason };
         let named = b.path.display();
         if a.values != b.values {
@@ -64,7 +64,7 @@ impl<'a> Pair<'a> {
     }
 
     /// Every channel of every pixel that is compared.
-    pub fn values(&self) -> impl Iterator<Item = Value> {
+    pub(crate) fn values(&self) -> impl Iterator<Item = Value> {
         let pixels = self.a.pixels.iter().zip(&self.b.pixels).enumerate().filter(|(pixel, _)| self.is_compared[*pixel]);
         pixels.flat_map(|(pixel, (a, b))| {
             let of = |colour: &Vec3, channel: usize| f64::from(colour[channel]);

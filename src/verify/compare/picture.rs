@@ -16,7 +16,7 @@ const PNG_MAGIC: &[u8] = b"\x89PNG";
 /// What the numbers of a picture mean.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Values {
+pub(crate) enum Values {
     /// Radiance, or what else is proportional to light: .exr, .hdr.
     Linear,
     /// sRGB codes as a display takes them, from 0 to 1: .png.
@@ -25,7 +25,7 @@ pub enum Values {
 
 /// Row by row from the top.
 #[derive(Debug, Clone)]
-pub struct Picture {
+pub(crate) struct Picture {
     /// As the user named it.
     pub path: PathBuf,
     pub width: u32,
@@ -38,7 +38,7 @@ pub struct Picture {
 
 impl Picture {
     /// Reads a file; an error says what is wrong with it, and what to do.
-    pub fn read(path: &Path) -> Result<Picture, String> {
+    pub(crate) fn read(path: &Path) -> Result<Picture, String> {
         let content = file::read(path)?;
         let path = path.to_owned();
         if linear_picture::is_one(&content) {
@@ -66,11 +66,11 @@ impl Picture {
     }
 
     /// Where a pixel is: its column and row, from 0 at the upper left.
-    pub fn place(&self, pixel: usize) -> [u32; 2] {
+    pub(crate) fn place(&self, pixel: usize) -> [u32; 2] {
         [pixel as u32 % self.width, pixel as u32 / self.width]
     }
 
-    pub fn size(&self) -> String {
+    pub(crate) fn size(&self) -> String {
         format!("{} x {}", self.width, self.height)
     }
 }

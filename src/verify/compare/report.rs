@@ -29,7 +29,7 @@ struct Report<'a> {
 }
 
 impl Comparison<'_> {
-    pub fn json(&self) -> Vec<u8> {
+    pub(crate) fn json(&self) -> Vec<u8> {
         let (a, b) = (self.pair.a, self.pair.b);
         let report = Report {
             a: &a.path,
@@ -49,7 +49,7 @@ impl Comparison<'_> {
     }
 
     /// What of the files is not compared, or not as it is.
-    pub fn warnings(&self) -> Vec<String> {
+    pub(crate) fn warnings(&self) -> Vec<String> {
         let of = |picture: &Picture| {
             let path = echo(picture.path.display());
             picture.warnings.iter().map(move |warning| format!("{path}: {warning}")).collect::<Vec<_>>()
@@ -57,7 +57,7 @@ impl Comparison<'_> {
         [of(self.pair.a), of(self.pair.b)].concat()
     }
 
-    pub fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         let (a, b) = (self.pair.a, self.pair.b);
         let values = match a.values {
             Values::Linear => "linear values",
@@ -82,7 +82,7 @@ impl Comparison<'_> {
 
 impl Deviation {
     /// The RMSE and what it is relative to.
-    pub fn relative_rmse(&self) -> String {
+    pub(crate) fn relative_rmse(&self) -> String {
         match self.relative {
             Some(relative) => format!("{} of the reference's mean", percent(relative.rmse)),
             None => format!("{}, and the reference's mean is not above 0", number(self.rmse)),

@@ -14,7 +14,7 @@ use super::picture::{Picture, Values};
 
 /// z = (a - b) / sqrt(error_a^2 + error_b^2), of every channel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ZScores {
+pub(crate) struct ZScores {
     /// Values that have one.
     pub count: usize,
     /// Pixels of which an error is unknown.
@@ -43,7 +43,7 @@ pub struct ZScores {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct LargestZ {
+pub(crate) struct LargestZ {
     pub z: f64,
     pub x: u32,
     pub y: u32,
@@ -61,7 +61,7 @@ const LEVEL: f64 = 0.005;
 const TILES: u32 = 8;
 
 /// Whether a picture can be that of standard errors for this pair; else why not, and what to do.
-pub fn check(errors: &Picture, pair: &Pair) -> Result<(), String> {
+pub(crate) fn check(errors: &Picture, pair: &Pair) -> Result<(), String> {
     if pair.a.values == Values::Display {
         return Err(format!("is for linear pictures, and {} has display values; compare .exr pictures", pair.a.path.display()));
     }
@@ -81,7 +81,7 @@ pub fn check(errors: &Picture, pair: &Pair) -> Result<(), String> {
 impl ZScores {
     /// From the errors of one picture or both; those of the other count as 0. Errors are themselves estimates: where they are the
     /// spread of a few `blocks` of rounds, z-scores follow Student's distribution, else a normal one. None where no z-score exists.
-    pub fn of(pair: &Pair, errors: [Option<&Picture>; 2], blocks: Option<u32>) -> Option<ZScores> {
+    pub(crate) fn of(pair: &Pair, errors: [Option<&Picture>; 2], blocks: Option<u32>) -> Option<ZScores> {
         let degrees_of_freedom = blocks.map(|blocks| f64::from(blocks) - 1.0);
         let both_tails = |z: f64| both_tails(z, degrees_of_freedom);
         let variance = |pixel: usize| {
@@ -147,7 +147,7 @@ impl ZScores {
     }
 
     /// Whether the largest z-score alone says that the pictures disagree.
-    pub fn has_outlier(&self) -> bool {
+    pub(crate) fn has_outlier(&self) -> bool {
         self.largest.p < LEVEL
     }
 }

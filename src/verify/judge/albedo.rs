@@ -11,7 +11,7 @@ use crate::constants::DELTA_ALPHA_INVERSE;
 
 /// Albedos at a cosine: A and B of the guide's page on materials.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GgxAlbedo {
+pub(crate) struct GgxAlbedo {
     /// Of D V (1 - (1 - v.h)^5).
     pub a: f64,
     /// Of D V (1 - v.h)^5.
@@ -19,7 +19,7 @@ pub struct GgxAlbedo {
 }
 
 /// Places and weights of Gauss-Legendre quadrature over [0, 1].
-pub fn gauss_legendre(count: usize) -> Vec<(f64, f64)> {
+pub(crate) fn gauss_legendre(count: usize) -> Vec<(f64, f64)> {
     let n = count as f64;
     let node = |k: usize| {
         let mut x = (PI * (k as f64 + 0.75) / (n + 0.5)).cos();
@@ -183,7 +183,7 @@ static SHEEN: LazyLock<Table<1>> = LazyLock::new(|| {
 });
 
 /// A and B at this cosine and alpha.
-pub fn ggx(cosine: f64, alpha: f64) -> GgxAlbedo {
+pub(crate) fn ggx(cosine: f64, alpha: f64) -> GgxAlbedo {
     let cosine = cosine.clamp(0.0, 1.0);
     if is_delta(alpha) {
         return GgxAlbedo { a: 1.0 - schlick(cosine), b: schlick(cosine) };
@@ -194,7 +194,7 @@ pub fn ggx(cosine: f64, alpha: f64) -> GgxAlbedo {
 }
 
 /// Albedo of sheen of colour 1, from s = roughness^2.
-pub fn sheen(cosine: f64, s: f64) -> f64 {
+pub(crate) fn sheen(cosine: f64, s: f64) -> f64 {
     let [albedo] = SHEEN.at(graded(cosine.max(LEAST_COSINE), SHEEN_LAYER), row(s, LEAST_SHEEN));
     albedo
 }

@@ -15,7 +15,7 @@ const LEAST_LEFT: f64 = 1e-3;
 
 /// Means over a pixel; 0 where it sees nothing.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FirstSurface {
+pub(crate) struct FirstSurface {
     /// The colour that its material has there, before any light.
     pub albedo: DVec3,
     /// The shading normal on the camera's side, in the scene's axes.
@@ -25,7 +25,7 @@ pub struct FirstSurface {
 }
 
 /// Row by row from the top. A lens is taken for a pinhole: what is out of focus stays sharp.
-pub fn first_surfaces(scene: &Scene, camera: &Camera, (width, height): (u32, u32)) -> Vec<FirstSurface> {
+pub(crate) fn first_surfaces(scene: &Scene, camera: &Camera, (width, height): (u32, u32)) -> Vec<FirstSurface> {
     let geometry = Geometry::new(scene);
     let camera = Camera { lens: None, ..camera.clone() };
     let aspect = f64::from(width) / f64::from(height);

@@ -21,12 +21,12 @@ const OFFSET_SHARE: f64 = 1.0 / (1u64 << 36) as f64;
 const EDGE_SHARE: f64 = 1.0 / (1u64 << 40) as f64;
 
 #[derive(Clone, Copy)]
-pub struct Ray {
+pub(crate) struct Ray {
     pub origin: DVec3,
     pub direction: DVec3,
 }
 
-pub struct Triangle<'a> {
+pub(crate) struct Triangle<'a> {
     pub mesh: &'a Mesh,
     /// Among the mesh's triangles.
     pub index: usize,
@@ -41,7 +41,7 @@ pub struct Triangle<'a> {
 }
 
 #[derive(Clone, Copy)]
-pub struct Hit {
+pub(crate) struct Hit {
     /// Along the ray, in lengths of its direction.
     pub t: f64,
     pub triangle: usize,
@@ -50,7 +50,7 @@ pub struct Hit {
 }
 
 /// A point of a surface, as it is seen from `wo`.
-pub struct Vertex {
+pub(crate) struct Vertex {
     pub position: DVec3,
     /// Geometric and shading normal, unit, both on the side of `wo`.
     pub ng: DVec3,
@@ -65,7 +65,7 @@ pub struct Vertex {
     pub emission: DVec3,
 }
 
-pub struct Geometry<'a> {
+pub(crate) struct Geometry<'a> {
     scene: &'a Scene,
     pub triangles: Vec<Triangle<'a>>,
     bvh: Bvh2,
@@ -100,17 +100,17 @@ impl Triangle<'_> {
     }
 
     /// What a place has of the values of the triangle's own corners.
-    pub fn mixed<T: std::ops::Mul<f64, Output = T> + std::ops::Add<Output = T>>(&self, of_corners: [T; 3], weights: DVec3) -> T {
+    pub(super) fn mixed<T: std::ops::Mul<f64, Output = T> + std::ops::Add<Output = T>>(&self, of_corners: [T; 3], weights: DVec3) -> T {
         mix(of_corners, self.of_vertices(weights))
     }
 
     /// Of the vertices' colours.
-    pub fn alpha(&self, weights: DVec3) -> f64 {
+    pub(super) fn alpha(&self, weights: DVec3) -> f64 {
         let alphas = &self.mesh.alphas;
         if alphas.is_empty() { 1.0 } else { self.mixed(self.vertices.map(|vertex| alphas[vertex]), weights) }
     }
 
-    pub fn point(&self, weights: DVec3) -> DVec3 {
+    pub(super) fn point(&self, weights: DVec3) -> DVec3 {
         mix(self.corners, weights)
     }
 
@@ -132,7 +132,7 @@ impl Triangle<'_> {
 }
 
 impl<'a> Geometry<'a> {
-    pub fn new(scene: &'a Scene) -> Geometry<'a> {
+    pub(super) fn new(scene: &'a Scene) -> Geometry<'a> {
         let mut triangles = Vec::new();
         let kinds = contact::kinds(scene);
         let offsets = Offsets::of(scene, &kinds);
@@ -169,13 +169,13 @@ impl<'a> Geometry<'a> {
     }
 
     /// A ray that leaves a surface with this normal, on the side that it points to.
-    pub fn leaving(&self, position: DVec3, normal: DVec3, direction: DVec3) -> Ray {
+    pub(super) fn leaving(&self, position: DVec3, normal: DVec3, direction: DVec3) -> Ray {
         let side = direction.dot(normal).signum();
         Ray { origin: position + side * self.offset * normal, direction }
     }
 
     /// The nearest hit with 0 < t < `t_max`.
-    pub fn closest_hit(&self, ray: &Ray, t_max: f64) -> Option<Hit> {
+    pub(super) fn closest_hit(&self, ray: &Ray, t_max: f64) -> Option<Hit> {
         let (mut nearest, mut t_max) = (None, t_max);
         // An axis along which the ray does not move gets a huge slope: an infinite one would turn a box
         // that begins at the origin into no number.
@@ -216,7 +216,7 @@ impl<'a> Geometry<'a> {
     }
 
     /// A texture at a point of a triangle; 1 without one.
-    pub fn texel(&self, texture: Option<TextureUse>, triangle: &Triangle, weights: DVec3) -> DVec4 {
+    pub(super) fn texel(&self, texture: Option<TextureUse>, triangle: &Triangle, weights: DVec3) -> DVec4 {
         let Some(TextureUse { texture, uv_set, transform: UvTransform { scale, rotation, offset } }) = texture else { return DVec4::ONE };
         let uvs = &triangle.mesh.uvs[uv_set];
         let uv = if uvs.is_empty() { DVec2::ZERO } else { triangle.mixed(triangle.vertices.map(|vertex| uvs[vertex]), weights) };
@@ -226,12 +226,12 @@ impl<'a> Geometry<'a> {
     }
 
     /// Radiance that leaves a triangle's shining side.
-    pub fn emission(&self, triangle: &Triangle, weights: DVec3) -> DVec3 {
+    pub(super) fn emission(&self, triangle: &Triangle, weights: DVec3) -> DVec3 {
         let material = triangle.material;
         material.emission.as_dvec3() * self.texel(material.emission_texture, triangle, weights).truncate()
     }
 
-    pub fn vertex(&self, hit: &Hit, wo: DVec3) -> Vertex {
+    pub(super) fn vertex(&self, hit: &Hit, wo: DVec3) -> Vertex {
         let triangle = &self.triangles[hit.triangle];
         let material = triangle.material;
         let is_front = wo.dot(triangle.normal) > 0.0;

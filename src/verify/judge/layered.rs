@@ -30,7 +30,7 @@ fn towards_eye(n: DVec3, wo: DVec3) -> DVec3 {
 
 impl<'a> Geometry<'a> {
     /// The share of a surface that is there.
-    pub fn coverage(&self, triangle: &Triangle, weights: DVec3) -> f64 {
+    pub(super) fn coverage(&self, triangle: &Triangle, weights: DVec3) -> f64 {
         let material = triangle.material;
         let alpha =
             |factor: f32| f64::from(factor) * self.texel(material.base_colour_texture, triangle, weights).w * triangle.alpha(weights);
@@ -61,7 +61,7 @@ impl<'a> Geometry<'a> {
     }
 
     /// The shading normal of a surface with its normal map.
-    pub fn mapped_normal(&self, hit: &Hit, vertex: &Vertex) -> DVec3 {
+    pub(super) fn mapped_normal(&self, hit: &Hit, vertex: &Vertex) -> DVec3 {
         let triangle = &self.triangles[hit.triangle];
         let seen = (vertex.wo, vertex.is_front);
         self.mapped(triangle.material.normal_map, &triangle.mesh.tangents, (triangle, hit.weights), vertex.ns, seen)
@@ -83,7 +83,7 @@ impl<'a> Geometry<'a> {
 
     /// The lobes of a layered surface that is seen from within `media`, by a path that has met `depth` surfaces before.
     /// `channel`: the only one that it has light in.
-    pub fn lobes(&self, hit: &Hit, vertex: &Vertex, media: &Media<'a>, channel: Option<usize>, depth: u32) -> Lobes {
+    pub(super) fn lobes(&self, hit: &Hit, vertex: &Vertex, media: &Media<'a>, channel: Option<usize>, depth: u32) -> Lobes {
         let (triangle, wo) = (&self.triangles[hit.triangle], vertex.wo);
         let (material, layers) = (triangle.material, &triangle.material.layers);
         let texel = |texture: Option<TextureUse>| self.texel(texture, triangle, hit.weights);

@@ -18,7 +18,7 @@ enum Emitter<'a> {
     Light(&'a LightKind),
 }
 
-pub struct Emitters<'a> {
+pub(crate) struct Emitters<'a> {
     emitters: Vec<Emitter<'a>>,
     /// The share of power of this emitter and all before it.
     cumulative: Vec<f64>,
@@ -95,7 +95,7 @@ impl SkyCells<'_> {
 
 /// The last place where a path was scattered, as far as it matters to the light that its ray meets.
 #[derive(Clone, Copy)]
-pub struct Scattering {
+pub(crate) struct Scattering {
     pub position: DVec3,
     /// Of the lobe's cosine.
     pub axis: DVec3,
@@ -113,7 +113,7 @@ impl Scattering {
 }
 
 /// What arrives at a point from one sampled place.
-pub struct Arriving {
+pub(crate) struct Arriving {
     /// Unit, towards the light.
     pub wi: DVec3,
     /// On a surface that faces the light, W/m2, over the density of the sample.
@@ -126,7 +126,7 @@ pub struct Arriving {
 
 impl Arriving {
     /// Its weight where rays of this density may meet the light as well.
-    pub fn weight(&self, of_ray: f64) -> f64 {
+    pub(super) fn weight(&self, of_ray: f64) -> f64 {
         if self.density.is_infinite() { 1.0 } else { self.density / (self.density + of_ray) }
     }
 }
@@ -169,7 +169,7 @@ fn disc_intensity(law: EmissionLaw, cosine: f64) -> f64 {
 }
 
 impl<'a> Emitters<'a> {
-    pub fn new(scene: &'a Scene, geometry: &Geometry<'a>) -> Emitters<'a> {
+    pub(super) fn new(scene: &'a Scene, geometry: &Geometry<'a>) -> Emitters<'a> {
         let (min, max) = scene.bounds();
         let radius = if geometry.triangles.is_empty() { 1.0 } else { 0.5 * (max - min).length() };
         let of_triangles = geometry.triangles.iter().enumerate().map(|(number, triangle)| {
@@ -202,7 +202,7 @@ impl<'a> Emitters<'a> {
 
     /// Light straight from one emitter, chosen by power, at a point with this shading normal. `None`
     /// where nothing can arrive. What lies between is not looked at.
-    pub fn sample(&self, geometry: &Geometry, position: DVec3, ns: DVec3, rng: &mut Random) -> Option<Arriving> {
+    pub(super) fn sample(&self, geometry: &Geometry, position: DVec3, ns: DVec3, rng: &mut Random) -> Option<Arriving> {
         let last = self.emitters.len().checked_sub(1)?;
         let u = uniform(rng);
         // The last sum may round to less than 1.
@@ -260,14 +260,14 @@ impl<'a> Emitters<'a> {
     }
 
     /// The weight of emission that a ray meets on a triangle.
-    pub fn weight_of_triangle(&self, geometry: &Geometry, hit: &Hit, from: &Scattering) -> f64 {
+    pub(super) fn weight_of_triangle(&self, geometry: &Geometry, hit: &Hit, from: &Scattering) -> f64 {
         let triangle = &geometry.triangles[hit.triangle];
         let point = triangle.point(hit.weights);
         from.weight(self.of_triangles[hit.triangle] * area_density(triangle.area, from.position, point, triangle.normal))
     }
 
     /// Radiance that arrives from beyond the scene, with its weights.
-    pub fn environment(&self, direction: DVec3, from: &Scattering) -> DVec3 {
+    pub(super) fn environment(&self, direction: DVec3, from: &Scattering) -> DVec3 {
         let radiance = |(number, emitter): (usize, &Emitter)| match emitter {
             Emitter::Light(LightKind::Environment { radiance }) => {
                 let density = direction.dot(from.axis).max(0.0) / PI;
@@ -283,7 +283,7 @@ impl<'a> Emitters<'a> {
     }
 
     /// Radiance of all discs whose front a ray crosses before `t_max`, with its weights and what is left of it after its way.
-    pub fn discs_along(&self, geometry: &Geometry, ray: &Ray, t_max: f64, from: &Scattering, left: impl Fn(f64) -> DVec3) -> DVec3 {
+    pub(super) fn discs_along(&self, geometry: &Geometry, ray: &Ray, t_max: f64, from: &Scattering, left: impl Fn(f64) -> DVec3) -> DVec3 {
         let radiance = |(number, emitter): (usize, &Emitter)| {
             let Emitter::Light(LightKind::Disc { centre, normal, radius, power, law }) = emitter else { return DVec3::ZERO };
             // A hair in front of the wall that it may lie in.

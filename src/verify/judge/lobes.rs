@@ -20,7 +20,7 @@ const COAT_F0: f64 = 0.04;
 const LEAST_CHANCE: f64 = 0.02;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub(crate) enum Kind {
     Diffuse,
     Reflection,
     Transmission,
@@ -31,14 +31,14 @@ pub enum Kind {
 
 impl Kind {
     /// Whether it scatters to the side away from the eye.
-    pub fn is_beyond(self) -> bool {
+    pub(crate) fn is_beyond(self) -> bool {
         matches!(self, Kind::Transmission | Kind::DiffuseTransmission)
     }
 }
 
 /// What a lobe is to a path that follows it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Class {
+pub(crate) enum Class {
     /// The path goes straight on as if nothing were there.
     Passing,
     Sharp,
@@ -47,7 +47,7 @@ pub enum Class {
 
 /// What lies beyond a transmissive surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Wall {
+pub(crate) enum Wall {
     Thin,
     /// Indices of refraction on the side of `wo` and on the other one.
     Solid {
@@ -58,7 +58,7 @@ pub enum Wall {
 
 /// A thin film on the base.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Film {
+pub(crate) struct Film {
     /// How much of it is there.
     pub share: f64,
     pub ior: f64,
@@ -69,7 +69,7 @@ pub struct Film {
 }
 
 impl Film {
-    pub const NONE: Film = Film { share: 0.0, ior: 1.0, thickness: 0.0, bound: 0.0 };
+    pub(crate) const NONE: Film = Film { share: 0.0, ior: 1.0, thickness: 0.0, bound: 0.0 };
 
     /// What it makes of `bare` reflectance over a base of this F0.
     fn over(&self, bare: DVec3, f0: DVec3, cosine: f64) -> DVec3 {
@@ -82,7 +82,7 @@ impl Film {
 
 /// A material at a point, its textures included.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Inputs {
+pub(crate) struct Inputs {
     pub base_colour: DVec3,
     pub metalness: f64,
     /// Squared roughness.
@@ -108,7 +108,7 @@ pub struct Inputs {
 
 /// Unit vectors: towards the eye, and normals on its side.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Frame {
+pub(crate) struct Frame {
     pub wo: DVec3,
     /// Of the triangle.
     pub ng: DVec3,
@@ -116,7 +116,7 @@ pub struct Frame {
     pub coat_n: DVec3,
 }
 
-pub struct Lobes {
+pub(crate) struct Lobes {
     inputs: Inputs,
     frame: Frame,
     /// F0d and F0t.
@@ -132,7 +132,7 @@ pub struct Lobes {
 }
 
 /// Where a path goes on.
-pub struct Scattered {
+pub(crate) struct Scattered {
     pub wi: DVec3,
     /// BSDF times cosine over the density.
     pub weight: DVec3,
@@ -186,7 +186,7 @@ fn along_normal(from: f64, to: f64) -> f64 {
 }
 
 impl Lobes {
-    pub fn new(inputs: Inputs, frame: Frame) -> Lobes {
+    pub(crate) fn new(inputs: Inputs, frame: Frame) -> Lobes {
         // An ior of 0 stands for an infinite one.
         let f0 = inputs.f0(if inputs.ior == 0.0 { 1.0 } else { along_normal(inputs.ior, 1.0) });
         let f0_transmission = match inputs.wall {
@@ -321,12 +321,12 @@ impl Lobes {
     }
 
     /// Lobes and the probabilities with which a path chooses them.
-    pub fn chances(&self) -> impl Iterator<Item = (Kind, f64)> {
+    pub(crate) fn chances(&self) -> impl Iterator<Item = (Kind, f64)> {
         self.chances.into_iter().filter(|(_, chance)| *chance > 0.0)
     }
 
     /// A lobe and its probability; `None` where all is black.
-    pub fn choose(&self, rng: &mut Random) -> Option<(Kind, f64)> {
+    pub(crate) fn choose(&self, rng: &mut Random) -> Option<(Kind, f64)> {
         let mut left = uniform(rng);
         let mut chosen = None;
         for (kind, chance) in self.chances() {
@@ -340,7 +340,7 @@ impl Lobes {
         chosen
     }
 
-    pub fn is_delta(&self, kind: Kind) -> bool {
+    pub(crate) fn is_delta(&self, kind: Kind) -> bool {
         match kind {
             Kind::Diffuse | Kind::Sheen | Kind::DiffuseTransmission => false,
             Kind::Reflection => is_delta(self.inputs.alpha),
@@ -353,7 +353,7 @@ impl Lobes {
         matches!(self.inputs.wall, Wall::Solid { from, to } if from == to)
     }
 
-    pub fn class(&self, kind: Kind) -> Class {
+    pub(crate) fn class(&self, kind: Kind) -> Class {
         let by_alpha = |alpha: f64| if alpha * 1000.0 < f64::from(MAP_ALPHA_PER_MILLE) { Class::Sharp } else { Class::Matt };
         match kind {
             Kind::Diffuse | Kind::Sheen => Class::Matt,
@@ -368,7 +368,7 @@ impl Lobes {
     }
 
     /// The normal that a lobe's cosine is taken with, on the side that it scatters to.
-    pub fn axis(&self, kind: Kind) -> DVec3 {
+    pub(crate) fn axis(&self, kind: Kind) -> DVec3 {
         match kind {
             Kind::Coat => self.frame.coat_n,
             _ if kind.is_beyond() => -self.frame.n,
@@ -407,7 +407,7 @@ impl Lobes {
     }
 
     /// BSDF of a lobe that is no delta, 1/sr.
-    pub fn evaluate(&self, kind: Kind, wi: DVec3) -> DVec3 {
+    pub(crate) fn evaluate(&self, kind: Kind, wi: DVec3) -> DVec3 {
         if !self.reaches(kind, wi) || self.is_delta(kind) {
             return DVec3::ZERO;
         }
@@ -447,7 +447,7 @@ impl Lobes {
     }
 
     /// Density of a lobe's samples per solid angle; 0 for a delta.
-    pub fn density(&self, kind: Kind, wi: DVec3) -> f64 {
+    pub(crate) fn density(&self, kind: Kind, wi: DVec3) -> f64 {
         if !self.reaches(kind, wi) || self.is_delta(kind) {
             return 0.0;
         }
@@ -466,7 +466,7 @@ impl Lobes {
     }
 
     /// A direction of a lobe; `None` where the sample lies on the wrong side.
-    pub fn sample(&self, kind: Kind, rng: &mut Random) -> Option<Scattered> {
+    pub(crate) fn sample(&self, kind: Kind, rng: &mut Random) -> Option<Scattered> {
         if self.is_delta(kind) {
             return self.follow_delta(kind);
         }
@@ -508,7 +508,7 @@ impl Lobes {
     }
 
     /// What a shadow ray keeps: the share of a thin smooth wall.
-    pub fn passed(&self) -> DVec3 {
+    pub(crate) fn passed(&self) -> DVec3 {
         let passing = Kind::Transmission;
         let passes = self.class(passing) == Class::Passing;
         passes.then(|| self.follow_delta(passing)).flatten().map_or(DVec3::ZERO, |straight| straight.weight)

@@ -10,18 +10,18 @@ use crate::constants::SMOOTH_TOTAL_REFLECTIONS;
 use crate::scene::Surface;
 
 /// `w` reflected about a unit normal; both point away from the surface.
-pub fn mirrored(w: DVec3, normal: DVec3) -> DVec3 {
+pub(crate) fn mirrored(w: DVec3, normal: DVec3) -> DVec3 {
     2.0 * w.dot(normal) * normal - w
 }
 
 /// `local` in a frame whose z is `axis`, a unit vector.
-pub fn around(axis: DVec3, local: DVec3) -> DVec3 {
+pub(crate) fn around(axis: DVec3, local: DVec3) -> DVec3 {
     let (x, y) = axis.any_orthonormal_pair();
     local.x * x + local.y * y + local.z * axis
 }
 
 /// A direction with a density in proportion to cos^exponent around a unit axis.
-pub fn sample_lobe(axis: DVec3, exponent: f64, rng: &mut Random) -> DVec3 {
+pub(crate) fn sample_lobe(axis: DVec3, exponent: f64, rng: &mut Random) -> DVec3 {
     // 1 - u is never 0: then no direction lies on the horizon, where a cosine's density is 0.
     let cosine = (1.0 - uniform(rng)).powf(1.0 / (exponent + 1.0));
     let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
@@ -36,7 +36,7 @@ fn lobe(cosine: f64, exponent: f32) -> f64 {
 
 /// Reflectance for unpolarised light of a smooth boundary between media of these indices of refraction,
 /// from the cosine on the side where light arrives; 1 in total internal reflection.
-pub fn fresnel(cos_i: f64, n_i: f64, n_t: f64) -> f64 {
+pub(crate) fn fresnel(cos_i: f64, n_i: f64, n_t: f64) -> f64 {
     let sin_t = n_i / n_t * (1.0 - cos_i * cos_i).max(0.0).sqrt();
     if sin_t >= 1.0 {
         return 1.0;
@@ -50,7 +50,7 @@ pub fn fresnel(cos_i: f64, n_i: f64, n_t: f64) -> f64 {
 impl Vertex {
     /// The BRDF of a surface that is not specular, 1/sr. `towards_eye`: no surface that is not specular
     /// lies between it and the eye; there alone the paper's Phong has its lobe.
-    pub fn brdf(&self, wi: DVec3, towards_eye: bool) -> DVec3 {
+    pub(super) fn brdf(&self, wi: DVec3, towards_eye: bool) -> DVec3 {
         let cosine = mirrored(wi, self.ns).dot(self.wo);
         let share = match self.surface {
             Surface::Lambert => FRAC_1_PI,
@@ -64,7 +64,7 @@ impl Vertex {
 
     /// Where a path goes on that has met `depth` surfaces before, and its weight: BRDF times cosine over the density of the
     /// direction. `None`: the direction lies on the wrong side, and the path ends.
-    pub fn scatter(&self, depth: u32, towards_eye: bool, rng: &mut Random) -> Option<(DVec3, DVec3)> {
+    pub(super) fn scatter(&self, depth: u32, towards_eye: bool, rng: &mut Random) -> Option<(DVec3, DVec3)> {
         let (wi, weight, is_transmitted) = match self.surface {
             Surface::Lambert => (sample_lobe(self.ns, 1.0, rng), 1.0, false),
             Surface::PaperPhong { exponent } => {

@@ -14,16 +14,16 @@ const OUTWARDS: DVec3 = DVec3::new(0.290_380_3, 0.829_658_1, 0.476_861_2);
 /// The solids around a point, the one that fills the place at the end: the one entered last, or the smallest where solids lie partly in
 /// one another.
 #[derive(Clone, Default)]
-pub struct Media<'a> {
+pub(crate) struct Media<'a> {
     solids: Vec<&'a Material>,
     by_size: Option<BySize<'a>>,
 }
 
 /// Materials of solids, the largest first.
-pub type BySize<'a> = Arc<[&'a Material]>;
+pub(crate) type BySize<'a> = Arc<[&'a Material]>;
 
 /// Those of a scene in which solids of different media lie partly in one another.
-pub fn by_size(scene: &Scene) -> Option<BySize<'_>> {
+pub(crate) fn by_size(scene: &Scene) -> Option<BySize<'_>> {
     match solids::order(scene) {
         Order::Size(order) => Some(order.into_iter().map(|material| &scene.materials[material]).collect()),
         Order::Entry | Order::Unclear(_) => None,
@@ -31,7 +31,7 @@ pub fn by_size(scene: &Scene) -> Option<BySize<'_>> {
 }
 
 /// Whether a material encloses a medium.
-pub fn is_solid(material: &Material) -> bool {
+pub(crate) fn is_solid(material: &Material) -> bool {
     let layers = &material.layers;
     let lets_in = layers.transmission > 0.0 || layers.diffuse_transmission > 0.0;
     material.surface == Surface::Layered && lets_in && layers.medium.is_some() && !layers.is_unlit
@@ -56,17 +56,17 @@ fn is_dispersive(solid: &Material) -> bool {
 
 impl<'a> Media<'a> {
     /// Index of refraction.
-    pub fn index(&self, channel: Option<usize>) -> f64 {
+    pub(super) fn index(&self, channel: Option<usize>) -> f64 {
         self.solids.last().map_or(1.0, |solid| index_of(solid, channel))
     }
 
     /// Whether colours have different ones.
-    pub fn is_dispersive(&self) -> bool {
+    pub(super) fn is_dispersive(&self) -> bool {
         self.solids.last().is_some_and(|solid| is_dispersive(solid))
     }
 
     /// Share of light that is left after a way.
-    pub fn transmittance(&self, metres: f64) -> DVec3 {
+    pub(super) fn transmittance(&self, metres: f64) -> DVec3 {
         let medium = self.solids.last().and_then(|solid| solid.layers.medium);
         medium.map_or(DVec3::ONE, |medium| medium.transmittance.as_dvec3().map(|share| share.powf(metres / f64::from(medium.metres))))
     }
@@ -76,7 +76,7 @@ impl<'a> Media<'a> {
     }
 
     /// On the side from which a solid's surface is seen: whoever sees its back is inside.
-    pub fn before(mut self, solid: &'a Material, is_front: bool) -> Media<'a> {
+    pub(super) fn before(mut self, solid: &'a Material, is_front: bool) -> Media<'a> {
         if !is_front && self.place(solid).is_none() {
             self.enter(solid);
         }
@@ -84,7 +84,7 @@ impl<'a> Media<'a> {
     }
 
     /// On its other side.
-    pub fn beyond(&self, solid: &'a Material, is_front: bool) -> Media<'a> {
+    pub(super) fn beyond(&self, solid: &'a Material, is_front: bool) -> Media<'a> {
         let mut media = self.clone();
         if is_front {
             media.enter(solid);
@@ -103,7 +103,7 @@ impl<'a> Media<'a> {
     }
 
     /// Around a point: the solids that a ray from there leaves without having entered them.
-    pub fn around(geometry: &Geometry<'a>, by_size: Option<BySize<'a>>, position: DVec3) -> Media<'a> {
+    pub(super) fn around(geometry: &Geometry<'a>, by_size: Option<BySize<'a>>, position: DVec3) -> Media<'a> {
         let (mut entered, mut left) = (Media::default(), Vec::new());
         let mut ray = Ray { origin: position, direction: OUTWARDS.normalize() };
         while let Some(hit) = geometry.closest_hit(&ray, f64::INFINITY) {

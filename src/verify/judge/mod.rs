@@ -14,12 +14,12 @@ mod first_surface;
 mod geometry;
 mod layered;
 mod light;
-pub mod lobes;
+pub(crate) mod lobes;
 mod material;
 mod media;
 mod microfacets;
 mod path;
-pub mod radiosity;
+pub(crate) mod radiosity;
 mod verdict;
 
 use std::cell::Cell;
@@ -32,13 +32,13 @@ use rand_pcg::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
 
 use crate::scene::{Camera, Scene};
-pub use crate::settings::scene::Part;
-pub use first_surface::{FirstSurface, first_surfaces};
+pub(crate) use crate::settings::scene::Part;
+pub(crate) use first_surface::{FirstSurface, first_surfaces};
 use geometry::Geometry;
 use light::Emitters;
-pub use material::fresnel;
+pub(crate) use material::fresnel;
 use media::{BySize, is_solid};
-pub use verdict::Verdict;
+pub(crate) use verdict::Verdict;
 
 /// Radiance (W/m2/sr) or irradiance (W/m2) by [`Part`], linear RGB. Irradiance has no specular part.
 ///
@@ -46,7 +46,7 @@ pub use verdict::Verdict;
 /// lies before and behind x. Of layered surfaces it is the lobe that counts, sharp or matt: see the guide's page on materials.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
 #[repr(C)]
-pub struct Parts {
+pub(crate) struct Parts {
     /// Emission that is seen as such, and light that reaches x straight from where it is emitted.
     pub direct: DVec3,
     /// All that is seen through specular surfaces.
@@ -59,7 +59,7 @@ pub struct Parts {
 
 /// The mean of independent samples.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Estimate {
+pub(crate) struct Estimate {
     pub mean: Parts,
     /// Standard error of each part's mean, and of the total's; infinite for less than two samples.
     pub standard_error: Parts,
@@ -68,14 +68,14 @@ pub struct Estimate {
 
 /// Radiance by pixel, row by row from the top.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Image {
+pub(crate) struct Image {
     pub width: u32,
     pub height: u32,
     pub pixels: Vec<Estimate>,
 }
 
 /// A scene, ready for rays.
-pub struct Judge<'a> {
+pub(crate) struct Judge<'a> {
     geometry: Geometry<'a>,
     emitters: Emitters<'a>,
     /// Some material encloses a medium.
@@ -85,10 +85,10 @@ pub struct Judge<'a> {
 }
 
 /// Random numbers of one pixel or point.
-pub type Random = rand_pcg::Pcg64;
+pub(crate) type Random = rand_pcg::Pcg64;
 
 /// The random numbers `index` of a seed: what a pixel's result depends on, whichever thread computes it.
-pub fn random(seed: u64, index: u64) -> Random {
+pub(crate) fn random(seed: u64, index: u64) -> Random {
     Random::seed_from_u64(seed.rotate_left(32) ^ index)
 }
 
@@ -102,7 +102,7 @@ thread_local! {
 }
 
 /// Paths that this thread has asked judges for so far, a count that no clock disturbs.
-pub fn paths_traced() -> u64 {
+pub(crate) fn paths_traced() -> u64 {
     PATHS.get()
 }
 
@@ -113,7 +113,7 @@ fn count_paths(paths: u64) {
 impl<'a> Judge<'a> {
     /// `max_bounces`: surfaces that may scatter light on its way from the emitter to the eye, or to the
     /// point that irradiance is asked for; `u32::MAX` for no limit.
-    pub fn new(scene: &'a Scene, max_bounces: u32) -> Judge<'a> {
+    pub(crate) fn new(scene: &'a Scene, max_bounces: u32) -> Judge<'a> {
         let geometry = Geometry::new(scene);
         let emitters = Emitters::new(scene, &geometry);
         let has_solids = scene.materials.iter().any(is_solid);
@@ -122,7 +122,7 @@ impl<'a> Judge<'a> {
     }
 
     /// A picture. Samples are spread evenly over each pixel's square.
-    pub fn image(&self, camera: &Camera, width: u32, height: u32, samples_per_pixel: u32, seed: u64) -> Image {
+    pub(crate) fn image(&self, camera: &Camera, width: u32, height: u32, samples_per_pixel: u32, seed: u64) -> Image {
         count_paths(u64::from(width) * u64::from(height) * u64::from(samples_per_pixel));
         let aspect = f64::from(width) / f64::from(height);
         let pixel = |number: u32| {
@@ -143,7 +143,7 @@ impl<'a> Judge<'a> {
     }
 
     /// Irradiance at points, each with the unit normal of the side that is lit.
-    pub fn irradiance_at(&self, points: &[(DVec3, DVec3)], samples: u32, seed: u64) -> Vec<Estimate> {
+    pub(crate) fn irradiance_at(&self, points: &[(DVec3, DVec3)], samples: u32, seed: u64) -> Vec<Estimate> {
         count_paths(points.len() as u64 * u64::from(samples));
         let estimate = |(index, (point, normal)): (usize, &(DVec3, DVec3))| {
             let mut rng = random(seed, index as u64);
@@ -176,7 +176,7 @@ impl Estimate {
 }
 
 impl Parts {
-    pub fn total(&self) -> DVec3 {
+    pub(crate) fn total(&self) -> DVec3 {
         self.direct + self.specular + self.caustic + self.indirect
     }
 

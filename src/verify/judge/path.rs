@@ -81,14 +81,14 @@ impl Prefix<'_> {
 
 impl<'a> Judge<'a> {
     /// One sample of the radiance that arrives along a ray, W/m2/sr.
-    pub fn radiance(&self, origin: DVec3, direction: DVec3, rng: &mut Random) -> Parts {
+    pub(crate) fn radiance(&self, origin: DVec3, direction: DVec3, rng: &mut Random) -> Parts {
         let last = Scattering { position: origin, axis: direction, density: f64::INFINITY };
         let prefix = self.start(origin, last, 0);
         self.follow(Ray { origin, direction }, prefix, rng)
     }
 
     /// One sample of the irradiance at a point, on the side of its unit normal, W/m2.
-    pub fn irradiance(&self, point: DVec3, normal: DVec3, rng: &mut Random) -> Parts {
+    pub(crate) fn irradiance(&self, point: DVec3, normal: DVec3, rng: &mut Random) -> Parts {
         let prefix = self.start(point + self.geometry.offset * normal, Scattering { position: point, axis: normal, density: 0.0 }, 1);
         let direct = self.direct_light(&prefix, (point, normal), normal, |_| (DVec3::ONE, 0.0), rng);
         let ray = self.geometry.leaving(point, normal, sample_lobe(normal, 1.0, rng));

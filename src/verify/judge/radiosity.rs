@@ -14,38 +14,38 @@ const HALF_EDGE: f64 = 0.25;
 const EDGE: f64 = 2.0 * HALF_EDGE;
 const LIGHT_RADIUS: f64 = 0.05;
 /// Left, right, floor, ceiling, back: the wall 2 * axis + (1 on the positive side). The sixth is open.
-pub const WALLS: usize = 5;
+pub(crate) const WALLS: usize = 5;
 /// Walls in whose middle the lamps lie, in the order of their photons.
 const LIT_WALLS: [usize; 2] = [2, 0];
 
 /// Radiant intensity over the hemisphere.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Law {
+pub(crate) enum Law {
     Uniform,
     Cosine,
 }
 
 /// Flux from each of the two lamps, of 1 W, or what it makes.
-pub type ByLamp = [f64; 2];
+pub(crate) type ByLamp = [f64; 2];
 
 fn side(wall: usize) -> f64 {
     if wall.is_multiple_of(2) { -1.0 } else { 1.0 }
 }
 
 /// Normal of a wall, into the box.
-pub fn inward(wall: usize) -> DVec3 {
+pub(crate) fn inward(wall: usize) -> DVec3 {
     -side(wall) * DVec3::AXES[wall / 2]
 }
 
 /// The point of a wall at coordinates s and t, from -1/4 to 1/4 m along the two axes after the wall's own.
-pub fn on_wall(wall: usize, s: f64, t: f64) -> DVec3 {
+pub(crate) fn on_wall(wall: usize, s: f64, t: f64) -> DVec3 {
     let axis = wall / 2;
     side(wall) * HALF_EDGE * DVec3::AXES[axis] + s * DVec3::AXES[(axis + 1) % 3] + t * DVec3::AXES[(axis + 2) % 3]
 }
 
 /// A rectangle of a wall.
 #[derive(Debug, Clone, Copy)]
-pub struct Cell {
+pub(crate) struct Cell {
     pub wall: usize,
     pub s: [f64; 2],
     pub t: [f64; 2],
@@ -69,19 +69,19 @@ impl Cell {
     }
 
     /// Share of the light that leaves this cell evenly and arrives at the other.
-    pub fn form_factor(&self, other: &Cell) -> f64 {
+    pub(crate) fn form_factor(&self, other: &Cell) -> f64 {
         exchange(self, other) / self.area()
     }
 }
 
 /// Cells of a wall, row by row.
-pub fn cells_of(wall: usize, n: usize) -> impl Iterator<Item = Cell> {
+pub(crate) fn cells_of(wall: usize, n: usize) -> impl Iterator<Item = Cell> {
     Cell { wall, s: [-HALF_EDGE, HALF_EDGE], t: [-HALF_EDGE, HALF_EDGE] }.parts(n)
 }
 
 /// Form factor of a cell seen from a point of a surface with this normal, the cell wholly before it: Lambert's sum
 /// over the edges of the angle each takes up, times the cosine of the plane through it and the point.
-pub fn form_factor_from(point: DVec3, normal: DVec3, cell: &Cell) -> f64 {
+pub(crate) fn form_factor_from(point: DVec3, normal: DVec3, cell: &Cell) -> f64 {
     let corners = cell.corners().map(|corner| corner - point);
     let sum: f64 = (0..4)
         .map(|k| {
@@ -110,7 +110,7 @@ fn solid_angle_from(point: DVec3, cell: &Cell) -> f64 {
 
 /// Area times form factor between two cells of different walls: the double contour integral
 /// 1 / 2 pi of ln r along both outlines (Sparrow 1963), to which edges at a right angle add nothing.
-pub fn exchange(one: &Cell, other: &Cell) -> f64 {
+pub(crate) fn exchange(one: &Cell, other: &Cell) -> f64 {
     let (a, b) = (one.corners(), other.corners());
     let mut sum = 0.0;
     for i in 0..4 {
@@ -218,7 +218,7 @@ impl FormFactors {
 }
 
 /// Irradiance of the cells of all walls, wall by wall and row by row, W/m2 from each lamp.
-pub struct Radiosity {
+pub(crate) struct Radiosity {
     pub n: usize,
     pub law: Law,
     pub albedo: f64,
@@ -229,7 +229,7 @@ pub struct Radiosity {
 impl Radiosity {
     /// On n x n cells a wall, n even, by Richardson's extrapolation from these and twice as wide ones: cells of constant
     /// radiosity err with the square of their width.
-    pub fn solve(law: Law, albedo: f64, n: usize, orders: usize) -> Radiosity {
+    pub(crate) fn solve(law: Law, albedo: f64, n: usize, orders: usize) -> Radiosity {
         let coarse = Radiosity::on_cells(law, albedo, n / 2, orders);
         let mut solution = Radiosity::on_cells(law, albedo, n, orders);
         for (values, coarse) in solution.orders.iter_mut().zip(&coarse.orders) {
@@ -278,7 +278,7 @@ impl Radiosity {
 
     /// Flux that a photon of each lamp brings to the cells of an order, as a mean over its photons: the chance that it
     /// arrives there.
-    pub fn arrives(&self, order: usize, cells: impl Iterator<Item = usize>) -> ByLamp {
+    pub(crate) fn arrives(&self, order: usize, cells: impl Iterator<Item = usize>) -> ByLamp {
         let cell_area = (EDGE / self.n as f64).powi(2);
         let mut sum = [0.0; 2];
         for cell in cells {
@@ -288,13 +288,13 @@ impl Radiosity {
     }
 
     /// Cells of a wall.
-    pub fn wall(&self, wall: usize) -> std::ops::Range<usize> {
+    pub(crate) fn wall(&self, wall: usize) -> std::ops::Range<usize> {
         let n = self.n * self.n;
         wall * n..(wall + 1) * n
     }
 
     /// Irradiance straight from both lamps at a point of a wall: intensity times cosine over squared distance.
-    pub fn direct_at(&self, wall: usize, point: DVec3) -> f64 {
+    pub(crate) fn direct_at(&self, wall: usize, point: DVec3) -> f64 {
         let mut sum = 0.0;
         for lit in LIT_WALLS.into_iter().filter(|lit| *lit != wall) {
             for (from, share) in lamp_points(lit) {
@@ -333,7 +333,7 @@ impl Radiosity {
     /// What all walls reflect to a point of one, from both lamps and of all orders, with the exact form factors of the
     /// point. Cells around the edge next to it are cut finer, since it sees how
     /// light changes across them.
-    pub fn reflected_at(&self, wall: usize, point: DVec3) -> f64 {
+    pub(crate) fn reflected_at(&self, wall: usize, point: DVec3) -> f64 {
         const CUTS: usize = 6;
         let near = 3.0 * EDGE / self.n as f64;
         let mut sum = 0.0;
@@ -354,7 +354,7 @@ impl Radiosity {
     }
 
     /// Mean of all light over a disc that lies on its wall.
-    pub fn over_disc(&self, wall: usize, [s, t]: [f64; 2], radius: f64) -> f64 {
+    pub(crate) fn over_disc(&self, wall: usize, [s, t]: [f64; 2], radius: f64) -> f64 {
         let direct: f64 =
             disc_points().map(|(x, y, share)| share * self.direct_at(wall, on_wall(wall, s + radius * x, t + radius * y))).sum();
         direct + self.reflected_over_disc(wall, [s, t], radius)
@@ -362,7 +362,7 @@ impl Radiosity {
 
     /// The same of reflected light, which is smoother: seven points, exact for polynomials up to degree five
     /// (Stroud 1971, S2 5-1).
-    pub fn reflected_over_disc(&self, wall: usize, [s, t]: [f64; 2], radius: f64) -> f64 {
+    pub(crate) fn reflected_over_disc(&self, wall: usize, [s, t]: [f64; 2], radius: f64) -> f64 {
         let ring = radius * (2.0f64 / 3.0).sqrt();
         let around = (0..6).map(|k| {
             let (sin, cos) = (TAU * f64::from(k) / 6.0).sin_cos();

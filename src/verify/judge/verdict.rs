@@ -14,7 +14,7 @@ const ROUNDING: f64 = 1e-5;
 
 /// A comparison, block by block.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Verdict {
+pub(crate) struct Verdict {
     pub blocks: usize,
     /// Blocks and channels that differ by more than four standard errors.
     pub apart: usize,
@@ -35,7 +35,7 @@ impl Verdict {
     ///
     /// What neither saw, neither states an error of: an edge or a spark that a pixel's `samples` (the fewer of both)
     /// all missed may be worth one sample of what the block holds, and each number is rounded.
-    pub fn new(means: &[DVec3], errors: &[DVec3], samples: u32, judged: &Image, part: Option<Part>) -> Verdict {
+    pub(crate) fn new(means: &[DVec3], errors: &[DVec3], samples: u32, judged: &Image, part: Option<Part>) -> Verdict {
         let of = |parts: &Parts| part.map_or(parts.total(), |part| parts[part]);
         let (width, height) = (judged.width, judged.height);
         let side = |length: u32, block: u32| (block * length / BLOCKS)..((block + 1) * length / BLOCKS);
@@ -90,7 +90,7 @@ impl Verdict {
         verdict
     }
 
-    pub fn agrees(&self) -> bool {
+    pub(crate) fn agrees(&self) -> bool {
         self.apart == 0
     }
 }

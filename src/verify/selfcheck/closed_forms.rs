@@ -80,7 +80,7 @@ fn seen(name: impl Into<String>, expected: f64, in_scene: &'static str, settings
     case(name, expected, move |gpu| radiance(gpu, &scene(in_scene), &settings, eye, point))
 }
 
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     [furnace(), integrating_sphere(), point(), disc(), sun_and_sky(), mirrors(), glass()].into_iter().flatten().collect()
 }
 

@@ -12,10 +12,10 @@ use crate::scene::{Camera, Scene};
 use crate::settings::scene::SceneSettings;
 
 /// Independent runs of a case.
-pub const SEEDS: u64 = 16;
+pub(crate) const SEEDS: u64 = 16;
 
 /// Mean and standard error of the mean of independent values.
-pub fn estimate_of(values: &[f64]) -> Estimate {
+pub(crate) fn estimate_of(values: &[f64]) -> Estimate {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;
     let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0);
@@ -41,16 +41,16 @@ fn light(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, target: Target) -> 
 }
 
 /// Irradiance at points (position, normal), W/m2.
-pub fn irradiance(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, points: &[(DVec3, DVec3)]) -> Result<Estimate> {
+pub(crate) fn irradiance(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, points: &[(DVec3, DVec3)]) -> Result<Estimate> {
     light(gpu, scene, settings, Target::Points(points))
 }
 
 /// Radiance along one ray, W/m2/sr, seen through a picture of a narrow view.
-pub fn radiance(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, eye: DVec3, target: DVec3) -> Result<Estimate> {
+pub(crate) fn radiance(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, eye: DVec3, target: DVec3) -> Result<Estimate> {
     mean_radiance(gpu, scene, settings, &Camera::looking_at("ray", eye, target, DVec3::Y, 0.003))
 }
 
 /// Radiance over a camera's picture, W/m2/sr.
-pub fn mean_radiance(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, camera: &Camera) -> Result<Estimate> {
+pub(crate) fn mean_radiance(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, camera: &Camera) -> Result<Estimate> {
     light(gpu, scene, settings, Target::Picture(camera, [24, 24]))
 }

@@ -1,8 +1,8 @@
 //! Checks against closed forms on the user's device. Each case computes a known value with the same kernels that
 //! render and bake, so that a driver that miscompiles a kernel is found here and not in an image.
 
-pub mod closed_forms;
-pub mod measure;
+pub(crate) mod closed_forms;
+pub(crate) mod measure;
 mod open_box;
 
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,10 +13,10 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 
 /// Measures on a device; `None` runs the CPU builder.
-pub type Measurement = dyn Fn(Option<&Gpu>) -> Result<Estimate>;
+pub(crate) type Measurement = dyn Fn(Option<&Gpu>) -> Result<Estimate>;
 
 /// A value that is known, and a way to measure it.
-pub struct Case {
+pub(crate) struct Case {
     pub name: String,
     pub expected: f64,
     pub measure: Box<Measurement>,
@@ -26,14 +26,14 @@ pub struct Case {
 
 /// A mean and its standard error.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Estimate {
+pub(crate) struct Estimate {
     pub mean: f64,
     pub standard_error: f64,
 }
 
 /// What was found of a case.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Finding {
+pub(crate) struct Finding {
     pub name: String,
     pub expected: f64,
     pub found: f64,
@@ -46,12 +46,12 @@ pub struct Finding {
 /// Standard errors that a case may be off: a false alarm in 1.7 million cases where the error is known, in 6000 where
 /// it is that of 16 runs (Student's t). With fixed seeds a device that passes once passes always. Every case
 /// notices an error of 1 % (`tests/light/closed_form.rs`).
-pub const Z_LIMIT: f64 = 5.0;
+pub(crate) const Z_LIMIT: f64 = 5.0;
 /// Where nothing is random the error is that of single precision over many operations.
 const ROUNDING: f64 = 1e-5;
 
 impl Finding {
-    pub fn new(name: &str, expected: f64, estimate: Estimate) -> Finding {
+    pub(crate) fn new(name: &str, expected: f64, estimate: Estimate) -> Finding {
         // An error that is no number stays one.
         let rounding = ROUNDING * expected.abs();
         let standard_error = if estimate.standard_error < rounding { rounding } else { estimate.standard_error };
@@ -62,12 +62,12 @@ impl Finding {
 }
 
 /// Every case, those of the CPU builder too.
-pub fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     [open_box::cases(), closed_forms::cases()].into_iter().flatten().collect()
 }
 
 /// Runs the cases that `gpu` allows (without one, those of the CPU builder), and tells each as it is found.
-pub fn run(gpu: Option<&Gpu>, cancelled: &AtomicBool, mut tell: impl FnMut(&Finding)) -> Result<Vec<Finding>> {
+pub(crate) fn run(gpu: Option<&Gpu>, cancelled: &AtomicBool, mut tell: impl FnMut(&Finding)) -> Result<Vec<Finding>> {
     let mut findings = Vec::new();
     for case in cases().into_iter().filter(|case| !case.on_gpu || gpu.is_some()) {
         if cancelled.load(Ordering::Relaxed) {

@@ -21,7 +21,7 @@ use crate::gpu::{Buffer, Commands, Extent, Kernel, Module};
 use crate::records::{DispatchSizePush, TreePush};
 
 /// Kernels that the tree needs.
-pub fn modules() -> Vec<Module> {
+pub(crate) fn modules() -> Vec<Module> {
     vec![
         TreeSizes::MODULE,
         TreeKeys::MODULE,

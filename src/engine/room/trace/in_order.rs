@@ -10,7 +10,7 @@ use crate::path::StoredPath;
 use crate::records::TracePush;
 
 /// Survivors are counted by work group, the counts summed, and the survivors moved to where they belong.
-pub fn one_bounce<'a>(
+pub(crate) fn one_bounce<'a>(
     commands: &mut Commands,
     Chunk { resources, plan, .. }: Chunk,
     [paths, next_paths]: [&Buffer<StoredPath>; 2],

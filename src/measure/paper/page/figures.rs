@@ -7,7 +7,7 @@ use crate::measure::paper::figures::{Figure, letter};
 use crate::measure::paper::{Reproduction, verdicts};
 use crate::output::page::picture;
 
-pub fn figures(found: &Reproduction) -> Markup {
+pub(crate) fn figures(found: &Reproduction) -> Markup {
     html! {
         section id="figures" {
             h2 { "Figures 1 to 4" }

@@ -12,7 +12,7 @@ use crate::output::words::count;
 
 const TITLE: &str = "Photon Mapping On The GPU, measured again";
 
-pub fn html(found: &Reproduction) -> String {
+pub(crate) fn html(found: &Reproduction) -> String {
     let content = html! {
         style { (PreEscaped(include_str!("page.css"))) }
         (head(found))

@@ -9,7 +9,7 @@ use crate::output::page::table;
 use crate::output::words;
 use crate::text::counted;
 
-pub fn summary(verdicts: &[Verdict]) -> Markup {
+pub(crate) fn summary(verdicts: &[Verdict]) -> Markup {
     let (claims, additions): (Vec<&Verdict>, Vec<&Verdict>) = verdicts.iter().partition(|verdict| verdict.standing.is_some());
     html! {
         section id="standing" {
@@ -81,7 +81,7 @@ fn row(verdict: &Verdict) -> Markup {
     }
 }
 
-pub fn badge(standing: Standing, words: &str) -> Markup {
+pub(crate) fn badge(standing: Standing, words: &str) -> Markup {
     html! { span class={ "standing " (standing.class()) } { (words) } }
 }
 

@@ -10,7 +10,7 @@ use crate::output::words::{count, duration, number, times};
 use crate::settings::Gather;
 use crate::text::counted;
 
-pub fn running_times(found: &Reproduction) -> Markup {
+pub(crate) fn running_times(found: &Reproduction) -> Markup {
     html! {
         section id="running-times" {
             h2 { "Running times (section 4.3)" }
@@ -118,7 +118,7 @@ fn left_out(experiments: &[LeftOut], limit_ms: f64, known: &str) -> Markup {
     }
 }
 
-pub fn table_1(found: &Reproduction) -> Markup {
+pub(crate) fn table_1(found: &Reproduction) -> Markup {
     let large = format!("Grid, {} photons per round (philox)", count(u64::from(found.request.large)));
     let titles = ["Brute force, as in the paper", "The same photons, sorted into a grid", &large];
     html! {

@@ -36,7 +36,7 @@ fn mean_between(frame: &Frame, from: f64, to: f64) -> f64 {
 }
 
 /// Directly lit places are brighter (figure 1).
-pub fn figure_1(found: &Reproduction) -> Option<Verdict> {
+pub(crate) fn figure_1(found: &Reproduction) -> Option<Verdict> {
     let figure = figure(found, 1)?;
     let contrast = figure.over_seeds(|frames| mean_between(&frames[0], 0.9, 1.0) / mean_between(&frames[0], 0.0, 0.1));
     let lit = mean(illumination(&figure.frames[0].walls).map(|value| f64::from(u8::from(value > 0.0))));
@@ -73,7 +73,7 @@ fn noise_of_seeds(figure: &Figure) -> Option<f64> {
 }
 
 /// Mean illumination by shininess (figure 3), of which the paper says nothing.
-pub fn figure_3(found: &Reproduction) -> Option<Verdict> {
+pub(crate) fn figure_3(found: &Reproduction) -> Option<Verdict> {
     let figure = figure(found, 3)?;
     let brightness = |frame: &Frame| mean(illumination(&frame.walls));
     let ratio = figure.over_seeds(|frames| brightness(&frames[frames.len() - 1]) / brightness(&frames[0]));

@@ -8,11 +8,11 @@ use super::experiments::Pass;
 use crate::measure::interval::{Decision, Interval};
 use crate::output::words::number;
 
-pub use light::{figure_1, figure_3};
+pub(crate) use light::{figure_1, figure_3};
 
 /// What became of something that the paper found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Standing {
+pub(crate) enum Standing {
     Holds,
     HoldsInPart,
     NoLonger,
@@ -33,17 +33,17 @@ impl Standing {
         }
     }
 
-    pub fn words(self) -> &'static str {
+    pub(crate) fn words(self) -> &'static str {
         self.in_words()[0]
     }
 
     /// The same of what a figure shows.
-    pub fn words_for_figures(self) -> &'static str {
+    pub(crate) fn words_for_figures(self) -> &'static str {
         self.in_words()[1]
     }
 
     /// Its class in the style sheet.
-    pub fn class(self) -> &'static str {
+    pub(crate) fn class(self) -> &'static str {
         self.in_words()[2]
     }
 
@@ -59,7 +59,7 @@ impl Standing {
 
 /// One finding of the paper, or one that this run adds.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Verdict {
+pub(crate) struct Verdict {
     pub topic: &'static str,
     /// What the paper found, in a few words.
     pub then: String,
@@ -83,7 +83,7 @@ impl Verdict {
     }
 
     /// 'holds at 2, not decided at 2 of 4'; empty where every number decides alike.
-    pub fn split(&self) -> String {
+    pub(crate) fn split(&self) -> String {
         let all: Vec<Decision> = self.evidence.iter().filter_map(|one| one.decision).collect();
         let parts: Vec<String> = [Decision::Yes, Decision::No, Decision::Undecided]
             .into_iter()
@@ -97,7 +97,7 @@ impl Verdict {
 
 /// One measured number, and whether it supports the claim.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Evidence {
+pub(crate) struct Evidence {
     pub what: String,
     pub interval: Interval,
     pub quantity: Quantity,
@@ -106,7 +106,7 @@ pub struct Evidence {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Quantity {
+pub(crate) enum Quantity {
     /// A ratio.
     Factor,
     /// A part of a whole, shown in percent.
@@ -116,7 +116,7 @@ pub enum Quantity {
 
 impl Quantity {
     /// '1.36 × (1.31 to 1.41)'; the value alone where too few runs bound it.
-    pub fn shown(self, interval: &Interval) -> String {
+    pub(crate) fn shown(self, interval: &Interval) -> String {
         let (digits, unit): (fn(f64) -> String, &str) = match self {
             Quantity::Factor => (number, "\u{a0}×"),
             Quantity::Share => (|share| number(100.0 * share), "\u{a0}%"),
@@ -133,15 +133,15 @@ impl Evidence {
         Evidence { what, interval, quantity: Quantity::Factor, decision: Some(interval.above(MARGIN)) }
     }
 
-    pub fn shown(&self) -> String {
+    pub(crate) fn shown(&self) -> String {
         self.quantity.shown(&self.interval)
     }
 }
 
 /// Factors closer to 1 count as no difference.
-pub const MARGIN: f64 = 1.1;
+pub(crate) const MARGIN: f64 = 1.1;
 
-pub fn all(found: &Reproduction) -> Vec<Verdict> {
+pub(crate) fn all(found: &Reproduction) -> Vec<Verdict> {
     let verdicts = [
         times::append(found),
         times::packed(found),
@@ -160,7 +160,7 @@ pub fn all(found: &Reproduction) -> Vec<Verdict> {
 }
 
 /// The finding that a figure illustrates.
-pub fn of_figure(found: &Reproduction, number: usize) -> Option<Verdict> {
+pub(crate) fn of_figure(found: &Reproduction, number: usize) -> Option<Verdict> {
     match number {
         1 => figure_1(found),
         2 => light::indirect_light(found),
