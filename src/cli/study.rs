@@ -161,6 +161,9 @@ mod tests {
         // What is as usual is not printed.
         let usual = RenderRequest { photons: Some(5000), seed: Some(1), rounds: Some(2), mesh: Some(64), ..RenderRequest::default() };
         assert_eq!(check(&usual), "photonmill --rounds 2 -o picture.exr");
+        let (preset, shininess) = (Some(Preset::Phong), Some(Shininess([0.5; 5])));
+        let phong = RenderRequest { preset, shininess, ..usual };
+        assert_eq!(check(&phong), "photonmill --shininess 0.5,0.5,0.5,0.5,0.5 --preset phong --rounds 2 -o picture.exr");
         let base = RenderRequest { photons: Some(8192), ..RenderRequest::of("cornell") };
         let of_scene = axes::of_scene(base, &Effect::ALL, Some(0.1), true, true);
         let groups: Vec<Group> = [axes::of_paper(12, 8192), axes::of_the_papers_rounds(12), of_scene].concat();

@@ -331,13 +331,13 @@ impl RenderRequest {
         kept
     }
 
-    /// The same without settings that are as usual anyway.
+    /// The same without settings that are as usual anyway. A preset stays, of which others are changes, and so does a generator that is named.
     pub fn brief(&self) -> RenderRequest {
         let is_box = self.scene.is_empty();
         let is_setting = |row: &&Row| match row.group {
             Group::Output | Group::WhenToStop => false,
             Group::Scene => is_box,
-            _ => row.form() != Form::File,
+            _ => row.form() != Form::File && !["preset", "rng"].contains(&row.field),
         };
         let are_same = |a: &RenderRequest, b: &RenderRequest| match is_box {
             true => a.room_settings() == b.room_settings(),

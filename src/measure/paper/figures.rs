@@ -110,7 +110,7 @@ fn exhibits() -> [Exhibit; COUNT] {
             published: "Two images that differ little. The one with 15 bounces is brighter where light arrives only after reflections.",
             caption: "Both images contain the same photons for the first two bounces. The next thirteen bounces brighten every wall, including its shaded places. \
                 The paper's text and its caption disagree about the order of the two images; this page follows the text.",
-            frames: vec![("15 bounces, modified".to_owned(), of(Preset::Modified)), ("2 bounces, naive".to_owned(), of(Preset::Naive))],
+            frames: vec![("15 bounces, modified".to_owned(), RenderRequest::default()), ("2 bounces, naive".to_owned(), of(Preset::Naive))],
         },
         Exhibit {
             title: "Phong walls, shininess 2.0, 0.5 and 0.01",
