@@ -125,11 +125,13 @@ mod tests {
     use clap::Parser;
 
     use super::super::{Cli, Command};
-    use crate::measure::study::axes::{self, Group, Line};
-    use crate::output::command;
+    use crate::measure::study::axes::{self, Group};
+    use crate::render::RenderRequest;
+    use crate::render::image::command_line;
+    use crate::render::values::{Shininess, Threads, Variant};
     use crate::rng::Rng;
     use crate::settings::scene::Effect;
-    use crate::settings::{Builder, Gather, Preset, RoomSettings};
+    use crate::settings::{Builder, Gather, Preset};
 
     fn parse(line: &str) -> Cli {
         Cli::try_parse_from(line.split(' ')).unwrap_or_else(|error| panic!("{line}: {error}"))
@@ -138,37 +140,37 @@ mod tests {
     /// Pages print the command that repeats each experiment, so it must mean what was run.
     #[test]
     fn printed_commands_give_the_settings_they_stand_for() {
-        for preset in [Preset::Naive, Preset::Modified, Preset::Phong, Preset::Rounds] {
-            let defaults = RoomSettings::preset(preset);
-            let full_light = defaults.full_light_for(65_536);
-            for settings in [
-                defaults.clone(),
-                RoomSettings { builder: Builder::Cpu, threads: 3, bounces: 7, gather: Gather::Brute, ..defaults.clone() },
-                RoomSettings { photons: 65_536, full_light, rng: Rng::Philox, rounds: 5, ..defaults.clone() },
-                RoomSettings { shininess: [Some(0.01); 5], ..defaults },
-            ] {
-                let line = command::main_job(preset, &settings);
-                assert_eq!(parse(&line).run.request.0.room_settings(), settings, "{line}");
+        let check = |request: &RenderRequest| {
+            let is_box = request.scene.is_empty();
+            let line = command_line(if is_box { "" } else { "render" }, &request.brief(), &["-o", "picture.exr"]);
+            let cli = parse(&line);
+            match cli.command {
+                Some(Command::Render(render)) => assert_eq!(render.request.0.settings(None), request.settings(None), "{line}"),
+                _ => assert_eq!((is_box, cli.run.request.0.room_settings()), (true, request.room_settings()), "{line}"),
             }
+            line
+        };
+        for preset in [Preset::Naive, Preset::Modified, Preset::Phong, Preset::Rounds] {
+            let usual = RenderRequest { preset: Some(preset), ..RenderRequest::default() };
+            let (variant, gather) = (Some(Variant::Of(Builder::Cpu)), Some(Gather::Brute));
+            check(&RenderRequest { variant, threads: Some(Threads(3)), bounces: Some(7), gather, ..usual.clone() });
+            check(&RenderRequest { photons: Some(65_536), rng: Some(Rng::Philox), rounds: Some(5), ..usual.clone() });
+            check(&RenderRequest { shininess: Some(Shininess([0.01; 5])), ..usual.clone() });
+            check(&usual);
         }
-        let groups: Vec<Group> =
-            [axes::of_paper(12, 8192), axes::of_the_papers_rounds(12), axes::of_scene(8192, &Effect::ALL, Some(0.1), true, true)].concat();
+        // What is as usual is not printed.
+        let usual = RenderRequest { photons: Some(5000), seed: Some(1), rounds: Some(2), mesh: Some(64), ..RenderRequest::default() };
+        assert_eq!(check(&usual), "photonmill --rounds 2 -o picture.exr");
+        let (preset, shininess) = (Some(Preset::Phong), Some(Shininess([0.5; 5])));
+        let phong = RenderRequest { preset, shininess, ..usual };
+        assert_eq!(check(&phong), "photonmill --shininess 0.5,0.5,0.5,0.5,0.5 --preset phong --rounds 2 -o picture.exr");
+        let base = RenderRequest { photons: Some(8192), ..RenderRequest::of("cornell") };
+        let of_scene = axes::of_scene(base, &Effect::ALL, Some(0.1), true, true);
+        let groups: Vec<Group> = [axes::of_paper(12, 8192), axes::of_the_papers_rounds(12), of_scene].concat();
         let configurations: Vec<_> = groups.iter().flat_map(|group| &group.configurations).collect();
         assert!(configurations.len() > 50);
         for configuration in configurations {
-            match &configuration.line {
-                Line::Paper(settings) => {
-                    let line = command::main_job(Preset::Modified, settings);
-                    let parsed = parse(&line).run.request.0.room_settings();
-                    // Full light is of the paper's picture, which no study looks at.
-                    assert_eq!(RoomSettings { full_light: settings.full_light, ..parsed }, *settings, "{line}");
-                }
-                Line::Scene(settings) => {
-                    let line = command::on_scene("render open-box -o picture.exr", settings);
-                    let Some(Command::Render(render)) = parse(&line).command else { panic!("{line}") };
-                    assert_eq!(render.request.0.settings(None), *settings, "{line}");
-                }
-            }
+            check(&configuration.request);
         }
     }
 }

@@ -1,7 +1,6 @@
 //! What a run writes: pictures, irradiance, the report and the trace file.
 
 pub mod colour;
-pub mod command;
 #[cfg(feature = "lab")]
 pub mod csv_table;
 pub mod destination;

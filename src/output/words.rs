@@ -1,5 +1,10 @@
 //! Numbers as people read them.
 
+/// The name of an enum's value.
+pub fn lower_case(value: impl std::fmt::Debug) -> String {
+    format!("{value:?}").to_lowercase()
+}
+
 /// Three significant digits, thousands grouped by a narrow space.
 pub fn number(value: f64) -> String {
     significant(value, 3)

@@ -241,13 +241,7 @@ impl Image {
 
 /// A request with nothing in it but what decides its image, however much work is done for it.
 pub fn kept(request: &RenderRequest) -> RenderRequest {
-    let mut kept = RenderRequest::of(request.scene.clone());
-    for row in ROWS.iter().filter(|row| row.is_kept(request)) {
-        if let Some(text) = row.text(request) {
-            (row.of)(&mut kept).read(&text).expect("a value is read as it is written");
-        }
-    }
-    kept
+    request.only(|row| row.is_kept(request))
 }
 
 /// The command line that makes the image of a run again, with what each round did where that is not what it does without saying so.
@@ -266,15 +260,15 @@ fn command(request: &RenderRequest, run: &RunResult, output: &str) -> String {
         rounds: Some(run.film.rounds),
         ..kept(request)
     };
-    command_line("render", &request, output)
+    command_line("render", &request, &["-o", output])
 }
 
-/// A command line for a shell, with `output` as its file.
-pub fn command_line(command: &str, request: &RenderRequest, output: &str) -> String {
+/// A command line for a shell, with options that are no request's at its end.
+pub fn command_line(command: &str, request: &RenderRequest, others: &[&str]) -> String {
     let options = ROWS.iter().filter_map(|row| Some((row, row.text(request)?))).flat_map(|(row, value)| {
         let value = (row.form() != Form::Flag).then_some(value);
         [Some(format!("--{}", row.option())), value].into_iter().flatten()
     });
     let words = ["photonmill", command, &request.scene].into_iter().filter(|word| !word.is_empty()).map(str::to_owned).chain(options);
-    words.chain(["-o".to_owned(), output.to_owned()]).map(quoted).collect::<Vec<String>>().join(" ")
+    words.chain(others.iter().map(|word| (*word).to_owned())).map(quoted).collect::<Vec<String>>().join(" ")
 }

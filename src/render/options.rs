@@ -320,6 +320,35 @@ pub fn row(name: &str) -> Option<&'static Row> {
 }
 
 impl RenderRequest {
+    /// The same with these options alone.
+    pub(super) fn only(&self, is_kept: impl Fn(&Row) -> bool) -> RenderRequest {
+        let mut kept = RenderRequest::of(self.scene.clone());
+        for row in ROWS.iter().filter(|row| is_kept(row)) {
+            if let Some(text) = row.text(self) {
+                (row.of)(&mut kept).read(&text).expect("a value is read as it is written");
+            }
+        }
+        kept
+    }
+
+    /// The same without settings that are as usual anyway. A preset stays, of which others are changes, and so does a generator that is named.
+    pub fn brief(&self) -> RenderRequest {
+        let is_box = self.scene.is_empty();
+        let is_setting = |row: &&Row| match row.group {
+            Group::Output | Group::WhenToStop => false,
+            Group::Scene => is_box,
+            _ => row.form() != Form::File && !["preset", "rng"].contains(&row.field),
+        };
+        let are_same = |a: &RenderRequest, b: &RenderRequest| match is_box {
+            true => a.room_settings() == b.room_settings(),
+            false => a.settings(None) == b.settings(None),
+        };
+        ROWS.iter().filter(is_setting).fold(self.clone(), |brief, row| {
+            let without = brief.only(|other| other.field != row.field);
+            if are_same(&without, &brief) { without } else { brief }
+        })
+    }
+
     /// What is given, as words of a command line, the scene first.
     pub fn words(&self) -> Vec<String> {
         let option = |row: &'static Row| {

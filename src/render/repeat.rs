@@ -46,7 +46,7 @@ impl RenderRequest {
     }
 
     /// The same; fails with what the words are not.
-    pub(super) fn of_words(words: &[String]) -> std::result::Result<RenderRequest, String> {
+    pub fn of_words(words: &[String]) -> std::result::Result<RenderRequest, String> {
         let mut request = RenderRequest::default();
         for word in words {
             let Some(option) = word.strip_prefix("--") else {

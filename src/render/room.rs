@@ -51,6 +51,7 @@ impl RenderRequest {
             radius: self.radius.unwrap_or(preset.radius),
             full_light: self.full_light.unwrap_or_else(|| preset.full_light_for(photons)),
             seed: self.seed.unwrap_or(preset.seed),
+            // Rand48 is dealt out by leap-frogging, which a count with a large power of two makes almost regular.
             rng: self.rng.unwrap_or(if photons == preset.photons { preset.rng } else { Rng::Philox }),
             gather: self.gather.unwrap_or(preset.gather),
             sums: self.sums.unwrap_or(preset.sums),
@@ -255,7 +256,7 @@ pub fn metadata(request: &RenderRequest, outcome: &RunResult, error: &FilmError,
             Format::Png => "the paper's illumination, from 0 to 1 as codes from 0 to 255".to_owned(),
             Format::Exr => "the paper's illumination, not clamped to 1".to_owned(),
         },
-        command: command_line("", &with_rounds, name_in_text(format)),
+        command: command_line("", &with_rounds, &["-o", name_in_text(format)]),
         settings: settings_with_effect(settings),
         repeat: match outcome.end {
             End::Rounds | End::Error | End::Photons => Repeat::With {

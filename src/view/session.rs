@@ -377,7 +377,7 @@ impl<'a> Session<'a> {
 
     fn command(&self, choices: &Choices) -> String {
         let command = if self.status.is_box { "" } else { "render" };
-        command_line(command, &self.image_request(choices), "picture.png")
+        command_line(command, &self.image_request(choices), &["-o", "picture.png"])
     }
 }
 

@@ -4,7 +4,7 @@ use super::Bench;
 use super::pass::Pass;
 use super::rates::Rates;
 use super::scale::{Growth, PassTime, Series};
-use crate::output::command::lower_case;
+use crate::output::words::lower_case;
 use crate::timings::Spread;
 
 pub fn text(bench: &Bench) -> String {

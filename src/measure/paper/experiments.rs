@@ -5,9 +5,10 @@ use super::bench::Bench;
 use super::{Reproduction, Request, published};
 use crate::engine::room::RunResult;
 use crate::error::Result;
-use crate::output::command;
-use crate::output::words;
-use crate::rng::Rng;
+use crate::output::words::{self, lower_case};
+use crate::render::RenderRequest;
+use crate::render::image::command_line;
+use crate::render::values::{Threads, Variant};
 use crate::settings::{Builder, Gather, Preset, RoomSettings};
 use crate::text::counted;
 use crate::timings::{Clock, Spread};
@@ -127,15 +128,11 @@ pub fn count(bench: &Bench, request: &Request) -> usize {
 }
 
 impl Case {
-    fn settings(&self) -> RoomSettings {
-        RoomSettings {
-            builder: self.implementation.builder,
-            threads: self.implementation.threads,
-            photons: self.photons,
-            bounces: self.bounces,
-            gather: self.gather,
-            ..at_size(Preset::Modified, self.photons)
-        }
+    fn request(&self) -> RenderRequest {
+        let Implementation { builder, threads } = self.implementation;
+        let (variant, threads) = (Some(Variant::Of(builder)), Some(Threads(threads)));
+        let (photons, bounces, gather) = (Some(self.photons), Some(self.bounces), Some(self.gather));
+        RenderRequest { variant, threads, photons, bounces, gather, ..RenderRequest::default() }
     }
 
     fn title(&self) -> String {
@@ -144,17 +141,14 @@ impl Case {
             "{} photons, {bounces} bounces, {}, {} gather",
             words::count(u64::from(*photons)),
             implementation.name(),
-            command::lower_case(*gather)
+            lower_case(*gather)
         )
     }
 }
 
-/// The paper's settings at another photon count. Rand48 is dealt out by leap-frogging, which a count
-/// with a large power of two makes almost regular, so the large size has the counter-based generator.
-fn at_size(preset: Preset, photons: u32) -> RoomSettings {
-    let paper = RoomSettings::preset(preset);
-    let rng = if photons == paper.photons { paper.rng } else { Rng::Philox };
-    RoomSettings { photons, rng, full_light: paper.full_light_for(photons), ..paper }
+/// What repeats an experiment.
+pub fn command(request: &RenderRequest) -> String {
+    command_line("", &request.brief(), &[])
 }
 
 /// Small before large, as the small ones predict the large.
@@ -203,10 +197,10 @@ pub fn running_times(bench: &mut Bench, found: &mut Reproduction) -> Result<()> 
         }
         let is_large = group[0].photons == found.request.large;
         let repeats = if is_large { found.request.repeats.min(LARGE_REPEATS) } else { found.request.repeats };
-        let settings: Vec<RoomSettings> = measured.iter().map(|case| case.settings()).collect();
+        let settings: Vec<RoomSettings> = measured.iter().map(|case| case.request().room_settings()).collect();
         let outcomes = bench.repeat_interleaved(&settings, repeats)?;
-        for ((case, settings), outcomes) in measured.iter().zip(&settings).zip(&outcomes) {
-            let command = command::main_job(Preset::Modified, settings);
+        for (case, outcomes) in measured.iter().zip(&outcomes) {
+            let command = command(&case.request());
             // The map does not depend on the gather, and is timed where the gather disturbs least.
             let map = (case.gather == Gather::Grid).then_some(Pass::Map);
             let passes = map.into_iter().chain([Pass::Rendering(case.gather)]);
@@ -251,20 +245,25 @@ pub fn series(request: &Request) -> [(u32, Gather); 3] {
     [(published::PHOTONS, Gather::Brute), (published::PHOTONS, Gather::Grid), (request.large, Gather::Grid)]
 }
 
+pub fn row_of_table_1(builder: Builder, photons: u32, rounds: u32, gather: Gather) -> RenderRequest {
+    let (preset, variant) = (Some(Preset::Rounds), Some(Variant::Of(builder)));
+    RenderRequest { preset, variant, photons: Some(photons), rounds: Some(rounds), gather: Some(gather), ..RenderRequest::default() }
+}
+
 /// Whole runs of table 1's rounds.
 pub fn totals(bench: &mut Bench, found: &mut Reproduction) -> Result<()> {
     for (photons, gather) in series(&found.request) {
         // Wall time of a round, by the latest row.
         let mut a_round = None;
         for (rounds, _) in published::TABLE_1 {
-            let builder = bench.available(Builder::Atomic);
-            let settings = RoomSettings { builder, rounds, gather, ..at_size(Preset::Rounds, photons) };
+            let request = row_of_table_1(bench.available(Builder::Atomic), photons, rounds, gather);
+            let settings = request.room_settings();
             let title = format!(
                 "{} photons as {} of {}, {} gather",
                 words::count(settings.total_photons()),
                 counted(rounds, "round"),
                 words::count(u64::from(photons)),
-                command::lower_case(gather)
+                lower_case(gather)
             );
             bench.begin(&title)?;
             if let Some(predicted_ms) = a_round.map(|ms| ms * f64::from(rounds)).filter(|ms| *ms > found.request.longest_ms) {
@@ -280,7 +279,7 @@ pub fn totals(bench: &mut Bench, found: &mut Reproduction) -> Result<()> {
             let wall_ms = row("run").and_then(|row| row.wall_ms).expect("a run has its wall time");
             let gpu_ms = row("round").and_then(|row| row.gpu_ms);
             a_round = Some(wall_ms / f64::from(rounds));
-            let command = command::main_job(Preset::Rounds, &settings);
+            let command = command(&request);
             found.totals.push(TotalTime { photons_per_round: photons, rounds, gather, gpu_ms, wall_ms, command });
         }
     }

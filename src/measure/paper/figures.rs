@@ -1,13 +1,15 @@
 //! The paper's four figures: films of its settings, as labelled pictures, and the same with other seeds.
 
 use super::bench::Bench;
+use super::experiments::command;
 use super::published;
 use crate::engine::room::film::{WallEstimate, estimate_walls};
 use crate::error::Result;
 use crate::measure::interval::Interval;
 use crate::output::colour::Format;
-use crate::output::command;
 use crate::output::image::{VIEWS, unfolded, view};
+use crate::render::RenderRequest;
+use crate::render::values::{Shininess, Variant};
 use crate::scene::open_box::open_box;
 use crate::settings::{Preset, RoomSettings};
 use crate::text::counted;
@@ -50,8 +52,8 @@ struct Exhibit {
     title: &'static str,
     published: &'static str,
     caption: &'static str,
-    /// Label, preset and settings of each frame.
-    frames: Vec<(String, Preset, RoomSettings)>,
+    /// Label and request of each frame.
+    frames: Vec<(String, RenderRequest)>,
 }
 
 pub fn make(bench: &mut Bench, figures: &mut Vec<Figure>) -> Result<()> {
@@ -90,10 +92,9 @@ pub fn letter(place: usize) -> char {
 }
 
 fn exhibits() -> [Exhibit; COUNT] {
-    let naive = RoomSettings::preset(Preset::Naive);
-    let modified = RoomSettings::preset(Preset::Modified);
-    let phong = |shininess: f32| RoomSettings { shininess: [Some(shininess); 5], ..RoomSettings::preset(Preset::Phong) };
-    let rounds = |rounds: u32| RoomSettings { rounds, ..RoomSettings::preset(Preset::Rounds) };
+    let of = |preset: Preset| RenderRequest { preset: Some(preset), ..RenderRequest::default() };
+    let phong = |shininess: f32| RenderRequest { shininess: Some(Shininess([shininess; 5])), ..of(Preset::Phong) };
+    let rounds = |rounds: u32| RenderRequest { rounds: Some(rounds), ..of(Preset::Rounds) };
     [
         Exhibit {
             title: "the naive implementation, 2 bounces",
@@ -102,17 +103,14 @@ fn exhibits() -> [Exhibit; COUNT] {
             caption: "A light emits away from its own wall, so the adjacent walls are brightest near it: \
                 low on the walls around the floor's light, and at the left of the walls around the left wall's light. \
                 The blotches are noise: there are only 5000 photons, each spread over a disc of radius 0.05 m.",
-            frames: vec![("2 bounces".to_owned(), Preset::Naive, naive.clone())],
+            frames: vec![("2 bounces".to_owned(), of(Preset::Naive))],
         },
         Exhibit {
             title: "15 bounces and 2 bounces",
             published: "Two images that differ little. The one with 15 bounces is brighter where light arrives only after reflections.",
             caption: "Both images contain the same photons for the first two bounces. The next thirteen bounces brighten every wall, including its shaded places. \
                 The paper's text and its caption disagree about the order of the two images; this page follows the text.",
-            frames: vec![
-                ("15 bounces, modified".to_owned(), Preset::Modified, modified),
-                ("2 bounces, naive".to_owned(), Preset::Naive, naive),
-            ],
+            frames: vec![("15 bounces, modified".to_owned(), RenderRequest::default()), ("2 bounces, naive".to_owned(), of(Preset::Naive))],
         },
         Exhibit {
             title: "Phong walls, shininess 2.0, 0.5 and 0.01",
@@ -120,25 +118,25 @@ fn exhibits() -> [Exhibit; COUNT] {
             caption: "The weight of a photon is the cosine between its mirror direction and the direction to the eye, raised to the shininess. \
                 At 2.0 the back wall, which faces the eye, is brightest, and the walls along the line of sight are dark. \
                 As the shininess approaches 0, every photon reflected towards the eye's side has weight 1, and the image approaches figure 2 (a).",
-            frames: published::FIGURE_3_SHININESS
-                .map(|shininess| (format!("shininess {shininess}"), Preset::Phong, phong(shininess)))
-                .into(),
+            frames: published::FIGURE_3_SHININESS.map(|shininess| (format!("shininess {shininess}"), phong(shininess))).into(),
         },
         Exhibit {
             title: "1, 5, 10, 25, 50 and 100 rounds",
             published: "Six images of the same box. From 1 round of photons to 100 rounds the noise clearly decreases.",
             caption: "Every round adds 5000 photons. Noise decreases, but the radius (here 0.025 m) is fixed: \
                 the dark rims along the edges, where part of each disc lies beyond the wall, remain after 100 rounds.",
-            frames: published::FIGURE_4_ROUNDS.map(|count| (counted(count, "round"), Preset::Rounds, rounds(count))).into(),
+            frames: published::FIGURE_4_ROUNDS.map(|count| (counted(count, "round"), rounds(count))).into(),
         },
     ]
 }
 
-fn frame(bench: &Bench, (label, preset, settings): &(String, Preset, RoomSettings), seed: u64) -> Result<Frame> {
-    let settings = RoomSettings { builder: bench.available(settings.builder), seed, ..settings.clone() };
+fn frame(bench: &Bench, (label, request): &(String, RenderRequest), seed: u64) -> Result<Frame> {
+    let builder = bench.available(request.room_settings().builder);
+    let request = RenderRequest { variant: Some(Variant::Of(builder)), seed: Some(seed), ..request.clone() };
+    let settings = request.room_settings();
     let outcome = bench.run(&settings)?;
     let walls = estimate_walls(&outcome.film, &open_box(&settings), &outcome.plan);
-    Ok(Frame { label: label.clone(), command: command::main_job(*preset, &settings), settings, walls })
+    Ok(Frame { label: label.clone(), command: command(&request), settings, walls })
 }
 
 /// Pixels along a picture, where a row has two and where it has more.

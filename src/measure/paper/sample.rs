@@ -1,11 +1,10 @@
 //! A reproduction with made-up times, for the tests of what is said of it.
 
 use super::bench::{Device, Machine};
-use super::experiments::{Implementation, LeftOut, Pass, RunningTime, TotalTime};
+use super::experiments::{Implementation, LeftOut, Pass, RunningTime, TotalTime, command, row_of_table_1};
 use super::figures::{Figure, Panel};
 use super::{Reproduction, Request, published};
-use crate::output::command;
-use crate::settings::{Builder, Gather, Preset, RoomSettings};
+use crate::settings::{Builder, Gather};
 use crate::timings::{Clock, Spread};
 
 const LARGE: u32 = 65_536;
@@ -48,7 +47,7 @@ fn running_times() -> Vec<RunningTime> {
                     ms: Spread { median: f64::from(photons) / 1000.0, min: 0.5, max: 100.0, repeats: 7 },
                     runs_ms: vec![f64::from(photons) / 1000.0; 7],
                     stored: u64::from(photons),
-                    command: command::main_job(Preset::Modified, &RoomSettings { builder, photons, ..RoomSettings::default() }),
+                    command: String::new(),
                 }));
             }
         }
@@ -64,7 +63,7 @@ fn totals() -> Vec<TotalTime> {
         gather,
         gpu_ms: Some(f64::from(rounds)),
         wall_ms: f64::from(rounds) + 1.0,
-        command: command::main_job(Preset::Rounds, &RoomSettings { photons, rounds, gather, ..RoomSettings::preset(Preset::Rounds) }),
+        command: command(&row_of_table_1(Builder::Atomic, photons, rounds, gather)),
     };
     series.into_iter().flat_map(|(photons, gather)| published::TABLE_1.map(|(rounds, _)| total(photons, rounds, gather))).collect()
 }

@@ -3,8 +3,8 @@
 use super::experiments::{RunningTime, TotalTime};
 use super::verdicts::{Evidence, Standing, Verdict};
 use crate::measure::interval::{Decision, Interval};
-use crate::output::command;
 use crate::output::csv_table::{Column, csv_table};
+use crate::output::words::lower_case;
 use crate::timings::Clock;
 
 const RUNNING_TIMES: [Column<RunningTime>; 15] = [
@@ -12,7 +12,7 @@ const RUNNING_TIMES: [Column<RunningTime>; 15] = [
     ("bounces", |time| time.bounces.to_string()),
     ("builder", |time| time.implementation.name()),
     ("pass", |time| time.pass.name().to_owned()),
-    ("gather", |time| time.pass.gather().map(command::lower_case).unwrap_or_default()),
+    ("gather", |time| time.pass.gather().map(lower_case).unwrap_or_default()),
     ("clock", |time| if time.clock == Clock::Gpu { "gpu" } else { "wall" }.to_owned()),
     ("repeats", |time| time.ms.repeats.to_string()),
     ("median_ms", |time| milliseconds(time.ms.median)),
@@ -29,7 +29,7 @@ const TOTALS: [Column<TotalTime>; 7] = [
     ("photons_per_round", |total| total.photons_per_round.to_string()),
     ("rounds", |total| total.rounds.to_string()),
     ("photons", |total| total.photons().to_string()),
-    ("gather", |total| command::lower_case(total.gather)),
+    ("gather", |total| lower_case(total.gather)),
     ("gpu_ms", |total| total.gpu_ms.map_or_else(String::new, milliseconds)),
     ("wall_ms", |total| milliseconds(total.wall_ms)),
     ("published_ms", |total| total.published_ms().map_or_else(String::new, milliseconds)),

@@ -2,9 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::render::RenderRequest;
+use crate::render::values::Variant;
 use crate::rng::Rng;
-use crate::settings::scene::{Effect, Illumination, Kernel, SceneSettings};
-use crate::settings::{Builder, Gather, Math, RoomSettings, Sums};
+use crate::settings::scene::{Effect, Illumination, Kernel};
+use crate::settings::{Builder, Gather, Math, Sums};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -55,19 +57,11 @@ impl Axis {
     }
 }
 
-/// Which of the two lines, and how.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Line {
-    /// The paper's box.
-    Paper(RoomSettings),
-    /// A scene of triangles.
-    Scene(SceneSettings),
-}
-
 #[derive(Debug, Clone, PartialEq)]
 pub struct Configuration {
     pub label: String,
-    pub line: Line,
+    /// Without a scene: of the paper's box.
+    pub request: RenderRequest,
 }
 
 /// What is measured in turn, so that a clock that drifts touches all alike: the base, then its alternatives.
@@ -80,44 +74,49 @@ pub struct Group {
 impl Configuration {
     /// Rounds that sums and random numbers allow.
     pub fn most_rounds(&self) -> u32 {
-        match &self.line {
-            Line::Paper(settings) => settings.most_rounds(),
-            Line::Scene(_) => 1 << 20,
-        }
+        if self.is_of_paper() { self.request.room_settings().most_rounds() } else { 1 << 20 }
+    }
+
+    pub fn request_of(&self, rounds: u32, seed: u64) -> RenderRequest {
+        RenderRequest { rounds: Some(rounds), seed: Some(seed), ..self.request.clone() }
+    }
+
+    /// Whether it is of the paper's box.
+    pub fn is_of_paper(&self) -> bool {
+        self.request.scene.is_empty()
     }
 }
 
 /// Alternatives to a base, axis by axis.
-struct Sweep<S> {
-    base: S,
+struct Sweep {
+    base: RenderRequest,
     label: String,
-    wrap: fn(S) -> Line,
     groups: Vec<Group>,
 }
 
-impl<S: Clone + PartialEq> Sweep<S> {
-    fn new(base: S, label: &str, wrap: fn(S) -> Line) -> Sweep<S> {
-        Sweep { base, label: label.to_owned(), wrap, groups: Vec::new() }
+impl Sweep {
+    fn new(base: RenderRequest, label: &str) -> Sweep {
+        Sweep { base, label: label.to_owned(), groups: Vec::new() }
     }
 
     /// One more choice; what the base has already is not measured again.
-    fn add(&mut self, axis: Axis, label: impl Into<String>, change: impl FnOnce(&mut S)) {
-        let mut settings = self.base.clone();
-        change(&mut settings);
-        if settings == self.base {
+    fn add(&mut self, axis: Axis, label: impl Into<String>, change: impl FnOnce(&mut RenderRequest)) {
+        let mut request = self.base.clone();
+        change(&mut request);
+        if request.brief() == self.base.brief() {
             return;
         }
         if self.groups.last().is_none_or(|group| group.axis != axis) {
-            let base = Configuration { label: self.label.clone(), line: (self.wrap)(self.base.clone()) };
+            let base = Configuration { label: self.label.clone(), request: self.base.clone() };
             self.groups.push(Group { axis, configurations: vec![base] });
         }
-        let configuration = Configuration { label: label.into(), line: (self.wrap)(settings) };
+        let configuration = Configuration { label: label.into(), request };
         self.groups.last_mut().expect("pushed above").configurations.push(configuration);
     }
 
     /// A choice for each value.
-    fn each<T>(&mut self, axis: Axis, choices: impl IntoIterator<Item = (impl Into<String>, T)>, change: impl Fn(&mut S, T)) {
-        choices.into_iter().for_each(|(label, value)| self.add(axis, label, |settings| change(settings, value)));
+    fn each<T>(&mut self, axis: Axis, choices: impl IntoIterator<Item = (impl Into<String>, T)>, change: impl Fn(&mut RenderRequest, T)) {
+        choices.into_iter().for_each(|(label, value)| self.add(axis, label, |request| change(request, value)));
     }
 }
 
@@ -140,46 +139,45 @@ fn bounce_counts<const COUNT: usize>(bounces: [u32; COUNT]) -> [(String, u32); C
 
 /// Irradiance of the walls by the paper's line.
 pub fn of_paper(mesh: u32, photons: u32) -> Vec<Group> {
-    let base = RoomSettings { mesh, photons, rng: Rng::Philox, radius: 0.025, bounces: 30, ..RoomSettings::default() };
-    let base = RoomSettings { full_light: base.full_light_for(photons), ..base };
-    let mut sweep = Sweep::new(base, "atomic, grid, radius 0.025 m, 30 bounces, philox", Line::Paper);
+    let (radius, bounces, rng) = (Some(0.025), Some(30), Some(Rng::Philox));
+    let base = RenderRequest { mesh: Some(mesh), photons: Some(photons), radius, bounces, rng, ..RenderRequest::default() };
+    let mut sweep = Sweep::new(base, "atomic, grid, radius 0.025 m, 30 bounces, philox");
     let others = [("persistent", Builder::Persistent), ("CPU, one thread", Builder::Cpu)];
-    sweep.each(Axis::Builder, BUILDERS.into_iter().chain(others), |s, builder| s.builder = builder);
-    sweep.each(Axis::Photons, photon_counts(photons), |s, photons| s.photons = photons);
-    sweep.each(Axis::Radius, [0.1, 0.05, 0.0125, 0.00625].map(|radius| (format!("radius {radius} m"), radius)), |s, r| s.radius = r);
+    sweep.each(Axis::Builder, BUILDERS.into_iter().chain(others), |s, builder| s.variant = Some(Variant::Of(builder)));
+    sweep.each(Axis::Photons, photon_counts(photons), |s, photons| s.photons = Some(photons));
+    sweep.each(Axis::Radius, [0.1, 0.05, 0.0125, 0.00625].map(|radius| (format!("radius {radius} m"), radius)), |s, r| s.radius = Some(r));
     for nearest in [10, 50, 200] {
         sweep.add(Axis::Nearest, format!("the {nearest} nearest photons within 0.1 m, kd-tree"), |s| {
-            (s.gather, s.nearest, s.radius) = (Gather::KdTree, Some(nearest), 0.1);
+            (s.gather, s.nearest, s.radius) = (Some(Gather::KdTree), Some(nearest), Some(0.1));
         });
     }
-    sweep.add(Axis::Edges, "no edge correction", |s| s.edge_correction = false);
-    sweep.each(Axis::Bounces, bounce_counts([2, 5, 15, 60]), |s, bounces| s.bounces = bounces);
+    sweep.add(Axis::Edges, "no edge correction", |s| s.edge_correction = Some(false));
+    sweep.each(Axis::Bounces, bounce_counts([2, 5, 15, 60]), |s, bounces| s.bounces = Some(bounces));
     let generators = [("rand48", Rng::Rand48), ("Mersenne Twister", Rng::Mt), ("Owen-scrambled Sobol'", Rng::Sobol)];
-    sweep.each(Axis::Randomness, generators, |s, rng| s.rng = rng);
-    sweep.each(Axis::Sums, [("32-bit floats", Sums::F32), ("compensated floats", Sums::Compensated)], |s, sums| s.sums = sums);
-    sweep.add(Axis::Arithmetic, "strict", |s| s.math = Math::Strict);
-    sweep.each(Axis::Index, [("brute force", Gather::Brute), ("kd-tree", Gather::KdTree)], |s, gather| s.gather = gather);
+    sweep.each(Axis::Randomness, generators, |s, rng| s.rng = Some(rng));
+    sweep.each(Axis::Sums, [("32-bit floats", Sums::F32), ("compensated floats", Sums::Compensated)], |s, sums| s.sums = Some(sums));
+    sweep.add(Axis::Arithmetic, "strict", |s| s.math = Some(Math::Strict));
+    sweep.each(Axis::Index, [("brute force", Gather::Brute), ("kd-tree", Gather::KdTree)], |s, gather| s.gather = Some(gather));
     sweep.groups
 }
 
 /// The paper's figure 4 and table 1: rounds of 5000 photons, at its two radii and another, and by the line of scenes,
 /// whose radius may shrink.
 pub fn of_the_papers_rounds(mesh: u32) -> Vec<Group> {
-    let base = RoomSettings { mesh, radius: 0.025, rounds: 1, ..RoomSettings::default() };
-    let mut sweep = Sweep::new(base, "radius 0.025 m", Line::Paper);
-    sweep.each(Axis::Paper, [("radius 0.05 m", 0.05), ("radius 0.0125 m", 0.0125)], |s, radius| s.radius = radius);
-    let triangles = |alpha: f64| SceneSettings {
-        photons: 5000,
-        caustic_photons: 5000,
-        bounces: 15,
+    let base = RenderRequest { mesh: Some(mesh), radius: Some(0.025), ..RenderRequest::default() };
+    let mut sweep = Sweep::new(base, "radius 0.025 m");
+    sweep.each(Axis::Paper, [("radius 0.05 m", 0.05), ("radius 0.0125 m", 0.0125)], |s, radius| s.radius = Some(radius));
+    let triangles = |alpha: f64| RenderRequest {
+        photons: Some(5000),
+        bounces: Some(15),
         radius: Some(0.05),
-        illumination: Illumination::Photons,
-        alpha,
+        illumination: Some(Illumination::Photons),
+        alpha: Some(alpha),
         block: Some(1),
-        ..SceneSettings::default()
+        ..RenderRequest::of("open-box")
     };
     let shrinking = [(1.0, "radius 0.05 m, box as triangles"), (2.0 / 3.0, "radius shrinking from 0.05 m (alpha 2/3), box as triangles")]
-        .map(|(alpha, label)| Configuration { label: label.to_owned(), line: Line::Scene(triangles(alpha)) });
+        .map(|(alpha, label)| Configuration { label: label.to_owned(), request: triangles(alpha) });
     sweep.groups[0].configurations.extend(shrinking);
     sweep.groups
 }
@@ -188,28 +186,28 @@ pub fn of_the_papers_rounds(mesh: u32) -> Vec<Group> {
 const REMOVABLE: [Effect; 5] =
     [Effect::Indirect, Effect::Glossy, Effect::ReflectiveCaustics, Effect::RefractiveCaustics, Effect::SmoothNormals];
 
-/// Whatever a scene of triangles may be lit by: `kept` are the effects that it calls for, `radius` that of its global
+/// Whatever the scene of triangles of a request may be lit by: `kept` are the effects that it calls for, `radius` that of its global
 /// map in metres, if it has one, `has_few_triangles` says whether a list of them may be tested from end to end, and
 /// `is_picture` whether a camera looks.
-pub fn of_scene(photons: u32, kept: &[Effect], radius: Option<f64>, has_few_triangles: bool, is_picture: bool) -> Vec<Group> {
-    let base = SceneSettings { photons, caustic_photons: photons, block: Some(1), ..SceneSettings::default() };
-    let mut sweep = Sweep::new(base, "persistent, shrinking radius, shadow rays", Line::Scene);
-    sweep.each(Axis::Builder, BUILDERS, |s, builder| s.builder = Some(builder));
-    sweep.each(Axis::Photons, photon_counts(photons), |s, photons| (s.photons, s.caustic_photons) = (photons, photons));
+pub fn of_scene(base: RenderRequest, kept: &[Effect], radius: Option<f64>, has_few_triangles: bool, is_picture: bool) -> Vec<Group> {
+    let photons = base.settings(None).photons;
+    let mut sweep = Sweep::new(base, "persistent, shrinking radius, shadow rays");
+    sweep.each(Axis::Builder, BUILDERS, |s, builder| s.variant = Some(Variant::Of(builder)));
+    sweep.each(Axis::Photons, photon_counts(photons), |s, photons| s.photons = Some(photons));
     if let Some(radius) = radius {
         let radii = [("twice the radius", 2.0 * radius), ("half the radius", 0.5 * radius)];
         sweep.each(Axis::Radius, radii, |s, radius| s.radius = Some(significant(radius)));
     }
-    sweep.each(Axis::Schedule, [("alpha 0.5", 0.5), ("alpha 0.8", 0.8), ("fixed radius", 1.0)], |s, alpha| s.alpha = alpha);
-    sweep.each(Axis::Kernel, [("cone", Kernel::Cone), ("Epanechnikov", Kernel::Epanechnikov)], |s, kernel| s.kernel = kernel);
-    sweep.add(Axis::Edges, "no edge correction", |s| s.edge_correction = false);
-    sweep.each(Axis::Bounces, bounce_counts([2, 5, 15]), |s, bounces| s.bounces = bounces);
-    sweep.add(Axis::Arithmetic, "strict", |s| s.math = Math::Strict);
-    sweep.each(Axis::Direct, [("one shadow ray", 1), ("16 shadow rays", 16)], |s, rays| s.shadow_rays = rays);
-    sweep.add(Axis::Direct, "direct light from photons", |s| s.illumination = Illumination::Photons);
+    sweep.each(Axis::Schedule, [("alpha 0.5", 0.5), ("alpha 0.8", 0.8), ("fixed radius", 1.0)], |s, alpha| s.alpha = Some(alpha));
+    sweep.each(Axis::Kernel, [("cone", Kernel::Cone), ("Epanechnikov", Kernel::Epanechnikov)], |s, kernel| s.kernel = Some(kernel));
+    sweep.add(Axis::Edges, "no edge correction", |s| s.edge_correction = Some(false));
+    sweep.each(Axis::Bounces, bounce_counts([2, 5, 15]), |s, bounces| s.bounces = Some(bounces));
+    sweep.add(Axis::Arithmetic, "strict", |s| s.math = Some(Math::Strict));
+    sweep.each(Axis::Direct, [("one shadow ray", 1), ("16 shadow rays", 16)], |s, rays| s.shadow_rays = Some(rays));
+    sweep.add(Axis::Direct, "direct light from photons", |s| s.illumination = Some(Illumination::Photons));
     if is_picture {
         let paths = [4, 16].map(|samples| (format!("{samples} paths per pixel, one shadow ray each"), samples));
-        sweep.each(Axis::Paths, paths, |s, samples| (s.samples, s.shadow_rays) = (samples, 1));
+        sweep.each(Axis::Paths, paths, |s, samples| (s.samples, s.shadow_rays) = (Some(samples), Some(1)));
     }
     sweep.add(Axis::Gather, "final gather", |s| s.final_gather = true);
     if has_few_triangles {

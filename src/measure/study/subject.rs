@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use glam::{DVec3, Vec3};
 
 use super::Request;
-use super::axes::{self, Configuration, Group, Line};
+use super::axes::{self, Configuration, Group};
 use super::point::Shot;
 use super::reference::{Reference, wall_points};
 use crate::engine::room::{self, film::estimate_walls};
@@ -18,15 +18,16 @@ use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::ledger::Ledger;
 use crate::output::colour::ColourPicture;
-use crate::output::command;
 use crate::output::image::view_of_values;
-use crate::render::{Observer, PreparedScene};
+use crate::render::image::command_line;
+use crate::render::values::Variant;
+use crate::render::{Observer, Percent, PreparedScene, RenderRequest};
 use crate::scene::open_box::open_box;
+use crate::scene::picture_size::PictureSize;
 use crate::scene::{Camera, Light, Mesh, Scene};
 use crate::settings::scene::{Effect, SceneSettings};
 use crate::settings::stop::Stop;
-use crate::settings::{Builder, Preset, RoomSettings};
-use crate::text::quoted;
+use crate::settings::{Builder, RoomSettings};
 use crate::timings::Timings;
 use crate::verify::judge::radiosity::inward;
 
@@ -42,9 +43,8 @@ pub struct Subject {
     side: u32,
     /// Of the camera's picture.
     pixels: [u32; 2],
-    /// The scene as the user named it, and options of its light and its camera.
-    name: String,
-    view: Vec<String>,
+    /// The scene as the user named it, its light and its camera.
+    view: RenderRequest,
 }
 
 /// What a pilot has chosen for an error.
@@ -74,6 +74,8 @@ impl Subject {
     /// Quantities of a scene; making their references may take a while.
     pub fn all(gpu: &Gpu, scene: &Scene, request: &Request, cancelled: &AtomicBool, tell: &mut dyn FnMut(&str)) -> Result<Vec<Subject>> {
         let Request { scene: name, size, photons, reference_samples, .. } = request.clone();
+        let view = RenderRequest::of_words(&request.view).expect("they are options of a request");
+        let view = RenderRequest { scene: name.clone(), ..view };
         let prepared = Rc::new(PreparedScene::new(scene.clone()));
         // Fails before references are made, which takes long.
         prepared.geometry(&Observer::default())?;
@@ -88,8 +90,7 @@ impl Subject {
             receivers,
             side: size,
             pixels,
-            name: name.clone(),
-            view: request.view.clone(),
+            view: view.clone(),
         };
         let has_known_light = name == "open-box" || Reference::floor(&name, size).is_some();
         if let Some(option) = request.view.first().filter(|_| has_known_light) {
@@ -97,7 +98,7 @@ impl Subject {
                 format!("cannot be studied with {option}: its reference is of its own light; leave that out, or name another scene");
             return Err(Error::setting("SCENE", &name, allowed));
         }
-        let of_scene = |is_picture: bool| scene_axes(gpu, &prepared, request, is_picture.then_some(pixels));
+        let of_scene = |is_picture: bool| scene_axes(gpu, &prepared, &view, request, is_picture.then_some(pixels));
         if name == "open-box" {
             tell("reference: radiosity of the box");
             let reference = Reference::walls(&RoomSettings::default(), size)?;
@@ -137,33 +138,28 @@ impl Subject {
 
     /// What repeats a run.
     pub fn command(&self, configuration: &Configuration, rounds: u32, seed: u64) -> String {
-        match &configuration.line {
-            Line::Paper(settings) => {
-                let job = command::main_job(Preset::Modified, &RoomSettings { rounds, seed, ..settings.clone() });
-                let warm_up = if settings.builder == Builder::Cpu { "" } else { WARM_UP };
-                format!("{job} --irradiance irradiance{warm_up}")
-            }
-            Line::Scene(settings) => {
-                let settings = SceneSettings { rounds, seed, ..settings.clone() };
-                command::on_scene(&self.job(), &settings) + WARM_UP
-            }
+        let request = configuration.request_of(rounds, seed).brief();
+        if !configuration.is_of_paper() {
+            return self.command_of(request);
         }
+        let others: &[&str] = &["--irradiance", "irradiance", WARM_UP];
+        // The CPU needs no warm-up.
+        let is_on_cpu = request.variant == Some(Variant::Of(Builder::Cpu));
+        command_line("", &request, if is_on_cpu { &others[..2] } else { others })
     }
 
-    fn job(&self) -> String {
+    fn command_of(&self, request: RenderRequest) -> String {
         let [width, height] = self.pixels;
+        let size = Some(PictureSize::WidthAndHeight(width, height));
         match self.camera {
-            Some(_) => {
-                let words: Vec<String> = [&self.name].into_iter().chain(&self.view).cloned().map(quoted).collect();
-                format!("render {} --size {width}x{height} -o picture.exr", words.join(" "))
-            }
-            None => format!("probe {} --points {POINTS} -o irradiance.csv", quoted(self.name.clone())),
+            Some(_) => command_line("render", &RenderRequest { size, ..request }, &["-o", "picture.exr", WARM_UP]),
+            None => command_line("probe", &request, &["--points", POINTS, "-o", "irradiance.csv", WARM_UP]),
         }
     }
 
     /// What repeats a run with nothing set but its error.
     pub fn command_to(&self, error: f64, seed: u64) -> String {
-        format!("photonmill {} --error {}% --seed {seed}{WARM_UP}", self.job(), 100.0 * error)
+        self.command_of(RenderRequest { error: Some(Percent::of_share(error)), seed: Some(seed), ..self.view.clone() })
     }
 
     /// What a pilot chooses for an error.
@@ -212,7 +208,7 @@ impl Subject {
             let pixels = values.chunks(3).map(|pixel| DVec3::from_slice(pixel).as_vec3()).collect();
             return ColourPicture { width, height, pixels };
         }
-        if self.name == "open-box" {
+        if self.view.scene == "open-box" {
             let room = open_box(&RoomSettings::default());
             let per_wall = (self.side * self.side) as usize;
             let walls: Vec<(usize, &[f64])> = room.walls().map(|(face, _)| face).zip(values.chunks(per_wall)).collect();
@@ -235,25 +231,22 @@ impl Subject {
 
     /// Whether it is lit by the paper's line.
     pub fn is_of_paper(&self) -> bool {
-        self.groups.iter().flat_map(|group| &group.configurations).any(|configuration| matches!(configuration.line, Line::Paper(_)))
+        self.groups.iter().flat_map(|group| &group.configurations).any(Configuration::is_of_paper)
     }
 
     /// One run.
     pub fn run(&self, gpu: &Gpu, configuration: &Configuration, rounds: u32, seed: u64, cancelled: &AtomicBool) -> Result<Shot> {
         let mut control = Control::quiet(cancelled);
-        let shot = match &configuration.line {
-            Line::Paper(settings) => {
-                let settings = RoomSettings { rounds, seed, ..settings.clone() };
-                let room = open_box(&settings);
-                let outcome = room::run(Some(gpu), &room, &settings, &mut control)?;
-                let walls = estimate_walls(&outcome.film, &room, &outcome.plan);
-                let values = walls.into_iter().flat_map(|wall| wall.irradiance).collect();
-                shot(values, &outcome.timings, outcome.ledger())
-            }
-            Line::Scene(settings) => {
-                let settings = SceneSettings { rounds, seed, ..settings.clone() };
-                self.shot_of(&self.light(gpu, &settings, &mut control)?)
-            }
+        let request = configuration.request_of(rounds, seed);
+        let shot = if configuration.is_of_paper() {
+            let settings = request.room_settings();
+            let room = open_box(&settings);
+            let outcome = room::run(Some(gpu), &room, &settings, &mut control)?;
+            let walls = estimate_walls(&outcome.film, &room, &outcome.plan);
+            let values = walls.into_iter().flat_map(|wall| wall.irradiance).collect();
+            shot(values, &outcome.timings, outcome.ledger())
+        } else {
+            self.shot_of(&self.light(gpu, &request.settings(None), &mut control)?)
         };
         if cancelled.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(shot) }
     }
@@ -325,7 +318,7 @@ const BOX_VIEW: usize = 1;
 const BOX_PIXELS: u32 = 240;
 
 /// Runs of a study are timed at the clock of work.
-const WARM_UP: &str = " --warm-up";
+const WARM_UP: &str = "--warm-up";
 
 /// The file beside the page that the commands read points from.
 pub const POINTS: &str = "points.txt";
@@ -341,12 +334,12 @@ fn shot(values: Vec<f64>, timings: &Timings, ledger: Ledger) -> Shot {
     }
 }
 
-fn scene_axes(gpu: &Gpu, scene: &PreparedScene, request: &Request, picture: Option<[u32; 2]>) -> Result<Vec<Group>> {
-    let settings = SceneSettings { photons: request.photons, caustic_photons: request.photons, block: Some(1), ..SceneSettings::default() };
+fn scene_axes(gpu: &Gpu, scene: &PreparedScene, view: &RenderRequest, request: &Request, picture: Option<[u32; 2]>) -> Result<Vec<Group>> {
+    let base = RenderRequest { photons: Some(request.photons), block: Some(1), ..view.clone() };
     let camera = scene.scene.first_camera();
-    let prepared = scene.prepare_with(&settings, Target::Picture(&camera, picture.unwrap_or([request.size; 2])))?;
+    let prepared = scene.prepare_with(&base.settings(None), Target::Picture(&camera, picture.unwrap_or([request.size; 2])))?;
     let plan = prepared.plan_within(&engine::limits(gpu.facts()))?;
     let kept: Vec<Effect> = plan.decisions.iter().filter(|decision| decision.kept).map(|decision| decision.effect).collect();
     let radius = plan.global.as_ref().map(|map| map.radius * prepared.geometry.unit);
-    Ok(axes::of_scene(request.photons, &kept, radius, prepared.geometry.triangles.len() <= FEW_TRIANGLES, picture.is_some()))
+    Ok(axes::of_scene(base, &kept, radius, prepared.geometry.triangles.len() <= FEW_TRIANGLES, picture.is_some()))
 }
