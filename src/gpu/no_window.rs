@@ -6,6 +6,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::DeviceFacts;
+use super::device::Loaded;
 use crate::error::Result;
 
 pub enum Window {}
@@ -17,16 +18,12 @@ pub(super) fn instance_extensions(window: &Window) -> Result<&'static [*const c_
 }
 
 impl Surface {
-    pub(super) fn new(_: &ash::Entry, _: &ash::Instance, window: &Arc<Window>) -> Result<Surface> {
+    pub(super) fn new(_: &Loaded, window: &Arc<Window>) -> Result<Surface> {
         match **window {}
     }
 
     pub(super) fn window(&self) -> &Arc<Window> {
         match *self {}
-    }
-
-    pub(super) fn destroy(self) {
-        match self {}
     }
 
     pub(super) fn queue_family(&self, _: &ash::Instance, _: vk::PhysicalDevice, _: &DeviceFacts) -> Result<u32> {

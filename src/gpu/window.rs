@@ -11,6 +11,7 @@ use winit::raw_window_handle::{HasDisplayHandle, HasWindowHandle, RawDisplayHand
 pub use winit::window::Window;
 
 use super::commands::command_buffer;
+use super::device::Loaded;
 use super::{Buffer, Context, DeviceFacts, Gpu, call};
 use crate::error::{Error, Result};
 
@@ -37,7 +38,7 @@ pub(super) struct Surface {
 }
 
 impl Surface {
-    pub(super) fn new(entry: &ash::Entry, instance: &ash::Instance, window: &Arc<Window>) -> Result<Surface> {
+    pub(super) fn new(Loaded { entry, instance, .. }: &Loaded, window: &Arc<Window>) -> Result<Surface> {
         let (display, handle) = (display_of(window)?, window.window_handle().map_err(no_window)?.as_raw());
         // SAFETY: the instance was made with the extensions of this display, and the window is kept.
         let raw = unsafe { ash_window::create_surface(entry, instance, display, handle, None) }
@@ -47,11 +48,6 @@ impl Surface {
 
     pub(super) fn window(&self) -> &Arc<Window> {
         &self.window
-    }
-
-    pub(super) fn destroy(self) {
-        // SAFETY: no swapchain is left that was made for it, and the instance is alive.
-        unsafe { self.functions.destroy_surface(self.raw, None) };
     }
 
     /// A queue family that computes, draws and shows pictures in this window.
@@ -77,6 +73,13 @@ impl Surface {
             .filter(does)
             .max_by_key(|family| *family == facts.queue_family)
             .ok_or_else(|| no_window(format!("{} computes, but cannot show pictures in a window of this display", facts.label())))
+    }
+}
+
+impl Drop for Surface {
+    fn drop(&mut self) {
+        // SAFETY: no swapchain is left that was made for it, and the instance is alive.
+        unsafe { self.functions.destroy_surface(self.raw, None) };
     }
 }
 
@@ -130,7 +133,7 @@ impl<'gpu> Presenter<'gpu> {
         let mode =
             DynamicRendering { color_attachment_format: format.format, depth_attachment_format: None, stencil_attachment_format: None };
         let painter = Renderer::with_default_allocator(
-            &context.instance,
+            &context.loaded.instance,
             context.physical_device,
             device.clone(),
             RenderMode::DynamicRendering(mode),
@@ -139,7 +142,7 @@ impl<'gpu> Presenter<'gpu> {
         .map_err(drawing)?;
         Ok(Presenter {
             gpu,
-            functions: khr::swapchain::Device::new(&context.instance, device),
+            functions: khr::swapchain::Device::new(&context.loaded.instance, device),
             swapchain: vk::SwapchainKHR::null(),
             images: Vec::new(),
             views: Vec::new(),
