@@ -157,7 +157,7 @@ impl Gpu {
             }
             (error, _) => error,
         })?;
-        let surface = window.map(|window| Surface::new(&loaded, window)).transpose()?;
+        let surface = window.map(|window| Surface::new(&loaded.entry, &loaded.instance, window)).transpose()?;
         let (physical_device, mut facts) = device::choose(&loaded.instance, options.device.as_deref())?;
         if let Some(surface) = &surface {
             facts.queue_family = surface.queue_family(&loaded.instance, physical_device, &facts)?;

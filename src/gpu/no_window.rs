@@ -6,7 +6,6 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::DeviceFacts;
-use super::device::Loaded;
 use crate::error::Result;
 
 pub enum Window {}
@@ -18,7 +17,7 @@ pub(super) fn instance_extensions(window: &Window) -> Result<&'static [*const c_
 }
 
 impl Surface {
-    pub(super) fn new(_: &Loaded, window: &Arc<Window>) -> Result<Surface> {
+    pub(super) fn new(_: &ash::Entry, _: &ash::Instance, window: &Arc<Window>) -> Result<Surface> {
         match **window {}
     }
 
