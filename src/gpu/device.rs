@@ -73,7 +73,7 @@ impl DeviceFacts {
     }
 }
 
-/// An instance, and what it was made with.
+/// An instance, and what it was made with; what is made from it goes before it.
 pub(super) struct Loaded {
     pub(super) entry: ash::Entry,
     pub(super) instance: ash::Instance,
@@ -81,6 +81,16 @@ pub(super) struct Loaded {
     pub(super) messages: Option<Messages>,
     /// Whether it takes names and labels (VK_EXT_debug_utils).
     pub(super) has_labels: bool,
+}
+
+impl Drop for Loaded {
+    fn drop(&mut self) {
+        // SAFETY: nothing is left that was made from this instance.
+        unsafe {
+            self.messages.take().into_iter().for_each(|messages| messages.destroy());
+            self.instance.destroy_instance(None);
+        }
+    }
 }
 
 /// Loads the Vulkan loader at run time and makes an instance.

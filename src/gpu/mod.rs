@@ -106,12 +106,10 @@ pub(crate) struct Context {
     held: Mutex<HeldMemory>,
     device: ash::Device,
     labels: Option<Labels>,
-    messages: Option<Messages>,
     /// Of the window, if there is one.
     surface: Option<Surface>,
     physical_device: vk::PhysicalDevice,
-    instance: ash::Instance,
-    _entry: ash::Entry,
+    loaded: Loaded,
 }
 
 impl Context {
@@ -127,17 +125,9 @@ impl Context {
 
 impl Drop for Context {
     fn drop(&mut self) {
-        // SAFETY: every object of the device holds an Arc of this context, so all are gone; the
-        // allocator frees its memory before the device goes.
-        unsafe {
-            self.allocator().take();
-            self.device.destroy_device(None);
-            self.surface.take().into_iter().for_each(Surface::destroy);
-            if let Some(messages) = self.messages.take() {
-                messages.destroy();
-            }
-            self.instance.destroy_instance(None);
-        }
+        self.allocator().take();
+        // SAFETY: every object of the device holds an Arc of this context, so all are gone, and the allocator has freed its memory.
+        unsafe { self.device.destroy_device(None) };
     }
 }
 
@@ -169,63 +159,29 @@ impl Gpu {
             }
             (error, _) => error,
         })?;
-        let Loaded { entry, instance, messages, has_labels } = loaded;
-        let surface = window.map(|window| Surface::new(&entry, &instance, window)).transpose();
-        let opened = surface.and_then(|surface| {
-            let opened = device::choose(&instance, options.device.as_deref()).and_then(|(physical, mut facts)| {
-                if let Some(surface) = &surface {
-                    facts.queue_family = surface.queue_family(&instance, physical, &facts)?;
-                }
-                let (device, queue) = device::create(&instance, physical, &facts, surface.is_some())?;
-                Ok((physical, facts, device, queue))
-            });
-            match (opened, surface) {
-                (Ok(opened), surface) => Ok((opened, surface)),
-                (Err(error), surface) => {
-                    surface.into_iter().for_each(Surface::destroy);
-                    Err(error)
-                }
-            }
-        });
-        let ((physical_device, mut facts, device, queue), surface) = match opened {
-            Ok(opened) => opened,
-            Err(error) => {
-                // SAFETY: nothing else is left that was made from this instance.
-                unsafe {
-                    if let Some(messages) = messages {
-                        messages.destroy();
-                    }
-                    instance.destroy_instance(None);
-                }
-                return Err(error);
-            }
-        };
+        let surface = window.map(|window| Surface::new(&loaded.entry, &loaded.instance, window)).transpose()?;
+        let (physical_device, mut facts) = device::choose(&loaded.instance, options.device.as_deref())?;
+        if let Some(surface) = &surface {
+            facts.queue_family = surface.queue_family(&loaded.instance, physical_device, &facts)?;
+        }
+        let (device, queue) = device::create(&loaded.instance, physical_device, &facts, surface.is_some())?;
         facts.timestamp_bits = if options.without_timestamps { 0 } else { facts.timestamp_bits };
         facts.int64_atomics &= !options.without_int64_atomics;
         if let Some(memory) = options.memory {
             facts.usable_memory_bytes = memory;
         }
-        let labels = has_labels.then(|| Labels::new(&instance, &device));
+        let labels = loaded.has_labels.then(|| Labels::new(&loaded.instance, &device));
+        let held = Mutex::default();
+        let context = Arc::new(Context { allocator: Mutex::default(), held, device, labels, surface, physical_device, loaded });
         let allocator = Allocator::new(&AllocatorCreateDesc {
-            instance: instance.clone(),
-            device: device.clone(),
+            instance: context.loaded.instance.clone(),
+            device: context.device.clone(),
             physical_device,
             debug_settings: Default::default(),
             buffer_device_address: false,
             allocation_sizes: options.memory.map_or_else(Default::default, buffer::blocks_within),
-        })
-        .map_err(|error| Error::Device { call: "the memory allocator", reason: error.to_string() })?;
-        let context = Arc::new(Context {
-            allocator: Mutex::new(Some(allocator)),
-            held: Mutex::default(),
-            device,
-            labels,
-            messages,
-            surface,
-            physical_device,
-            instance,
-            _entry: entry,
         });
+        *context.allocator() = Some(allocator.map_err(|error| Error::Device { call: "the memory allocator", reason: error.to_string() })?);
         let cache = kernel::DiskCache::open(&context, &facts)?;
         let mut gpu = Gpu {
             facts,
@@ -247,11 +203,8 @@ impl Gpu {
 
     /// Devices that the loader lists, in its order.
     pub fn list() -> Result<Vec<DeviceFacts>> {
-        let Loaded { entry: _entry, instance, .. } = device::instance(false, None)?;
-        let facts = device::all(&instance).map(|devices| devices.into_iter().map(|(_, facts)| facts).collect());
-        // SAFETY: nothing else was made from this instance.
-        unsafe { instance.destroy_instance(None) };
-        facts
+        let loaded = device::instance(false, None)?;
+        Ok(device::all(&loaded.instance)?.into_iter().map(|(_, facts)| facts).collect())
     }
 
     /// From now on runs this SPIR-V in place of the kernels' own, by the kernel's name. Kernels that were replaced before and are
@@ -302,7 +255,7 @@ impl Gpu {
 
     /// Fails if the validation layer has said anything so far.
     pub fn check_validation(&self) -> Result<()> {
-        let messages = self.context.messages.as_ref().map(Messages::all).unwrap_or_default();
+        let messages = self.context.loaded.messages.as_ref().map(Messages::all).unwrap_or_default();
         match messages.first() {
             None => Ok(()),
             Some(first) => Err(Error::Validation { count: messages.len(), first: first.clone() }),

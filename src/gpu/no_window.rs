@@ -25,10 +25,6 @@ impl Surface {
         match *self {}
     }
 
-    pub(super) fn destroy(self) {
-        match self {}
-    }
-
     pub(super) fn queue_family(&self, _: &ash::Instance, _: vk::PhysicalDevice, _: &DeviceFacts) -> Result<u32> {
         match *self {}
     }

@@ -11,7 +11,7 @@ use winit::raw_window_handle::{HasDisplayHandle, HasWindowHandle, RawDisplayHand
 pub(crate) use winit::window::Window;
 
 use super::commands::command_buffer;
-use super::{Buffer, Context, DeviceFacts, Gpu, call};
+use super::{Buffer, DeviceFacts, Gpu, call};
 use crate::error::{Error, Result};
 
 fn no_window(reason: impl std::fmt::Display) -> Error {
@@ -49,11 +49,6 @@ impl Surface {
         &self.window
     }
 
-    pub(super) fn destroy(self) {
-        // SAFETY: no swapchain is left that was made for it, and the instance is alive.
-        unsafe { self.functions.destroy_surface(self.raw, None) };
-    }
-
     /// A queue family that computes, draws and shows pictures in this window.
     pub(super) fn queue_family(&self, instance: &ash::Instance, physical: vk::PhysicalDevice, facts: &DeviceFacts) -> Result<u32> {
         // SAFETY: plain enumeration.
@@ -77,6 +72,13 @@ impl Surface {
             .filter(does)
             .max_by_key(|family| *family == facts.queue_family)
             .ok_or_else(|| no_window(format!("{} computes, but cannot show pictures in a window of this display", facts.label())))
+    }
+}
+
+impl Drop for Surface {
+    fn drop(&mut self) {
+        // SAFETY: no swapchain is left that was made for it, and the instance is alive.
+        unsafe { self.functions.destroy_surface(self.raw, None) };
     }
 }
 
@@ -105,13 +107,12 @@ pub(crate) struct Presenter<'gpu> {
     format: vk::SurfaceFormatKHR,
     extent: vk::Extent2D,
     painter: Option<Painter>,
-    context: Arc<Context>,
 }
 
 impl<'gpu> Presenter<'gpu> {
     /// Of a device that was opened with a window.
     pub(crate) fn new(gpu: &'gpu Gpu) -> Result<Presenter<'gpu>> {
-        let context = gpu.context.clone();
+        let context = &gpu.context;
         let surface = context.surface.as_ref().expect("the device was opened with a window");
         // SAFETY: device and surface are alive.
         let formats = call("vkGetPhysicalDeviceSurfaceFormatsKHR", || unsafe {
@@ -130,7 +131,7 @@ impl<'gpu> Presenter<'gpu> {
         let mode =
             DynamicRendering { color_attachment_format: format.format, depth_attachment_format: None, stencil_attachment_format: None };
         let painter = Renderer::with_default_allocator(
-            &context.instance,
+            &context.loaded.instance,
             context.physical_device,
             device.clone(),
             RenderMode::DynamicRendering(mode),
@@ -139,7 +140,7 @@ impl<'gpu> Presenter<'gpu> {
         .map_err(drawing)?;
         Ok(Presenter {
             gpu,
-            functions: khr::swapchain::Device::new(&context.instance, device),
+            functions: khr::swapchain::Device::new(&context.loaded.instance, device),
             swapchain: vk::SwapchainKHR::null(),
             images: Vec::new(),
             views: Vec::new(),
@@ -151,7 +152,6 @@ impl<'gpu> Presenter<'gpu> {
             format,
             extent: vk::Extent2D::default(),
             painter: Some(painter),
-            context,
         })
     }
 
@@ -162,10 +162,10 @@ impl<'gpu> Presenter<'gpu> {
 
     /// Pixels of the window as it is now; none while it is minimised.
     pub(crate) fn size(&self) -> Result<[u32; 2]> {
-        let surface = self.context.surface.as_ref().expect("there is a window");
+        let surface = self.gpu.context.surface.as_ref().expect("there is a window");
         // SAFETY: device and surface are alive.
         let capabilities = call("vkGetPhysicalDeviceSurfaceCapabilitiesKHR", || unsafe {
-            surface.functions.get_physical_device_surface_capabilities(self.context.physical_device, surface.raw)
+            surface.functions.get_physical_device_surface_capabilities(self.gpu.context.physical_device, surface.raw)
         })?;
         let vk::Extent2D { width, height } = capabilities.current_extent;
         // Where the window takes the size of its images.
@@ -205,7 +205,7 @@ impl<'gpu> Presenter<'gpu> {
             Err(code) => return call("vkAcquireNextImageKHR", || Err(code)),
         };
         self.record(pixels, index as usize, painter, overlay)?;
-        let device = &self.context.device;
+        let device = &self.gpu.context.device;
         let wait = [vk::SemaphoreSubmitInfo::default().semaphore(self.acquired).stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)];
         let signal =
             [vk::SemaphoreSubmitInfo::default().semaphore(self.drawn[index as usize]).stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)];
@@ -232,7 +232,7 @@ impl<'gpu> Presenter<'gpu> {
     }
 
     fn record(&self, pixels: &Buffer<u32>, index: usize, painter: &mut Painter, overlay: &Overlay) -> Result<()> {
-        let (device, command_buffer, image) = (&self.context.device, self.command_buffer, self.images[index]);
+        let (device, command_buffer, image) = (&self.gpu.context.device, self.command_buffer, self.images[index]);
         let whole = vk::ImageSubresourceRange::default().aspect_mask(vk::ImageAspectFlags::COLOR).level_count(1).layer_count(1);
         let turn = |from: vk::ImageLayout, to: vk::ImageLayout| {
             let barrier = [vk::ImageMemoryBarrier2::default()
@@ -279,12 +279,12 @@ impl<'gpu> Presenter<'gpu> {
 
     fn make_images(&mut self, extent: vk::Extent2D) -> Result<()> {
         self.drop_images();
-        let surface = self.context.surface.as_ref().expect("there is a window");
-        let device = &self.context.device;
+        let surface = self.gpu.context.surface.as_ref().expect("there is a window");
+        let device = &self.gpu.context.device;
         // SAFETY: device and surface are alive; what is made is destroyed in `drop_images`.
         unsafe {
             let capabilities = call("vkGetPhysicalDeviceSurfaceCapabilitiesKHR", || {
-                surface.functions.get_physical_device_surface_capabilities(self.context.physical_device, surface.raw)
+                surface.functions.get_physical_device_surface_capabilities(self.gpu.context.physical_device, surface.raw)
             })?;
             let most = if capabilities.max_image_count == 0 { u32::MAX } else { capabilities.max_image_count };
             let info = vk::SwapchainCreateInfoKHR::default()
@@ -318,7 +318,7 @@ impl<'gpu> Presenter<'gpu> {
     }
 
     fn drop_images(&mut self) {
-        let device = &self.context.device;
+        let device = &self.gpu.context.device;
         // SAFETY: the queue is of this thread alone, and idle afterwards.
         unsafe {
             let _ = device.queue_wait_idle(self.gpu.queue);
@@ -339,7 +339,7 @@ impl Drop for Presenter<'_> {
     fn drop(&mut self) {
         self.drop_images();
         self.painter.take();
-        let device = &self.context.device;
+        let device = &self.gpu.context.device;
         // SAFETY: every frame was waited for.
         unsafe {
             device.destroy_semaphore(self.acquired, None);

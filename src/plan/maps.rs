@@ -3,8 +3,8 @@
 
 use super::Limits;
 use super::capacity::{self, Persistence};
-use super::radius::{FirstRadius, Trial};
-use super::scene::{MapPlan, SEGMENT_BOUNCES};
+use super::radius::FirstRadius;
+use super::scene::{Asked, MapPlan, SEGMENT_BOUNCES};
 use crate::constants::*;
 use crate::error::{Result, require};
 use crate::photon::MapPhoton;
@@ -38,14 +38,8 @@ pub(super) struct Maps {
 
 impl Maps {
     /// `settings` have a builder.
-    pub(super) fn new(
-        scene: &Scene,
-        geometry: &Geometry,
-        settings: &SceneSettings,
-        limits: &Limits,
-        trial: Option<&Trial>,
-        keeps: &dyn Fn(Effect) -> bool,
-    ) -> Result<Maps> {
+    pub(super) fn new(asked: Asked, keeps: &dyn Fn(Effect) -> bool) -> Result<Maps> {
+        let Asked { scene, geometry, settings, limits, .. } = asked;
         let builder = settings.builder.expect("the plan chose a builder");
         limits.check_builder(builder)?;
         let split = settings.illumination == Illumination::Split;
@@ -58,7 +52,7 @@ impl Maps {
             | of(keeps(Effect::Indirect), ARRIVED_INDIRECT);
 
         let landings = Landings::of(scene, settings.bounces);
-        let map = |caustic_only, stored| map(caustic_only, stored, geometry, settings, limits, trial, &landings);
+        let map = |caustic_only, stored| map(caustic_only, stored, asked, &landings);
         // Without a light there is nothing to trace.
         let has_light = !geometry.emitters.is_empty();
         let global = (has_light && stored != 0).then(|| map(false, stored)).transpose()?;
@@ -70,15 +64,8 @@ impl Maps {
 }
 
 /// The global map, or the caustic map.
-fn map(
-    caustic_only: bool,
-    stored: u32,
-    geometry: &Geometry,
-    settings: &SceneSettings,
-    limits: &Limits,
-    trial: Option<&Trial>,
-    landings: &Landings,
-) -> Result<MapPlan> {
+fn map(caustic_only: bool, stored: u32, asked: Asked, landings: &Landings) -> Result<MapPlan> {
+    let Asked { geometry, settings, limits, trial, .. } = asked;
     let (name, domain, photons, neighbours, radius) = if caustic_only {
         let radius = ("caustic_radius", settings.caustic_radius);
         ("caustic", DOMAIN_CAUSTIC_PHOTONS, settings.caustic_photons, settings.caustic_neighbours, radius)

@@ -9,7 +9,7 @@ use super::extra_samples::ExtraSamples;
 use super::film::{BiasPlan, FilmPlan, LostOffSurfaces};
 use super::maps::Maps;
 use super::radius::Trial;
-use super::scene::{LightOf, MapPlan, SEGMENT_BOUNCES, ScenePlan};
+use super::scene::{Asked, LightOf, MapPlan, SEGMENT_BOUNCES, ScenePlan};
 use super::sensor::Sensor;
 use super::{Limits, effects};
 use crate::constants::*;
@@ -53,17 +53,6 @@ impl ScenePlan {
         // A picture that is too large with its parts may fit without them.
         Asked { settings: &SceneSettings { keeps_parts: false, ..settings.clone() }, ..asked }.plan()
     }
-}
-
-/// What a plan is made of.
-#[derive(Clone, Copy)]
-struct Asked<'a> {
-    scene: &'a Scene,
-    geometry: &'a Geometry,
-    settings: &'a SceneSettings,
-    sensor: Sensor,
-    limits: &'a Limits,
-    trial: Option<&'a Trial>,
 }
 
 impl Asked<'_> {
@@ -110,7 +99,7 @@ impl Asked<'_> {
         let by_itself = if settings.math == Math::Strict || !limits.votes_in_loops { Builder::Ballot } else { Builder::Persistent };
         let settings = SceneSettings { builder: Some(settings.builder.unwrap_or(by_itself)), ..settings.clone() };
         let split = settings.illumination == Illumination::Split;
-        let maps = Maps::new(scene, geometry, &settings, for_maps, trial, &keeps)?;
+        let maps = Maps::new(Asked { settings: &settings, limits: for_maps, ..self }, &keeps)?;
         let gather_rays = match (keeps(Effect::Indirect), settings.final_gather, keeps(Effect::Glossy)) {
             (true, true, _) => GATHER_ALL,
             (true, false, true) if split => GATHER_GLOSSY,

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-use super::capacity::Persistence;
+use super::capacity::{Limits, Persistence};
 use super::evidence::EffectDecision;
 use super::extra_samples::ExtraSamples;
 use super::film::FilmPlan;
@@ -13,9 +13,21 @@ use super::radius::{self, Classes, RADIUS_RANGE, RadiusFrom, Trial};
 use super::sensor::Sensor;
 use crate::constants::*;
 use crate::records::*;
+use crate::scene::Scene;
 use crate::scene::geometry::Geometry;
 use crate::settings::Builder;
 use crate::settings::scene::{Effect, Part, SceneSettings};
+
+/// What a plan is made of.
+#[derive(Clone, Copy)]
+pub(super) struct Asked<'a> {
+    pub(super) scene: &'a Scene,
+    pub(super) geometry: &'a Geometry,
+    pub(super) settings: &'a SceneSettings,
+    pub(super) sensor: Sensor,
+    pub(super) limits: &'a Limits,
+    pub(super) trial: Option<&'a Trial>,
+}
 
 /// A photon map of each round.
 #[derive(Debug, Clone, PartialEq, Serialize)]

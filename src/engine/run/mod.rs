@@ -56,9 +56,11 @@ pub(crate) struct Task<'a, Film> {
     /// Whether what is done can be gone on with: sums of floats cannot.
     pub can_go_on: bool,
     pub error: Box<dyn Fn(&Film) -> FilmError + 'a>,
-    /// Light that limits kept from a film.
-    pub losses: Box<dyn Fn(&Film, &[Fates]) -> Losses + 'a>,
+    pub losses: LossesOf<'a, Film>,
 }
+
+/// Light that limits kept from a film.
+type LossesOf<'a, Film> = Box<dyn Fn(&Film, &[Fates]) -> Losses + 'a>;
 
 /// What is lit: the paper's box or a scene, on a device or on the CPU.
 pub(crate) trait World {

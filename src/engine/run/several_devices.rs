@@ -267,7 +267,7 @@ impl<Plan: Send, Film: WorldFilm> Together<'_, Plan, Film> {
             let blocks = run.done.count();
             if attempt.watch.is_due(blocks) {
                 let film = Film::of(&run.film);
-                attempt.watch.look(&(self.task.error)(film), &(self.task.losses)(film, &run.fates));
+                attempt.watch.look((self.task.error)(film), (self.task.losses)(film, &run.fates));
                 attempt.watch.check_error(self.task.bounces)?;
                 attempt.end = attempt.watch.end(blocks, 0);
             }

@@ -241,7 +241,7 @@ impl<'a, Film: WorldFilm> RunState<'a, Film> {
             let mut film = world.film(recorder, self)?;
             if looks {
                 let made = film();
-                self.watch.look(&(self.task.error)(&made), &(self.task.losses)(&made, self.fates()));
+                self.watch.look((self.task.error)(&made), (self.task.losses)(&made, self.fates()));
                 self.watch.check_error(self.task.bounces)?;
                 film = Box::new(|| made);
             }

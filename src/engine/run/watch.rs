@@ -184,25 +184,11 @@ pub(crate) struct Watch {
     seen: Option<Look>,
 }
 
-/// What a film told.
-#[derive(Clone, Copy)]
+/// What a film told, with the bound of its noise, and what limits kept from it.
 struct Look {
-    rounds: u32,
-    /// As it was found, and its bound.
-    noise: [f64; 2],
-    /// The share of the noise's square in light from maps.
-    of_maps: f64,
-    unknown: f64,
-    /// Whether no point lies on a surface, where some light is missing.
-    is_off_surfaces: bool,
-    /// What is too rare to have been seen.
-    unseen: f64,
-    /// As far as the film tells it.
-    bias: Option<Bias>,
-    /// What limits have kept from the result.
-    lost: f64,
-    /// Whether the number of bounces kept most of it.
-    is_lost_by_bounces: bool,
+    error: FilmError,
+    most_noise: f64,
+    losses: Losses,
 }
 
 impl Watch {
@@ -234,23 +220,18 @@ impl Watch {
     }
 
     /// Takes what a film tells, and what limits kept from it.
-    pub(crate) fn look(&mut self, error: &FilmError, losses: &Losses) {
-        let FilmError { rounds, blocks, noise, freedom, ref unknown, unseen, .. } = *error;
-        let noise = [noise, error_bound(noise, freedom, self.stop.confidence)];
-        let of_maps = error.places.map_or(1.0, |places| places.of_maps());
-        let is_off_surfaces = unknown.off_surfaces.is_all();
-        let (lost, is_lost_by_bounces) = (losses.relative, losses.cut_off > losses.clamped);
-        let unknown = unknown.relative;
-        self.seen = Some(Look { rounds, noise, of_maps, unknown, is_off_surfaces, unseen, bias: error.bias, lost, is_lost_by_bounces });
-        self.next_look = next_look(blocks);
+    pub(crate) fn look(&mut self, error: FilmError, losses: Losses) {
+        self.next_look = next_look(error.blocks);
         self.looked = Instant::now();
+        self.seen = Some(Look { most_noise: error_bound(error.noise, error.freedom, self.stop.confidence), error, losses });
     }
 
     /// Noise, bias, what is unknown and what is unseen together at the latest look.
     fn error(&self) -> Option<(u32, f64)> {
-        self.seen.map(|look| {
-            let Look { rounds, noise, unknown, unseen, lost, .. } = look;
-            (rounds, bound_of_both(noise, self.bias(&look, rounds.into()).map(|bias| bias + lost)).hypot(unknown).hypot(unseen))
+        self.seen.as_ref().map(|look| {
+            let Look { error: FilmError { rounds, noise, unknown, unseen, .. }, most_noise, losses } = look;
+            let bias = self.bias(look, f64::from(*rounds)).map(|bias| bias + losses.relative);
+            (*rounds, bound_of_both([*noise, *most_noise], bias).hypot(unknown.relative).hypot(*unseen))
         })
     }
 
@@ -260,14 +241,14 @@ impl Watch {
         if self.stop.seconds.is_some() || self.stop.photons.is_some() {
             return Ok(());
         }
-        let (Some(wanted), Some(look)) = (self.stop.error, self.seen) else { return Ok(()) };
+        let (Some(wanted), Some(Look { error, losses, .. })) = (self.stop.error, &self.seen) else { return Ok(()) };
         let refused = |allowed: String| Err(Error::setting("error", format!("{}%", 100.0 * wanted), allowed));
-        if look.is_off_surfaces {
+        if error.unknown.off_surfaces.is_all() {
             return refused("cannot be reached, because no point lies on a surface, and some light of this scene is only found there; move the points onto surfaces".to_owned());
         }
-        if look.lost > wanted {
-            let percent = 100.0 * look.lost;
-            return refused(match look.is_lost_by_bounces {
+        if losses.relative > wanted {
+            let percent = 100.0 * losses.relative;
+            return refused(match losses.cut_off > losses.clamped {
                 true => format!(
                     "cannot be reached, because photons are cut off after {bounces} bounces, and what they carry may add up to {percent:.2} % of the result; allow more `bounces`"
                 ),
@@ -276,7 +257,7 @@ impl Watch {
                 ),
             });
         }
-        if let Some(Bias { lower, upper, .. }) = look.bias
+        if let Some(Bias { lower, upper, .. }) = error.bias
             && self.alpha == 1.0
             && lower > wanted
         {
@@ -293,12 +274,11 @@ impl Watch {
     /// at a look.
     fn bias(&self, look: &Look, rounds: f64) -> [f64; 2] {
         let square = |rounds: f64| mean_squared_radius(self.alpha, rounds as u32);
-        match (self.stop.bias, look.bias) {
+        let at = f64::from(look.error.rounds);
+        match (self.stop.bias, look.error.bias) {
             (Some(bias), _) => [bias * square(rounds); 2],
-            (None, Some(Bias { relative, upper, .. })) if rounds == f64::from(look.rounds) => [relative, upper],
-            (None, Some(bias)) => {
-                bias.expected(square(rounds) / square(look.rounds.into()), (f64::from(look.rounds) / rounds).powf(self.alpha))
-            }
+            (None, Some(Bias { relative, upper, .. })) if rounds == at => [relative, upper],
+            (None, Some(bias)) => bias.expected(square(rounds) / square(at), (at / rounds).powf(self.alpha)),
             (None, None) => [0.0; 2],
         }
     }
@@ -330,7 +310,7 @@ impl Watch {
         let by_photons = self.stop.photons.map_or(most, |photons| (photons as f64 / photons_per_round.max(1) as f64).ceil());
         // Before the first look nobody knows when the error will be what is wanted.
         let by_error = match self.stop.error {
-            Some(wanted) => self.seen.map(|seen| self.rounds_wanted(wanted, seen, most)),
+            Some(wanted) => self.seen.as_ref().map(|seen| self.rounds_wanted(wanted, seen, most)),
             None => Some(most),
         };
         let by_rounds = by_error.filter(|_| rounds > 0.0).map(|by_error| a_round * (by_error.min(by_photons).min(most) - rounds).max(0.0));
@@ -350,14 +330,14 @@ impl Watch {
     /// Rounds after which the error will be what is wanted: the square of the noise falls as 1 / rounds, and that of light from maps as
     /// rounds^-alpha (Knaus and Zwicker 2011); the bias as the radii's mean square, what nothing has reached as 1 / (rounds and area of
     /// the discs), and what is unseen as 1 / rounds.
-    fn rounds_wanted(&self, wanted: f64, look: Look, most: f64) -> f64 {
-        let Look { rounds, noise, of_maps, unknown, unseen, lost, .. } = look;
-        let at = f64::from(rounds);
+    fn rounds_wanted(&self, wanted: f64, look: &Look, most: f64) -> f64 {
+        let Look { error: FilmError { rounds, noise, unknown, unseen, places, .. }, most_noise, losses } = look;
+        let (at, of_maps) = (f64::from(*rounds), places.map_or(1.0, |places| places.of_maps()));
         let error = |rounds: f64| {
-            let unknown = unknown * (at / rounds).powf(self.alpha);
+            let unknown = unknown.relative * (at / rounds).powf(self.alpha);
             let quieter = (1.0 - of_maps) * at / rounds + of_maps * (at / rounds).powf(self.alpha);
-            let noise = noise.map(|noise| noise * quieter.sqrt());
-            let bias = self.bias(&look, rounds).map(|bias| bias + lost);
+            let noise = [noise, most_noise].map(|noise| noise * quieter.sqrt());
+            let bias = self.bias(look, rounds).map(|bias| bias + losses.relative);
             bound_of_both(noise, bias).hypot(unknown).hypot(unseen * at / rounds)
         };
         let (mut less, mut more) = (at.min(most), most);

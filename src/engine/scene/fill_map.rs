@@ -93,7 +93,7 @@ fn one_map(commands: &mut Commands, round: Round, map: &MapPlan, take: &mut dyn 
     let mut stored = 0;
     for chunk in map.chunks() {
         let mut found: Vec<MapPhoton> = Vec::new();
-        trace::trace(commands, round, map, chunk, &mut |commands, _| Ok(found.extend(trace::in_map(commands, round, map)?)))?;
+        trace::trace(commands, round, map, chunk, &mut |commands, _| trace::take_map(commands, round, map, &mut found))?;
         found.par_sort_unstable_by_key(|photon| bytemuck::cast::<MapPhoton, [u32; 8]>(*photon));
         stored += found.len() as u64;
         take(&found)?;

@@ -99,16 +99,17 @@ pub(crate) fn trace(
 pub(crate) fn stored(commands: &mut Commands, round: Round, map: &MapPlan) -> Result<Vec<MapPhoton>> {
     let mut found = Vec::new();
     for chunk in map.chunks() {
-        trace(commands, round, map, chunk, &mut |commands, _| Ok(found.extend(in_map(commands, round, map)?)))?;
+        trace(commands, round, map, chunk, &mut |commands, _| take_map(commands, round, map, &mut found))?;
     }
     Ok(found)
 }
 
-/// The photons that are in the map now, without empty slots.
-pub(crate) fn in_map(commands: &mut Commands, round: Round, map_plan: &MapPlan) -> Result<impl Iterator<Item = MapPhoton> + use<>> {
+/// Adds the photons that are in the map now, without empty slots.
+pub(crate) fn take_map(commands: &mut Commands, round: Round, map_plan: &MapPlan, found: &mut Vec<MapPhoton>) -> Result<()> {
     let PhotonBuffers { counters, map, .. } = round.photons();
     let count = commands.read(counters, 1)?[0].min(map_plan.capacity);
-    Ok(commands.read(map, count as usize)?.into_iter().filter(|photon| photon.plane != NONE))
+    found.extend(commands.read(map, count as usize)?.into_iter().filter(|photon| photon.plane != NONE));
+    Ok(())
 }
 
 /// Whether the map has slots, some of them empty.
