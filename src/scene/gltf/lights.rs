@@ -43,15 +43,16 @@ impl Loader {
             }
         };
         let eye = to_world.transform_point3(DVec3::ZERO);
-        let target = eye + to_world.transform_vector3(DVec3::NEG_Z).normalize_or(DVec3::NEG_Z);
+        // Added to a place that is far away it would be lost.
+        let forward = to_world.transform_vector3(DVec3::NEG_Z).normalize_or(DVec3::NEG_Z);
         let up = to_world.transform_vector3(DVec3::Y);
         // Where the file leaves the aspect open, so does the camera.
         let is_usable = |aspect: &f32| aspect.is_finite() && *aspect > 0.0;
         if let Some(aspect) = aspect.filter(|aspect| !is_usable(aspect)) {
             self.leave_out(format!("an aspect ratio of {aspect}"), &owner);
         }
-        let camera = Camera::looking_at(&name, eye, target, up, 1.0);
-        self.scene.cameras.push(Camera { projection, aspect: aspect.filter(is_usable).map(f64::from), ..camera });
+        let camera = Camera::looking_at(&name, DVec3::ZERO, forward, up, 1.0);
+        self.scene.cameras.push(Camera { eye, projection, aspect: aspect.filter(is_usable).map(f64::from), ..camera });
     }
 
     pub(super) fn read_light(&mut self, light: &gltf::khr_lights_punctual::Light, node: &str, to_world: DMat4) -> Result<()> {
