@@ -104,10 +104,14 @@ impl Triangle<'_> {
         mix(of_corners, self.of_vertices(weights))
     }
 
+    /// The same of the values of the mesh's vertices, if it has some.
+    fn of_mesh<T: Copy + std::ops::Mul<f64, Output = T> + std::ops::Add<Output = T>>(&self, values: &[T], weights: DVec3) -> Option<T> {
+        (!values.is_empty()).then(|| self.mixed(self.vertices.map(|vertex| values[vertex]), weights))
+    }
+
     /// Of the vertices' colours.
-    pub(super) fn alpha(&self, weights: DVec3) -> f64 {
-        let alphas = &self.mesh.alphas;
-        if alphas.is_empty() { 1.0 } else { self.mixed(self.vertices.map(|vertex| alphas[vertex]), weights) }
+    pub(crate) fn alpha(&self, weights: DVec3) -> f64 {
+        self.of_mesh(&self.mesh.alphas, weights).unwrap_or(1.0)
     }
 
     pub(super) fn point(&self, weights: DVec3) -> DVec3 {
@@ -218,8 +222,7 @@ impl<'a> Geometry<'a> {
     /// A texture at a point of a triangle; 1 without one.
     pub(super) fn texel(&self, texture: Option<TextureUse>, triangle: &Triangle, weights: DVec3) -> DVec4 {
         let Some(TextureUse { texture, uv_set, transform: UvTransform { scale, rotation, offset } }) = texture else { return DVec4::ONE };
-        let uvs = &triangle.mesh.uvs[uv_set];
-        let uv = if uvs.is_empty() { DVec2::ZERO } else { triangle.mixed(triangle.vertices.map(|vertex| uvs[vertex]), weights) };
+        let uv = triangle.of_mesh(&triangle.mesh.uvs[uv_set], weights).unwrap_or(DVec2::ZERO);
         // A turn of the plane's points by minus the angle, v being its second axis.
         let turned = DMat2::from_angle(-rotation) * DMat2::from_diagonal(scale);
         self.scene.textures[texture].sample(turned * uv + offset).as_dvec4()
@@ -247,27 +250,16 @@ impl<'a> Geometry<'a> {
             scatters: shown || matches!(material.surface, Surface::Dielectric { .. }),
             base_colour: material.base_colour.as_dvec3()
                 * self.texel(material.base_colour_texture, triangle, hit.weights).truncate()
-                * vertex_colour(triangle, hit.weights),
+                * triangle.of_mesh(&triangle.mesh.colours, hit.weights).unwrap_or(DVec3::ONE),
             emission: if shown && !material.layers.is_unlit { self.emission(triangle, hit.weights) } else { DVec3::ZERO },
         }
     }
 }
 
-fn vertex_colour(triangle: &Triangle, weights: DVec3) -> DVec3 {
-    let colours = &triangle.mesh.colours;
-    if colours.is_empty() {
-        return DVec3::ONE;
-    }
-    triangle.mixed(triangle.vertices.map(|vertex| colours[vertex]), weights)
-}
-
 /// On the side of `ng`; `ng` itself where there is no other, or where it would be seen from below.
 fn shading_normal(triangle: &Triangle, weights: DVec3, ng: DVec3, wo: DVec3) -> DVec3 {
-    let normals = &triangle.mesh.normals;
-    if normals.is_empty() {
-        return ng;
-    }
-    let normal = triangle.mixed(triangle.vertices.map(|vertex| normals[vertex]), weights).normalize_or(ng);
+    let Some(normal) = triangle.of_mesh(&triangle.mesh.normals, weights) else { return ng };
+    let normal = normal.normalize_or(ng);
     let ns = if normal.dot(ng) < 0.0 { -normal } else { normal };
     if ns.dot(wo) > 0.0 { ns } else { ng }
 }
