@@ -435,7 +435,7 @@ fn write_kernel(source: &mut String, path: &str, name: &str, kernel: &Kernel) {
     for Buffer { name, binding, access, .. } in &kernel.buffers {
         let reads = *access != AccessType::WriteOnly;
         let writes = *access != AccessType::ReadOnly;
-        writeln!(source, "            Binding {{ name: \"{name}\", binding: {binding}, reads: {reads}, writes: {writes} }},").unwrap();
+        writeln!(source, "            Binding {{ binding: {binding}, reads: {reads}, writes: {writes} }},").unwrap();
     }
     writeln!(source, "        ],\n        constants: &[").unwrap();
     for (constant, id) in &kernel.constants {

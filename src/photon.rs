@@ -65,6 +65,7 @@ impl MapPhoton {
 
 impl Photon {
     /// Of a photon in its wall's plane to the bit, as any that was traced is.
+    #[cfg(test)]
     pub(crate) fn stored(&self) -> StoredPhoton {
         let axis = (self.wall / 2) & 3;
         let place = [1, 2].map(|after| self.position[(axis as usize + after) % 3].to_bits());
@@ -76,6 +77,7 @@ impl Photon {
         ])
     }
 
+    #[cfg(test)]
     pub(crate) fn origin(&self) -> Origin {
         Origin { photon: self.photon, bounce: self.bounce }
     }

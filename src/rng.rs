@@ -14,7 +14,7 @@ use crate::records::RandomKey;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 #[repr(u32)]
-pub(crate) enum Rng {
+pub enum Rng {
     /// The paper's: the C library's 48-bit generator, one sequence leap-frogged over the photons of
     /// a round (van Meel et al. 2008): photon i draws numbers i, i + N, i + 2N, ... of `srand48(seed)`.
     Rand48 = constants::RNG_RAND48,
@@ -351,11 +351,13 @@ pub(crate) fn draw_bounces<const N: usize>(
 }
 
 /// [`open_streams`] of one photon.
+#[cfg(test)]
 pub(crate) fn open_stream(rng: Rng, key: &RandomKey, photon: u32, start: UVec2) -> UVec2 {
     open_streams(rng, key, &[photon], start.to_array().map(|word| [word])).map(|[word]| word).into()
 }
 
 /// [`draw_emissions`] of one photon.
+#[cfg(test)]
 pub(crate) fn draw_emission(rng: Rng, key: &RandomKey, photon: u32, stream: &mut UVec2) -> [f32; 4] {
     let mut streams = stream.to_array().map(|word| [word]);
     let u = draw_emissions(rng, key, &[photon], &mut streams);
@@ -364,6 +366,7 @@ pub(crate) fn draw_emission(rng: Rng, key: &RandomKey, photon: u32, stream: &mut
 }
 
 /// [`draw_bounces`] of one photon.
+#[cfg(test)]
 pub(crate) fn draw_bounce(rng: Rng, key: &RandomKey, photon: u32, bounce: u32, stream: &mut UVec2) -> [f32; 3] {
     let mut streams = stream.to_array().map(|word| [word]);
     let u = draw_bounces(rng, key, &[photon], bounce, &mut streams);

@@ -69,7 +69,7 @@ use std::collections::BTreeMap;
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
-pub(crate) use files::{IntoFile, Written, names, preview, write};
+pub(crate) use files::{IntoFile, Written, names, write};
 pub(crate) use lighting::{estimates, usual_density, usual_exposure};
 pub(crate) use texels::{CoveredTexel, SurfacePoint};
 
@@ -130,7 +130,9 @@ pub(crate) struct MeshLightmap {
     /// Whether the coordinates are the mesh's own second set.
     pub is_second_set: bool,
     /// Texels of the object's map.
+    #[cfg_attr(not(test), expect(dead_code, reason = "tests alone read it"))]
     pub width: u32,
+    #[cfg_attr(not(test), expect(dead_code, reason = "tests alone read it"))]
     pub height: u32,
     /// What triangles cover, row by row.
     pub texels: Vec<CoveredTexel>,
@@ -177,6 +179,7 @@ pub(crate) struct Map {
 
 impl Layout {
     /// Unwraps what needs it and finds the covered texels.
+    #[cfg(test)]
     pub(crate) fn new(scene: &Scene, texels_per_metre: f64) -> Result<Layout> {
         Layout::of_file(scene, None, texels_per_metre, MAX_SIDE)
     }
@@ -223,6 +226,7 @@ impl Layout {
         self.lightmaps().flat_map(|(_, lightmap)| lightmap.texels.iter().map(move |texel| lightmap.sample(&texel.points[phase]))).collect()
     }
 
+    #[cfg(test)]
     pub(crate) fn phases(&self) -> Vec<Vec<TexelSample>> {
         (0..PHASE_COUNT).map(|phase| self.phase(phase)).collect()
     }

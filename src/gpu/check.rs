@@ -6,11 +6,15 @@ use std::time::Instant;
 
 use glam::Vec2;
 
-use super::kernels::{CheckMath, CheckSampling, StartUpTwoWords, StartUpU64};
+#[cfg(test)]
+use super::kernels::CheckSampling;
+use super::kernels::{CheckMath, StartUpTwoWords, StartUpU64};
 use super::{Commands, Constants, Extent, Gpu, Memory, dispatch_by_sums};
 use crate::constants::{LOOP_LIMIT, TALLY_COPIES};
 use crate::error::{Error, Result};
-use crate::records::{CheckPush, MathResults, Samples, SamplingCase, Tally};
+use crate::records::{CheckPush, MathResults, Tally};
+#[cfg(test)]
+use crate::records::{Samples, SamplingCase};
 
 /// What the check found beyond passing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -79,6 +83,7 @@ pub(crate) fn math(gpu: &Gpu, operands: &[Vec2]) -> Result<Vec<MathResults>> {
 }
 
 /// What the functions that sample make of each case on the device, under `constants` by name.
+#[cfg(test)]
 pub(crate) fn sampling(gpu: &Gpu, constants: &[(&'static str, u32)], cases: &[SamplingCase]) -> Result<Vec<Samples>> {
     let constants = constants.iter().fold(Constants::new(GROUP_SIZE), |constants, (name, value)| constants.set(name, *value));
     let mut commands = Commands::new(gpu, constants, Instant::now())?;

@@ -50,13 +50,13 @@ pub(crate) struct Module {
 
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Binding {
-    pub name: &'static str,
     pub binding: u32,
     pub reads: bool,
     pub writes: bool,
 }
 
 /// A struct as a kernel sees it; compared with its Rust twin by `tests/engine/layout.rs`.
+#[cfg_attr(not(test), expect(dead_code, reason = "tests alone read all of it"))]
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ReflectedStruct {
     pub name: &'static str,

@@ -22,7 +22,7 @@ const MOST_BYTES: usize = 1 << 24;
 /// Nothing in it depends on when, where or on how many devices of a kind the run was made: equal results are equal files.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Metadata {
+pub struct Metadata {
     /// The program's version.
     pub photonmill: String,
     /// Devices and their drivers.
@@ -54,7 +54,7 @@ pub(crate) struct Metadata {
 /// What `photonmill repeat` takes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub(crate) enum Repeat {
+pub enum Repeat {
     /// `command` is the subcommand; `arguments` are those that decide the picture, as they were typed; `division` is what each round did,
     /// as a pilot may have chosen it, and `tiles` have more samples.
     With { command: String, arguments: Vec<String>, division: Division, tiles: Option<TileSamples> },

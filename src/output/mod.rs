@@ -8,7 +8,7 @@ pub(crate) mod exr_file;
 pub(crate) mod image;
 pub(crate) mod lightmap;
 pub(crate) mod merge_report;
-pub(crate) mod metadata;
+pub mod metadata;
 #[cfg(feature = "lab")]
 pub(crate) mod page;
 pub(crate) mod photon_map;

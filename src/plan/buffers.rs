@@ -65,7 +65,7 @@ impl<T: Pod> Declared<T> {
 
 macro_rules! declare {
     ($($declared:ident: $element:ty = $name:literal),* $(,)?) => {
-        $(pub const $declared: Declared<$element> = Declared { name: $name, element: PhantomData };)*
+        $(pub(crate) const $declared: Declared<$element> = Declared { name: $name, element: PhantomData };)*
     };
 }
 

@@ -19,8 +19,8 @@ pub(crate) mod scene;
 pub(crate) mod sensor;
 pub(crate) mod traffic;
 pub(crate) mod work_cost;
-pub(crate) mod work_division;
+pub mod work_division;
 
-pub(crate) use capacity::{Limits, Persistence, Work};
+pub(crate) use capacity::Limits;
 pub(crate) use room::{EmissionRange, Grid, RoomPlan, photons_of};
 pub(crate) use room_effects::Decision;

@@ -96,11 +96,6 @@ impl RoomScene {
             })
             .collect()
     }
-
-    /// Watts of all lights.
-    pub(crate) fn power(&self) -> f64 {
-        self.lights.iter().map(|light| light.power).sum()
-    }
 }
 
 const _: () = assert!(NO_WALL > FACE_COUNT);

@@ -54,7 +54,7 @@ use stop::Stop;
 /// How photons near a point are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub(crate) enum Gather {
+pub enum Gather {
     /// Step through the whole photon list, as the paper does.
     Brute,
     /// Look into the cells of a sorted uniform grid.
@@ -67,7 +67,7 @@ pub(crate) enum Gather {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 #[repr(u32)]
-pub(crate) enum Sums {
+pub enum Sums {
     /// 64-bit fixed point: the same bits in whatever order photons come.
     Integer = constants::SUMS_INTEGER,
     /// 32-bit floats: a sum's last digits depend on the order of addition, and it stops growing once
@@ -103,7 +103,7 @@ pub enum Math {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 #[repr(u32)]
-pub(crate) enum PhongDirection {
+pub enum PhongDirection {
     /// The mirror direction of the arriving photon.
     Mirror = constants::PHONG_MIRROR,
     /// The direction in which the photon left.

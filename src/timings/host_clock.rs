@@ -21,11 +21,6 @@ impl HostClock {
         HostClock { started: Instant::now(), whole, open: Vec::new(), timings }
     }
 
-    /// The zero of all times.
-    pub(crate) fn started(&self) -> Instant {
-        self.started
-    }
-
     pub(crate) fn time<T>(&mut self, name: &str, body: impl FnOnce(&mut Self) -> T) -> T {
         let path = self.open.last().map_or_else(|| name.to_owned(), |outer| format!("{outer}/{name}"));
         self.timings.count(&path);

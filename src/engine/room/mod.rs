@@ -17,7 +17,9 @@ use std::cell::OnceCell;
 pub(crate) use bias::measure_bias;
 pub(crate) use on_cpu::on_cpu;
 pub(crate) use on_gpu::{constants, on_gpu};
-pub(crate) use replay::{photons_on_cpu, photons_on_gpu, replay};
+#[cfg(test)]
+pub(crate) use replay::photons_on_cpu;
+pub(crate) use replay::{photons_on_gpu, replay};
 
 use crate::engine::Control;
 use crate::engine::room::film::{RoomFilm, irradiance_weights};

@@ -80,6 +80,7 @@ pub(crate) fn photons_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettin
 }
 
 /// The same by the CPU builder.
+#[cfg(test)]
 pub(crate) fn photons_on_cpu(scene: &RoomScene, settings: &RoomSettings) -> Result<Vec<Photon>> {
     let plan = on_cpu::plan(scene, settings)?;
     let pool = on_cpu::thread_pool(settings)?;

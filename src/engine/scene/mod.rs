@@ -42,7 +42,9 @@ use glam::DVec3;
 
 pub use film::SceneFilm;
 pub(crate) use identity::scene_hash;
-pub(crate) use on_gpu::{constants, light, light_from, modules, task};
+#[cfg(test)]
+pub(crate) use on_gpu::task;
+pub(crate) use on_gpu::{constants, light, light_from, modules};
 pub(crate) use on_several::light_on;
 
 use crate::engine::error::bound::FilmError;
@@ -107,6 +109,7 @@ impl<'a> Target<'a> {
         }
     }
 
+    #[cfg(test)]
     pub(crate) fn camera(self) -> Option<&'a Camera> {
         match self {
             Target::Picture(camera, _) => Some(camera),

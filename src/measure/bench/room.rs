@@ -51,8 +51,6 @@ pub(crate) struct Timed {
     pub counts: Counts,
     /// Of a round, all passes together.
     pub round_ms: f64,
-    /// Of a round.
-    pub dispatches: f64,
     pub memory: HeldMemory,
     pub stated_bytes: u64,
     /// Counters that places were taken from in turn; 1 but in the paper's atomic builder.
@@ -75,7 +73,6 @@ impl Timed {
             passes: scopes.iter().filter_map(pass).collect(),
             counts: Counts::of(&run.fates[0], rounds),
             round_ms: sum_of_outermost(&scopes),
-            dispatches: run.dispatches as f64 / f64::from(rounds),
             memory,
             stated_bytes: 0,
             counters: 1,

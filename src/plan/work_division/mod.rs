@@ -18,7 +18,7 @@ mod variance;
 
 use serde::{Deserialize, Serialize};
 
-pub(crate) use rounds::{ErrorParts, Rounds};
+pub(crate) use rounds::Rounds;
 pub(crate) use search::{MOST_PHOTONS, MOST_SAMPLES, best};
 pub(crate) use variance::{FOUND_BIAS, MapVariance, USUAL_BIAS, USUAL_UNCERTAINTY, Variance, of_samples};
 
@@ -28,7 +28,7 @@ use crate::settings::scene::SceneSettings;
 /// What each round does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Division {
+pub struct Division {
     /// Paths through a pixel, and shadow rays from each visible point.
     pub samples: u32,
     pub shadow_rays: u32,
@@ -89,6 +89,7 @@ pub(crate) struct Free {
 }
 
 impl Free {
+    #[cfg(test)]
     pub(crate) const ALL: Free =
         Free { samples: true, shadow_rays: true, photons: true, caustic_photons: true, neighbours: true, caustic_neighbours: true };
 }

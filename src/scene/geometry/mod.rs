@@ -47,8 +47,6 @@ pub(crate) struct Geometry {
     pub planes: Vec<Vec4>,
     /// The number of the first plane that only sheets of points in the air lie in ([`super::sensors`]); such planes are the last ones.
     pub first_sensor_plane: u32,
-    /// For each triangle (mesh, triangle of the mesh).
-    pub sources: Vec<(u32, u32)>,
     pub normals: Vec<TriangleNormals>,
     pub uvs: Vec<TriangleUvs>,
     /// One for all triangles where no mesh has any.
@@ -273,6 +271,7 @@ pub(crate) fn pack_normal(n: Vec3) -> u32 {
 }
 
 /// What [`pack_normal`] packed.
+#[cfg(test)]
 pub(crate) fn unpack_normal(code: u32) -> Vec3 {
     let o = Vec2::new((code & 0xffff) as f32 - 32767.0, (code >> 16) as f32 - 32767.0) / 32767.0;
     let sign = |x: f32| if x >= 0.0 { 1.0 } else { -1.0 };

@@ -69,8 +69,6 @@ pub(crate) struct Film {
 }
 
 impl Film {
-    pub(crate) const NONE: Film = Film { share: 0.0, ior: 1.0, thickness: 0.0, bound: 0.0 };
-
     /// What it makes of `bare` reflectance over a base of this F0.
     fn over(&self, bare: DVec3, f0: DVec3, cosine: f64) -> DVec3 {
         if self.share == 0.0 {

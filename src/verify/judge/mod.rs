@@ -36,6 +36,7 @@ pub(crate) use crate::settings::scene::Part;
 pub(crate) use first_surface::{FirstSurface, first_surfaces};
 use geometry::Geometry;
 use light::Emitters;
+#[cfg(test)]
 pub(crate) use material::fresnel;
 use media::{BySize, is_solid};
 pub(crate) use verdict::Verdict;
@@ -102,6 +103,7 @@ thread_local! {
 }
 
 /// Paths that this thread has asked judges for so far, a count that no clock disturbs.
+#[cfg(test)]
 pub(crate) fn paths_traced() -> u64 {
     PATHS.get()
 }

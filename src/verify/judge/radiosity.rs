@@ -64,13 +64,10 @@ impl Cell {
         (0..n * n).map(move |k| Cell { wall, s: cut(s, k % n), t: cut(t, k / n) })
     }
 
-    fn area(&self) -> f64 {
-        (self.s[1] - self.s[0]) * (self.t[1] - self.t[0])
-    }
-
     /// Share of the light that leaves this cell evenly and arrives at the other.
+    #[cfg(test)]
     pub(crate) fn form_factor(&self, other: &Cell) -> f64 {
-        exchange(self, other) / self.area()
+        exchange(self, other) / ((self.s[1] - self.s[0]) * (self.t[1] - self.t[0]))
     }
 }
 
@@ -278,6 +275,7 @@ impl Radiosity {
 
     /// Flux that a photon of each lamp brings to the cells of an order, as a mean over its photons: the chance that it
     /// arrives there.
+    #[cfg(test)]
     pub(crate) fn arrives(&self, order: usize, cells: impl Iterator<Item = usize>) -> ByLamp {
         let cell_area = (EDGE / self.n as f64).powi(2);
         let mut sum = [0.0; 2];
@@ -354,6 +352,7 @@ impl Radiosity {
     }
 
     /// Mean of all light over a disc that lies on its wall.
+    #[cfg(test)]
     pub(crate) fn over_disc(&self, wall: usize, [s, t]: [f64; 2], radius: f64) -> f64 {
         let direct: f64 =
             disc_points().map(|(x, y, share)| share * self.direct_at(wall, on_wall(wall, s + radius * x, t + radius * y))).sum();
@@ -362,6 +361,7 @@ impl Radiosity {
 
     /// The same of reflected light, which is smoother: seven points, exact for polynomials up to degree five
     /// (Stroud 1971, S2 5-1).
+    #[cfg(test)]
     pub(crate) fn reflected_over_disc(&self, wall: usize, [s, t]: [f64; 2], radius: f64) -> f64 {
         let ring = radius * (2.0f64 / 3.0).sqrt();
         let around = (0..6).map(|k| {

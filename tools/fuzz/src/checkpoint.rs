@@ -36,7 +36,7 @@ fn read(file: &[u8]) -> Option<SavedRun> {
 }
 
 /// Writes, reports and shows a run as `merge` does, and goes on with it where it is of the paper's box.
-pub fn use_run(run: &SavedRun) {
+pub(crate) fn use_run(run: &SavedRun) {
     let bytes = run.to_bytes();
     assert_eq!(bytes, SavedRun::from_bytes(&bytes).expect("what was written can be read").to_bytes());
     let _ = (run.missing(), run.emitted());

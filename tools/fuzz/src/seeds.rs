@@ -34,7 +34,7 @@ use photonmill::settings::{Builder, RoomSettings};
 
 /// Keeps all that a run saves.
 #[derive(Default)]
-pub struct Saved(pub Vec<SavedRun>);
+pub(crate) struct Saved(pub(crate) Vec<SavedRun>);
 
 impl SaveRun for Saved {
     fn save(&mut self, run: &Arc<SavedRun>, _: bool) -> photonmill::error::Result<()> {
@@ -44,7 +44,7 @@ impl SaveRun for Saved {
 }
 
 /// A part of a run of the paper's box, so small that it takes no time; it goes on with what there is of it.
-pub fn part_of_box(share: Share, resume: Option<SavedRun>) -> photonmill::error::Result<SavedRun> {
+pub(crate) fn part_of_box(share: Share, resume: Option<SavedRun>) -> photonmill::error::Result<SavedRun> {
     let settings = RoomSettings { photons: 101, rounds: 4, mesh: 2, builder: Builder::Cpu, rng: Rng::Philox, ..RoomSettings::default() };
     let (never, mut saved) = (AtomicBool::new(false), Saved::default());
     let resume = resume.map(|run| ("seed".into(), run));
@@ -54,14 +54,14 @@ pub fn part_of_box(share: Share, resume: Option<SavedRun>) -> photonmill::error:
 }
 
 /// A box with a mirror for a wall, so that photons make a caustic map too.
-pub fn scene() -> (Scene, Geometry) {
+pub(crate) fn scene() -> (Scene, Geometry) {
     let mut scene = built_in::by_name("cornell").expect("it is built in");
     scene.materials[2].surface = Surface::Mirror;
     Geometry::new(&scene).map(|geometry| (scene, geometry)).expect("it has triangles")
 }
 
 /// A part of eight blocks of a picture of four pixels, as far as what it holds must fit.
-pub fn part_of_picture(share: Share, keeps_parts: bool) -> SavedRun {
+pub(crate) fn part_of_picture(share: Share, keeps_parts: bool) -> SavedRun {
     let ((scene, geometry), settings) = (scene(), SceneSettings { keeps_parts, ..SceneSettings::default() });
     let sensor = Sensor::Picture { width: 2, height: 2 };
     let plan = ScenePlan::new(&scene, &geometry, &settings, sensor, &Limits::of_host()).expect("it can be planned").film;
