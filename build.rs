@@ -432,7 +432,7 @@ fn write_kernel(source: &mut String, path: &str, name: &str, kernel: &Kernel) {
     writeln!(source, "        scene_bindings: {},", world.map_or(0, |(_, bindings)| bindings.len())).unwrap();
     writeln!(source, "        votes_in_loops: {},", kernel.votes_in_loops).unwrap();
     writeln!(source, "        bindings: &[").unwrap();
-    for Buffer { name, binding, access, .. } in &kernel.buffers {
+    for Buffer { binding, access, .. } in &kernel.buffers {
         let reads = *access != AccessType::WriteOnly;
         let writes = *access != AccessType::ReadOnly;
         writeln!(source, "            Binding {{ binding: {binding}, reads: {reads}, writes: {writes} }},").unwrap();

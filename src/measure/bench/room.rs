@@ -51,6 +51,9 @@ pub(crate) struct Timed {
     pub counts: Counts,
     /// Of a round, all passes together.
     pub round_ms: f64,
+    /// Of a round.
+    #[cfg_attr(not(test), expect(dead_code, reason = "tests alone read it"))]
+    pub dispatches: f64,
     pub memory: HeldMemory,
     pub stated_bytes: u64,
     /// Counters that places were taken from in turn; 1 but in the paper's atomic builder.
@@ -72,6 +75,7 @@ impl Timed {
         Timed {
             passes: scopes.iter().filter_map(pass).collect(),
             counts: Counts::of(&run.fates[0], rounds),
+            dispatches: run.dispatches as f64 / f64::from(rounds),
             round_ms: sum_of_outermost(&scopes),
             memory,
             stated_bytes: 0,

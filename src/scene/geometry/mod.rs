@@ -144,7 +144,6 @@ impl Geometry {
             nodes,
             triangles,
             first_sensor_plane: parts.first_sensor_plane(scene),
-            sources: leaves.each(|part| part.source),
             normals: leaves.each(|part| part.normals()),
             uvs: leaves.each(|part| part.uvs(scene)),
             colours: if has_colours { leaves.each(|part| part.colours()) } else { vec![Part::WHITE] },

@@ -38,8 +38,6 @@ pub(super) struct Parts {
 /// A triangle of a mesh, or a part of it.
 #[derive(Clone, Copy)]
 pub(super) struct Part<'a> {
-    /// (mesh, triangle of the mesh).
-    pub source: (u32, u32),
     pub mesh: &'a Mesh,
     pub triangle: usize,
     /// Normalised.
@@ -116,7 +114,6 @@ impl Leaves<'_> {
             let place = *place as usize;
             let (mesh, triangle) = sources[place];
             of(Part {
-                source: sources[place],
                 mesh: &self.scene.meshes[mesh as usize],
                 triangle: triangle as usize,
                 corners: corners[place],
