@@ -238,7 +238,7 @@ const PACKED: [(&str, &[&str]); 5] = [
     ("crate::photon::StoredPhoton", &["photons", "sorted_photons", "tree_photons"]),
     ("crate::photon::Origin", &["origins", "tree_origins"]),
     ("crate::photon::MapPhoton", &["map", "sorted_map", "landed"]),
-    ("crate::path::StoredPath", &["paths", "next_paths"]),
+    ("crate::photon_state::PackedPhotonState", &["paths", "next_paths"]),
     (
         "u64",
         &[

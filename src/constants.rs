@@ -13,7 +13,7 @@ macro_rules! constants {
 constants! {
     /// Wall id that means "no wall": a dead path, an empty slot of the naive photon map, a gap that several counters left.
     NO_WALL = 0xffff_ffff;
-    /// Words between the counters that work groups of the atomic builder take turns at.
+    /// Words between the counters that work groups of the atomic builder use round-robin.
     COUNTER_STRIDE = 64;
     /// Faces of a room, numbered 2 * axis + (1 on the positive side).
     FACE_COUNT = 6;
@@ -230,7 +230,7 @@ constants! {
     NO_CLASS = 0xff;
     /// No radius is below 2 to the power of minus this, of the scene's normalised extent.
     LEAST_RADIUS_BITS = 15;
-    /// Photons of the trial around a point that tell their density there.
+    /// Photons of the trial around a point that give their density there.
     CLASS_PHOTONS = 8;
     /// Photons of a leaf of the kd-tree.
     TREE_LEAF = 8;

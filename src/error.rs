@@ -40,7 +40,7 @@ pub enum Error {
 
     /// A picture that is compared cannot be used.
     #[error("{}: {reason}", echo(path.display()))]
-    Picture { path: PathBuf, reason: String },
+    Image { path: PathBuf, reason: String },
 
     /// Two pictures differ by more than the user allows.
     #[error("`fail_above` {allowed}: the RMSE of {} is {found}", echo(path.display()))]
@@ -134,7 +134,7 @@ impl Error {
             | Error::Output { .. }
             | Error::Saved { .. }
             | Error::Scene { .. }
-            | Error::Picture { .. }
+            | Error::Image { .. }
             | Error::DeviceAbsent { .. }
             | Error::Denoiser { .. }
             | Error::NoValidationLayer => 2,

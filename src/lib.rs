@@ -6,13 +6,13 @@
 //! ```
 //! use photonmill::gpu::{Gpu, Options};
 //! use photonmill::render::{Observer, PreparedScene, RenderRequest};
-//! use photonmill::scene::picture_size::PictureSize;
+//! use photonmill::scene::image_size::ImageSize;
 //! # let folder = tempfile::tempdir().unwrap();
 //! # std::env::set_current_dir(folder.path()).unwrap();
 //!
 //! let mut gpus = vec![Gpu::open(&Options::default())?];
 //! let scene = PreparedScene::open("cornell-spheres")?;
-//! let size = Some(PictureSize::WidthAndHeight(32, 32));
+//! let size = Some(ImageSize::WidthAndHeight(32, 32));
 //! let request = RenderRequest { size, rounds: Some(32), photons: Some(4096), ..RenderRequest::default() };
 //! let image = scene.render(&mut gpus, None, &request, &Observer::default())?;
 //! image.save("picture.png", &Observer::default())?;
@@ -43,8 +43,8 @@
 //! triangles. A file uses only what stands to its left:
 //!
 //! ```text
-//! constants, error, text, records, rng, ledger, timings < settings, path, photon < scene < plan < cpu, gpu, oidn < engine < output
-//! output < bake < render < measure, view < cli;  scene < verify::judge;  render < verify::selfcheck;  output < verify::compare < cli
+//! constants, error, text, records, rng, ledger, timings < settings, photon_state, photon < scene < plan < cpu, gpu, oidn < engine < output
+//! output < bake < render < measure, window < cli;  scene < verify::judge;  render < verify::selfcheck;  output < verify::compare < cli
 //! ```
 //!
 //! `tests/program/architecture.rs` checks it.
@@ -78,8 +78,8 @@ pub mod measure;
 #[expect(unsafe_code, reason = "the functions of Open Image Denoise, which is loaded at run time, are unsafe")]
 pub(crate) mod oidn;
 pub mod output;
-pub(crate) mod path;
 pub(crate) mod photon;
+pub(crate) mod photon_state;
 pub mod plan;
 pub(crate) mod records;
 pub mod render;
@@ -90,7 +90,7 @@ pub(crate) mod text;
 pub(crate) mod timings;
 pub(crate) mod verify;
 #[cfg(feature = "window")]
-pub(crate) mod view;
+pub(crate) mod window;
 
 #[cfg(any(test, fuzzing))]
 #[doc(hidden)]

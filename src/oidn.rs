@@ -91,7 +91,7 @@ impl Denoiser {
             return self.check().and_then(|()| Err(Error::Denoiser { reason: "makes no filter".to_owned() }));
         };
         let image = |name: &CStr, memory: *mut Vec3| {
-            // SAFETY: the memory holds three floats a pixel, and outlives the filter, which writes to no other image than its output.
+            // SAFETY: the memory holds three floats per pixel, and outlives the filter, which writes to no other image than its output.
             unsafe { (functions.set_image)(filter, name.as_ptr(), memory.cast(), FLOAT3, width as usize, height as usize, 0, 0, 0) };
         };
         image(c"color", light.as_ptr().cast_mut());

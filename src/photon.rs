@@ -1,4 +1,4 @@
-//! Photons as the maps of both lines hold them: in the room 16 bytes, twin of `glsl/world/room/photon.glsl`; in a scene of triangles 32,
+//! Photons as the maps of both worlds hold them: in the room 16 bytes, twin of `glsl/world/room/photon.glsl`; in a scene of triangles 32,
 //! twin of `glsl/world/scene/photon.glsl`.
 
 use bytemuck::{Pod, Zeroable};
@@ -22,7 +22,7 @@ pub(crate) struct Photon {
     pub bounce: u32,
 }
 
-/// One entry of the photon map on the device; `glsl/world/room/photon.glsl` tells its bits.
+/// One entry of the photon map on the device; `glsl/world/room/photon.glsl` describes its bits.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
 pub(crate) struct StoredPhoton(pub [u32; 4]);

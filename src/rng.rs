@@ -96,7 +96,7 @@ pub(crate) fn srand48(seed: u32) -> u64 {
     (u64::from(seed) << 16) | 0x330E
 }
 
-/// The streams of a run: what its seed, photons a round and draws a photon make of the generator.
+/// The streams of a run: what its seed, photons per round and draws per photon make of the generator.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Streams {
     pub rng: Rng,

@@ -1,5 +1,5 @@
-// One atomic a subgroup instead of one a thread: ballots find the survivors, exclusive bit counts their order, and a broadcast
-// tells them where the subgroup's block begins.
+// One atomic per subgroup instead of one per thread: ballots find the survivors, exclusive bit counts their order, and a broadcast
+// broadcasts where the subgroup's block begins.
 
 const uint PLACES = PATHS_EACH;
 

@@ -14,7 +14,7 @@ void trace()
     uint path_count = min(counters[1 + incoming_list()], push.path_capacity);
     uint row = (path_count + PLACES - 1) / PLACES;
     uint column = invocation_index();
-    LightPath[PLACES] path;
+    PhotonState[PLACES] path;
     Step[PLACES] taken;
     bool[PLACES] stored;
     bool[PLACES] goes_on;

@@ -9,7 +9,7 @@ void trace()
     bool fits = false;
     bool goes_on = false;
     if (index < photon_count) {
-        LightPath path = incoming_path(index);
+        PhotonState path = incoming_path(index);
         if (is_path(path)) {
             taken = step_path(path, push.bounce);
         }

@@ -16,7 +16,7 @@ void trace()
     }
     bool under_way = false;
     uint bounce = 0;
-    LightPath path;
+    PhotonState path;
     for (;;) {
         if (!under_way && next < photon_count()) {
             path = take_photon(next);

@@ -1,4 +1,4 @@
-// The next free place of one counter, by one atomic a subgroup: builder/ballot.glsl for one photon, as builder/persistent.glsl takes it.
+// The next free place of one counter, by one atomic per subgroup: builder/ballot.glsl for one photon, as builder/persistent.glsl takes it.
 
 uint take_place(uint counter, bool wanted)
 {

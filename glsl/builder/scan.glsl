@@ -18,7 +18,7 @@ void trace()
     Step taken = no_step();
     bool goes_on = false;
     if (entered) {
-        LightPath path = incoming_path(index);
+        PhotonState path = incoming_path(index);
         taken = step_path(path, push.bounce);
         goes_on = taken.alive && (STORED_IS_ALIVE || has_next_bounce());
         if (goes_on) {

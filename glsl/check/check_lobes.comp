@@ -53,7 +53,7 @@ struct LobeSample {
     uint lobe;
     float chance;
     // BRDF times cosine.
-    vec3 matt;
+    vec3 rough;
     vec3 sharp;
 };
 
@@ -114,5 +114,5 @@ void main()
     ChosenLobe chosen = choose_lobe(lobes, u.x);
     LobeLight light = weigh_light(surface, lobes, at.wo, scatter.direction, 0.0, false);
     results[index] = LobeSample(scatter.direction, scatter.weight, scatter.density, uint(scatter.alive), uint(scatter.is_specular),
-                                uint(scatter.passes), chosen.lobe, chosen.chance, light.matt, light.sharp);
+                                uint(scatter.passes), chosen.lobe, chosen.chance, light.rough, light.sharp);
 }

@@ -27,7 +27,7 @@ layout(set = 1, binding = 5, scalar) writeonly buffer Results { UnpackedRoom res
 
 #include "dispatch/dispatch.glsl"
 #include "world/room/photon.glsl"
-#include "world/room/path.glsl"
+#include "world/room/photon_state.glsl"
 
 void main()
 {
@@ -38,13 +38,13 @@ void main()
     }
     PackingCase at = cases[index];
     sorted_photons[index] = pack_photon(Photon(at.position, at.wall, at.flux, at.weight, 0, 0));
-    uvec4 words[PATH_WORDS] = pack_path(LightPath(at.position, at.wall, at.direction, at.photon, at.stream, at.flux));
+    uvec4 words[PATH_WORDS] = pack_path(PhotonState(at.position, at.wall, at.direction, at.photon, at.stream, at.flux));
     for (uint k = 0; k < PATH_WORDS; k++) {
         next_paths[path_word(k, index, count)] = words[k];
         words[k] = paths[path_word(k, index, count)];
     }
     uvec4 stored = photons[index];
-    LightPath path = unpack_path(words);
+    PhotonState path = unpack_path(words);
     results[index] = UnpackedRoom(position_of(stored, at.room), is_empty(stored) ? NO_WALL : wall_of(stored), flux_of(stored),
                                   weight_of(stored), path.position, path.wall, path.direction, path.photon, path.stream, path.flux);
 }

@@ -29,7 +29,7 @@ layout(set = 1, binding = 5, scalar) writeonly buffer Results { UnpackedScene re
 #include "math/directions.glsl"
 #include "world/scene/photon.glsl"
 #include "world/scene/bvh_node.glsl"
-#include "world/scene/one_hit.glsl"
+#include "world/scene/single_hit.glsl"
 
 layout(set = 1, binding = 2, scalar) readonly buffer NodeCases { BvhNode node_cases[]; };
 

@@ -5,7 +5,7 @@ const bool STORED_IS_ALIVE = false;
 
 layout(set = 1, binding = 2, scalar) writeonly buffer Entries { uint entries[]; };
 
-struct LightPath {
+struct PhotonState {
     uint photon;
 };
 
@@ -25,7 +25,7 @@ Step no_step()
     return Step(false, false, false, false, Photon(0));
 }
 
-Step step_path(inout LightPath path, uint bounce)
+Step step_path(inout PhotonState path, uint bounce)
 {
     uint hash = path.photon;
     // Neighbours are apart when they come to the next vote.
@@ -66,11 +66,11 @@ uint end_of_bounces()
     return 16;
 }
 
-LightPath take_photon(uint index)
+PhotonState take_photon(uint index)
 {
-    return LightPath(index);
+    return PhotonState(index);
 }
 
-void leave_path(LightPath path, uint bounce)
+void leave_path(PhotonState path, uint bounce)
 {
 }

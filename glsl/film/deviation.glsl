@@ -35,7 +35,7 @@ float float_of_wide(uvec4 a)
 }
 
 // Unbiased variance of the sum; 0 of fewer than two blocks. Twin of `BlockSums::variance`. Sums are at most 2^63, so that no product
-// exceeds 128 bits; the subtraction is exact, as floats could not tell large sums of little spread.
+// exceeds 128 bits; the subtraction is exact, as floats cannot hold the small spread of large sums.
 float variance_of_sum(uvec2 sum, uvec4 squares, uint blocks)
 {
     if (blocks < 2) {

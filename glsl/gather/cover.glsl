@@ -171,7 +171,7 @@ float kernel_over(Polygon polygon, out float left)
         sum += kernel_over_edge(polygon.from[k], polygon.to[k], enters, left);
     }
     left = is_empty ? -1.0 : left;
-    // No edge in the disc: all of it or nothing, not the rounding of sectors that cancel. Which of the two, sectors tell: the direction of
+    // No edge in the disc: all of it or nothing, not the rounding of sectors that cancel. Sectors say which of the two: the direction of
     // a short edge is all rounding, and so is the side of it that the middle lies on.
     float whole = 3.14159265358979324 * kernel_norm();
     if (!enters) {

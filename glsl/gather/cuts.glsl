@@ -1,6 +1,6 @@
 // Where walls cut the disc of a density estimate off: photons behind them do not count, and the area behind them is none of the
 // estimate's. Of each wall, the line through its nearest place, at a right angle to the way there: all of the wall lies beyond it, as a
-// part of a wall is convex. kernels/disc_cuts.comp finds them, and gather/disc_cuts.glsl tells those of a visible point.
+// part of a wall is convex. kernels/disc_cuts.comp finds them, and gather/disc_cuts.glsl gives those of a visible point.
 
 const uint CUT_LINES = 3;
 // Of a line: bits of its distance, in units of the reach, and above them those of its direction along the surface.

@@ -1,4 +1,4 @@
-// Photons within a share of the radius: what they change tells the bias of the radius (src/engine/error/bias.rs).
+// Photons within a share of the radius: what they change gives the bias of the radius (src/engine/error/bias.rs).
 
 // 1 / sqrt(2), as `SMALLER` there.
 const float NEAR_SHARE = 0.70710678118654752;

@@ -50,7 +50,7 @@ bool nearer(uvec2 a, uvec2 b)
 }
 
 // Keeps a photon if it is one of the nearest so far.
-void keep(uint lane, uvec2 photon, inout uint found, inout uint steps)
+void insert_nearest(uint lane, uvec2 photon, inout uint found, inout uint steps)
 {
     uint entry;
     if (found < push.nearest) {
@@ -200,7 +200,7 @@ void gather()
             walk.steps++;
             float distance_squared = squared_distance(place, tree_photons[i]);
             if (distance_squared <= search.limit) {
-                keep(lane, uvec2(floatBitsToUint(distance_squared), i), search.found, walk.steps);
+                insert_nearest(lane, uvec2(floatBitsToUint(distance_squared), i), search.found, walk.steps);
             }
         }
         if (search.found == push.nearest) {

@@ -1,4 +1,4 @@
-// Points of the paper's box, and what a dispatch that estimates the light there is told.
+// Points of the paper's box, and what a dispatch that estimates the light there is given.
 
 // A point at which light is estimated.
 struct Point {

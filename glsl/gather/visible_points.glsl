@@ -24,8 +24,8 @@ uint point_of(uint item, uint slice)
     return point_in_tiles(place, push.width, push.height, push.pixel_count);
 }
 
-layout(set = 1, binding = 14, scalar) readonly buffer MattLobesOfPoints { MattLobes matt_lobes[]; };
-layout(set = 1, binding = 16, scalar) readonly buffer MattCoversOfPoints { MattCover matt_covers[]; };
+layout(set = 1, binding = 14, scalar) readonly buffer RoughLobesOfPoints { RoughLobes rough_lobes[]; };
+layout(set = 1, binding = 16, scalar) readonly buffer RoughCoversOfPoints { RoughCover rough_covers[]; };
 
 // Weight of a photon that far from the point and that high above its plane.
 float kernel_at(float distance_squared, float height, float radius)
@@ -56,8 +56,8 @@ struct Query {
     Cuts cuts;
     // Of a layered surface.
     bool is_layered;
-    MattLobes lobes;
-    MattCover cover;
+    RoughLobes lobes;
+    RoughCover cover;
 };
 
 // That of this thread, and what it has found. No arguments: drivers keep copies of what has arrays.
@@ -99,9 +99,9 @@ void start_query(VisiblePoint point, uint index, float radius)
     query.is_layered = HAS_LAYERS && point.surface == SURFACE_LAYERED;
     query.cover = no_cover();
     if (query.is_layered) {
-        query.lobes = matt_lobes[index];
+        query.lobes = rough_lobes[index];
         if (HAS_COATS || HAS_SHEEN || HAS_IRIDESCENCE) {
-            query.cover = matt_covers[index];
+            query.cover = rough_covers[index];
         }
     }
     [[unroll]] for (uint k = 0; k < 9; k++) {
@@ -115,10 +115,10 @@ void start_query(VisiblePoint point, uint index, float radius)
 vec3 layered_weight(vec3 wi, float cosine)
 {
     float coat_cosine = HAS_COATS ? abs(dot(wi, unpack_normal(query.cover.coat_normal))) : cosine;
-    MattLobes lobes = query.lobes;
-    MattCover cover = query.cover;
-    LayerAlbedos lit = albedos_at(lobes.alpha, cover, cosine, coat_cosine);
-    return 3.14159265358979324 * matt_brdf(lobes, cover, cover.film, lit, query.ns, query.wo, wi);
+    RoughLobes lobes = query.lobes;
+    RoughCover cover = query.cover;
+    LayerAlbedos towards_light = albedos_at(lobes.alpha, cover, cosine, coat_cosine);
+    return 3.14159265358979324 * rough_brdf(lobes, cover, cover.film, towards_light, query.ns, query.wo, wi);
 }
 
 // Adds a photon of an arrival, 0 to 2; `near_gain` is what its flux counts within the smaller radius, 0 beyond.

@@ -1,5 +1,5 @@
 // Pixels of a window from what is shown: exposed, with the tone curve and transfer function of PNG files, or in false colours.
-// Dispatched by src/view/picture.rs once a frame. One thread = one pixel of the window.
+// Dispatched by src/window/display.rs once a frame. One thread = one pixel of the window.
 #extension GL_EXT_scalar_block_layout : require
 
 // What is shown, as pixels of a window; see `glsl/kernels/display.comp`.
@@ -49,7 +49,7 @@ vec3 neutral(vec3 colour)
     return colour + white * (vec3(new_peak) - colour);
 }
 
-// Relative errors from 0.1 % to 100 %, evenly by their logarithm; grey where they are unknown. Twin of `ERROR_COLOURS` in src/view/panel.rs.
+// Relative errors from 0.1 % to 100 %, evenly by their logarithm; grey where they are unknown. Twin of `ERROR_COLOURS` in src/window/panel.rs.
 vec3 false_colour(float error)
 {
     const vec3 COLOURS[5] = vec3[](vec3(0.27, 0.0, 0.33), vec3(0.23, 0.32, 0.55), vec3(0.13, 0.57, 0.55), vec3(0.37, 0.79, 0.38), vec3(0.99, 0.91, 0.14));

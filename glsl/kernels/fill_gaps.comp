@@ -17,7 +17,7 @@ layout(set = 1, binding = 1, scalar) writeonly buffer Photons { uvec4 photons[];
 layout(set = 1, binding = 2, scalar) writeonly buffer NextPaths { uvec4 next_paths[]; };
 
 #include "world/room/photon.glsl"
-#include "world/room/path.glsl"
+#include "world/room/photon_state.glsl"
 
 uint lists_end()
 {

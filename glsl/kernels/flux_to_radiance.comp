@@ -61,7 +61,7 @@ layout(set = 1, binding = 2, scalar) buffer Estimates { uvec2 estimates[]; };
 #include "film/kept_parts.glsl"
 #include "film/differences.glsl"
 #include "world/scene/tiles.glsl"
-#include "world/scene/one_hit.glsl"
+#include "world/scene/single_hit.glsl"
 
 float flux_of(uvec2 sum)
 {

@@ -49,7 +49,7 @@ layout(push_constant, scalar) uniform Push { SceneGatherPush push; };
 #include "world/scene/effects.glsl"
 #include "world/scene/sample_places.glsl"
 #include "material/lobes/phong.glsl"
-#include "material/matt_brdf.glsl"
+#include "material/rough_brdf.glsl"
 #include "gather/belongs.glsl"
 #include "index/buckets.glsl"
 #include "world/scene/rounding.glsl"

@@ -16,7 +16,7 @@ struct RadiusClassPush {
     uint map_class;
     uint first_class;
     uint class_count;
-    // Where nothing tells.
+    // Where nothing is known.
     uint usual_class;
     // Of class 0.
     float radius;
@@ -124,7 +124,7 @@ void main()
         float radius = radius_of_class(push.radius, push.first_class);
         uvec2 found = photons_near(point, radius);
         if (found.x < CLASS_PHOTONS && push.first_class > 0) {
-            return; // a wider grid tells
+            return; // a wider grid decides
         }
         own_class = class_at(point, radius, found, push.clearance_share * clearances[index]);
         atomicAdd(class_counts[push.map_class / CAUSTIC_CLASS * RADIUS_CLASSES + own_class], 1);

@@ -49,7 +49,7 @@ void main()
     vec3 ng = receiver.normal;
     vec3 ns = receiver.shading_normal;
     vec3 position = off_the_walls(receiver.position, ng);
-    Target here = receiver_at(position, position_error(position), ng, ns);
+    ShadingPoint here = receiver_at(position, position_error(position), ng, ns);
     start_chain(position, ns, vec3(1.0));
     if (HAS_MEDIA) {
         chain.media = media_at(position, ng);
@@ -59,7 +59,7 @@ void main()
         add_light(direct_light(here, push.emitter_count, push.draws, index, 0, RECEIVER_BLOCK));
         note_shadow_rays(index, vec3(1.0));
     }
-    // Photons only ever land on surfaces, and tell the irradiance of those: any other point, or direction, looks
+    // Photons only ever land on surfaces, and give the irradiance of those: any other point, or direction, looks
     // around.
     uint plane = plane_below(receiver.position, ng, push.radius);
     bool on_surface = plane != NONE;
@@ -80,7 +80,7 @@ void main()
         chain.position = offset_origin(position, here.surface.error, ng, chain.direction);
         chain.weight = vec3(3.14159265358979324);
         chain.role = on_surface ? ROLE_GATHER : ROLE_GATHER_IN_AIR;
-        // Neither shadow rays nor photons know what shines on a point in the air, where the maps are to hold it.
+        // Neither shadow rays nor photons know what light arrives at a point in the air, where the maps are to hold it.
         chain.sees_emission = HAS_ALL_ARRIVALS && !on_surface;
         follow(push.point_count, push.draws, push.emitter_count, 0);
     }

@@ -1,4 +1,4 @@
-// Rays from points of a trial and from what these see: they tell where light from beyond the scene comes in
+// Rays from points of a trial and from what these see: they show where light from beyond the scene comes in
 // (src/scene/openings.rs), and which places light the points (src/engine/scene/light_trial.rs).
 // Dispatched by src/engine/scene/trial_rays.rs before a run. One thread = two rays.
 #extension GL_EXT_control_flow_attributes : require

@@ -42,7 +42,7 @@ void main()
     uint cluster = pair % push.cluster_count;
     Receiver receiver = receivers[pair / push.cluster_count];
     // It may lie on a triangle whose corners are known no better than the point.
-    Target here = receiver_at(receiver.position, 4.0 * position_error(receiver.position), receiver.normal, receiver.shading_normal);
+    ShadingPoint here = receiver_at(receiver.position, 4.0 * position_error(receiver.position), receiver.normal, receiver.shading_normal);
     uvec4 words = words_of(pair, 0, push.draws);
     // Of the squares, in units of the largest.
     float largest = 0.0;

@@ -1,7 +1,7 @@
 // All lobes of a surface together: with which probability a path follows each, how they weigh light, and where a path goes on. Each lobe has
 // a file in material/lobes.
 
-#include "material/matt_brdf.glsl"
+#include "material/rough_brdf.glsl"
 #include "material/lobes/transmission.glsl"
 #include "material/lobes/diffuse_transmission.glsl"
 #include "material/lobes/lambert.glsl"
@@ -68,23 +68,23 @@ Lobes lobes_of(Surface surface, vec3 wo, float eta)
     lobes.cover.sheen_albedo = seen.sheen;
 
     vec2 bound = reflectance_bound(lobes.base, layers);
-    lobes.matt.e0 = bound.x;
-    lobes.matt.e90 = bound.y;
-    lobes.matt.alpha = layers.alpha;
-    float below_diffuse = share_below(layers, lobes.matt, seen, cosine), left = mean_share_below(layers, lobes.matt);
+    lobes.rough.e0 = bound.x;
+    lobes.rough.e90 = bound.y;
+    lobes.rough.alpha = layers.alpha;
+    float below_diffuse = share_below(layers, lobes.rough, seen, cosine), left = mean_share_below(layers, lobes.rough);
     float left_over = (0.31830988618379067 * divide(below_diffuse, max(left, 1e-6)));
-    lobes.matt.diffuse = diffuse_colour(surface, lobes.base) * left_over;
+    lobes.rough.diffuse = diffuse_colour(surface, lobes.base) * left_over;
     lobes.beyond = vec3(0.0);
     if (HAS_DIFFUSE_TRANSMISSION) {
         lobes.beyond = diffuse_transmission_colour(layers, lobes.base) * left_over;
     }
     lobes.transmitted = (1.0 - layers.metallic) * layers.transmission * surface.base_colour;
-    bool is_in_map = is_matt_reflection(lobes, layers) && !layers.is_unlit;
-    lobes.base.film.is_matt = uint(is_in_map);
-    lobes.matt.f0 = is_in_map ? lobes.base.f0 : vec3(0.0);
-    lobes.matt.f90 = is_in_map ? lobes.base.f90 : 0.0;
+    bool is_in_map = is_rough_reflection(lobes, layers) && !layers.is_unlit;
+    lobes.base.film.is_rough = uint(is_in_map);
+    lobes.rough.f0 = is_in_map ? lobes.base.f0 : vec3(0.0);
+    lobes.rough.f90 = is_in_map ? lobes.base.f90 : 0.0;
     if (layers.is_unlit) {
-        lobes.matt.diffuse = vec3(0.0);
+        lobes.rough.diffuse = vec3(0.0);
     }
     set_chances(lobes, surface, seen, below_diffuse, cosine);
     return lobes;
@@ -98,21 +98,21 @@ Lobes lobes_at(inout Surface surface, vec3 wo, uint media, uint channel, uint de
     return lobes_of(surface, wo, eta);
 }
 
-// Probability of the matt lobes together, where the path does not pass.
-float matt_chance(Lobes lobes, Layers layers)
+// Probability of the rough lobes together, where the path does not pass.
+float rough_chance(Lobes lobes, Layers layers)
 {
-    return lobes.diffuse_chance + lobes.sheen_chance + (is_matt_reflection(lobes, layers) ? lobes.reflection_chance : 0.0)
-         + (is_matt(layers.coat_alpha) ? lobes.coat_chance : 0.0);
+    return lobes.diffuse_chance + lobes.sheen_chance + (is_rough_reflection(lobes, layers) ? lobes.reflection_chance : 0.0)
+         + (is_rough(layers.coat_alpha) ? lobes.coat_chance : 0.0);
 }
 
-// Density with which the matt lobes together send a path along wi, 1/sr.
-float density_of_matt_lobes(Surface surface, Lobes lobes, vec3 wo, vec3 wi)
+// Density with which the rough lobes together send a path along wi, 1/sr.
+float density_of_rough_lobes(Surface surface, Lobes lobes, vec3 wo, vec3 wi)
 {
     float density = (lobes.diffuse_chance + lobes.sheen_chance) * even_density(surface.ns, wi);
-    if (is_matt_reflection(lobes, surface.layers)) {
+    if (is_rough_reflection(lobes, surface.layers)) {
         density += reflection_density(surface, lobes, wo, wi);
     }
-    if (HAS_COATS && is_matt(surface.layers.coat_alpha)) {
+    if (HAS_COATS && is_rough(surface.layers.coat_alpha)) {
         density += coat_density(surface, lobes, wo, wi);
     }
     return density;
@@ -132,10 +132,10 @@ vec3 base_colour_at(Lobes lobes, bool is_solid, float cosine, bool is_beyond)
 }
 
 // BRDF or BTDF times cosine of what rays follow of the base that is no delta, beside which a light sample of this density counts in part.
-vec3 sharp_base(Surface surface, Lobes lobes, LayerAlbedos lit, vec3 wo, vec3 wi, bool is_beyond, float light_density)
+vec3 sharp_base(Surface surface, Lobes lobes, LayerAlbedos towards_light, vec3 wo, vec3 wi, bool is_beyond, float light_density)
 {
     Layers layers = surface.layers;
-    float chance = is_beyond ? lobes.transmission_chance : (is_matt_reflection(lobes, layers) ? 0.0 : lobes.reflection_chance);
+    float chance = is_beyond ? lobes.transmission_chance : (is_rough_reflection(lobes, layers) ? 0.0 : lobes.reflection_chance);
     if (layers.alpha < DELTA_ALPHA || chance <= 0.0) {
         return vec3(0.0);
     }
@@ -148,32 +148,32 @@ vec3 sharp_base(Surface surface, Lobes lobes, LayerAlbedos lit, vec3 wo, vec3 wi
     if (found.density <= 0.0) {
         return vec3(0.0);
     }
-    vec3 colour = base_colour_at(lobes, layers.is_solid, found.along, is_beyond) * below_cover(lobes.cover, lit);
+    vec3 colour = base_colour_at(lobes, layers.is_solid, found.along, is_beyond) * below_cover(lobes.cover, towards_light);
     return colour * (found.value * light_share(light_density, chance * found.density));
 }
 
-// What arrives from a direction, as matt and as sharp lobes weigh it: BRDF times cosine.
+// What arrives from a direction, as rough and as sharp lobes weigh it: BRDF times cosine.
 struct LobeLight {
-    vec3 matt;
+    vec3 rough;
     vec3 sharp;
 };
 
-// `asks_matt`: rays of the matt lobes see the light, too.
-LobeLight weigh_light(Surface surface, Lobes lobes, vec3 wo, vec3 wi, float light_density, bool asks_matt)
+// `asks_rough`: rays of the rough lobes see the light, too.
+LobeLight weigh_light(Surface surface, Lobes lobes, vec3 wo, vec3 wi, float light_density, bool asks_rough)
 {
     LobeLight light = LobeLight(vec3(0.0), vec3(0.0));
     float cosine = dot(wi, surface.ns);
-    LayerAlbedos lit = albedos_towards(surface, lobes.cover, wi);
+    LayerAlbedos towards_light = albedos_towards(surface, lobes.cover, wi);
     bool is_beyond = dot(wi, surface.ng) <= 0.0;
     if (!is_beyond && cosine > 0.0) {
-        light.matt = matt_brdf(lobes.matt, lobes.cover, lobes.base.film, lit, surface.ns, wo, wi) * cosine;
-        if (asks_matt) {
-            light.matt *= light_share(light_density, density_of_matt_lobes(surface, lobes, wo, wi));
+        light.rough = rough_brdf(lobes.rough, lobes.cover, lobes.base.film, towards_light, surface.ns, wo, wi) * cosine;
+        if (asks_rough) {
+            light.rough *= light_share(light_density, density_of_rough_lobes(surface, lobes, wo, wi));
         }
     }
-    light.sharp = sharp_base(surface, lobes, lit, wo, wi, is_beyond, light_density);
+    light.sharp = sharp_base(surface, lobes, towards_light, wo, wi, is_beyond, light_density);
     if (HAS_DIFFUSE_TRANSMISSION && is_beyond) {
-        light.sharp += sharp_diffuse_transmission(surface, lobes, lit, wi, light_density);
+        light.sharp += sharp_diffuse_transmission(surface, lobes, towards_light, wi, light_density);
     }
     if (HAS_COATS && !is_beyond) {
         light.sharp += sharp_coat(surface, lobes, wo, wi, light_density);
@@ -237,16 +237,16 @@ Scatter sample_even_lobe(Surface surface, Lobes lobes, vec3 wo, vec2 u, ChosenLo
     bool is_beyond = HAS_DIFFUSE_TRANSMISSION && chosen.lobe == LOBE_DIFFUSE_TRANSMISSION;
     vec3 n = is_beyond ? -surface.ns : surface.ns, side = is_beyond ? -surface.ng : surface.ng;
     vec3 wi = to_frame(sample_cosine_hemisphere(u.x, u.y), n);
-    LayerAlbedos lit = albedos_towards(surface, lobes.cover, wi);
+    LayerAlbedos towards_light = albedos_towards(surface, lobes.cover, wi);
     Scatter scatter = Scatter(wi, vec3(0.0), dot(wi, side) > 0.0, is_beyond, false, 0.0);
     if (is_beyond) {
-        scatter.weight = diffuse_transmission_btdf(lobes, lit);
+        scatter.weight = diffuse_transmission_btdf(lobes, towards_light);
         scatter.density = chosen.chance * even_density(n, wi);
         scatter.alive = scatter.alive && scatter.density > 0.0;
     } else if (HAS_SHEEN && chosen.lobe == LOBE_SHEEN) {
-        scatter.weight = sheen_brdf(lobes.cover, lit, surface.ns, wo, wi);
+        scatter.weight = sheen_brdf(lobes.cover, towards_light, surface.ns, wo, wi);
     } else {
-        scatter.weight = diffuse_brdf(lobes.matt, lobes.cover, lit);
+        scatter.weight = diffuse_brdf(lobes.rough, lobes.cover, towards_light);
     }
     scatter.weight *= divide(3.14159265358979324, chosen.chance);
     return scatter;
@@ -274,11 +274,11 @@ Scatter sample_facet_lobe(Surface surface, Lobes lobes, vec3 wo, vec2 u, ChosenL
     scatter.weight *= carries_radiance && is_beyond && layers.is_solid ? lobes.base.eta * lobes.base.eta : 1.0;
     if (is_coat) {
         scatter.weight *= coat_colour(layers.coat, facet.along);
-        scatter.is_specular = !is_matt(facets.alpha);
+        scatter.is_specular = !is_rough(facets.alpha);
     } else {
-        LayerAlbedos lit = albedos_towards(surface, lobes.cover, scatter.direction);
-        scatter.weight *= base_colour_at(lobes, layers.is_solid, facet.along, is_beyond) * below_cover(lobes.cover, lit);
-        scatter.is_specular = is_beyond || !is_matt_reflection(lobes, layers);
+        LayerAlbedos towards_light = albedos_towards(surface, lobes.cover, scatter.direction);
+        scatter.weight *= base_colour_at(lobes, layers.is_solid, facet.along, is_beyond) * below_cover(lobes.cover, towards_light);
+        scatter.is_specular = is_beyond || !is_rough_reflection(lobes, layers);
     }
     return scatter;
 }

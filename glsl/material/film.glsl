@@ -5,7 +5,7 @@
 #include "material/ggx.glsl"
 
 // A thin film on the base: how much of it is there, and shares of dielectric and metal in what is reflected below it, with their F0.
-struct MattFilm {
+struct RoughFilm {
     float share;
     float ior;
     float thickness;
@@ -14,12 +14,12 @@ struct MattFilm {
     float metal;
     vec3 metal_f0;
     // What it reflects is no sharp lobe.
-    uint is_matt;
+    uint is_rough;
 };
 
-MattFilm no_film()
+RoughFilm no_film()
 {
-    return MattFilm(0.0, 1.0, 0.0, 0.0, vec3(0.0), 0.0, vec3(0.0), 0);
+    return RoughFilm(0.0, 1.0, 0.0, 0.0, vec3(0.0), 0.0, vec3(0.0), 0);
 }
 
 // Amplitude of a wave of this phase shift, for X, Y, Z of the observer: Gaussians in the frequency's Fourier space.
@@ -87,7 +87,7 @@ vec3 film_reflectance(vec3 f0, float film_ior, float thickness, float cosine)
 }
 
 // What a base reflects that has a film: of the dielectric, and of the metal.
-vec3 under_film(vec3 colour, MattFilm film, float cosine)
+vec3 under_film(vec3 colour, RoughFilm film, float cosine)
 {
     vec3 interference = vec3(0.0);
     if (film.dielectric > 0.0) {

@@ -7,8 +7,8 @@
 #include "material/scatter.glsl"
 #include "material/film.glsl"
 
-// How the matt lobes of a layered visible point weigh light (glsl/material/matt_brdf.glsl). Those that are none have weight 0.
-struct MattLobes {
+// How the rough lobes of a layered visible point weigh light (glsl/material/rough_brdf.glsl). Those that are none have weight 0.
+struct RoughLobes {
     // All of the diffuse lobe but the factors of where light comes from.
     vec3 diffuse;
     // What the dielectric reflects along its normal and at the horizon, in the largest channel.
@@ -21,7 +21,7 @@ struct MattLobes {
 };
 
 // What lies over them.
-struct MattCover {
+struct RoughCover {
     float coat;
     float coat_alpha;
     // It is no sharp lobe.
@@ -33,7 +33,7 @@ struct MattCover {
     vec3 sheen;
     float sheen_alpha;
     // Under them; here for it to be stored (drivers allow few buffers).
-    MattFilm film;
+    RoughFilm film;
 };
 
 // What the base reflects: metal and dielectric, mixed, under a film.
@@ -51,14 +51,14 @@ struct Base {
     float exact_share;
     // Index of refraction where the eye is, over that beyond; 1 for a thin wall.
     float eta;
-    MattFilm film;
+    RoughFilm film;
 };
 
 // The lobes of a layered surface as they are seen from a direction. Each has a file in material/lobes.
 struct Lobes {
     Base base;
-    MattLobes matt;
-    MattCover cover;
+    RoughLobes rough;
+    RoughCover cover;
     // (1 - m) t b
     vec3 transmitted;
     // All of diffuse transmission but the factors of where light comes from.
@@ -75,24 +75,24 @@ struct Lobes {
     float beyond_chance;
 };
 
-MattCover no_cover()
+RoughCover no_cover()
 {
-    return MattCover(0.0, 1.0, 0, 0, 0.0, 0.0, vec3(0.0), 1.0, no_film());
+    return RoughCover(0.0, 1.0, 0, 0, 0.0, 0.0, vec3(0.0), 1.0, no_film());
 }
 
-bool is_matt(float alpha)
+bool is_rough(float alpha)
 {
     return alpha >= MAP_ALPHA;
 }
 
 // Coat and sheen of a surface, before it is known what they reflect towards the eye.
-MattCover cover_of(Layers layers)
+RoughCover cover_of(Layers layers)
 {
-    MattCover cover = no_cover();
+    RoughCover cover = no_cover();
     if (HAS_COATS) {
         cover.coat = layers.coat;
         cover.coat_alpha = layers.coat_alpha;
-        cover.has_coat_lobe = uint(layers.coat > 0.0 && is_matt(layers.coat_alpha));
+        cover.has_coat_lobe = uint(layers.coat > 0.0 && is_rough(layers.coat_alpha));
         cover.coat_normal = pack_normal(layers.coat_normal);
     }
     if (HAS_SHEEN) {
@@ -110,7 +110,7 @@ struct LayerAlbedos {
 };
 
 // The coat reflects by its own normal, and takes from what lies below it as much as it reflects: else light is gained.
-LayerAlbedos albedos_at(float alpha, MattCover cover, float cosine, float coat_cosine)
+LayerAlbedos albedos_at(float alpha, RoughCover cover, float cosine, float coat_cosine)
 {
     LayerAlbedos albedos = LayerAlbedos(ggx_albedo(alpha, cosine), 0.0, 0.0);
     if (HAS_COATS && cover.coat > 0.0) {
@@ -124,7 +124,7 @@ LayerAlbedos albedos_at(float alpha, MattCover cover, float cosine, float coat_c
 }
 
 // What layers reflect of all light from wi, on either side.
-LayerAlbedos albedos_towards(Surface surface, MattCover cover, vec3 wi)
+LayerAlbedos albedos_towards(Surface surface, RoughCover cover, vec3 wi)
 {
     return albedos_at(surface.layers.alpha, cover, abs(dot(wi, surface.ns)), abs(dot(wi, surface.layers.coat_normal)));
 }
@@ -142,27 +142,27 @@ float below_base(float e0, float e90, vec2 albedo)
 }
 
 // What coat and sheen leave, seen along one direction and lit along another.
-float below_cover(MattCover cover, LayerAlbedos lit)
+float below_cover(RoughCover cover, LayerAlbedos towards_light)
 {
     float below = 1.0;
     if (HAS_COATS) {
-        below = 1.0 - max(cover.coat_albedo, lit.coat);
+        below = 1.0 - max(cover.coat_albedo, towards_light.coat);
     }
     if (HAS_SHEEN) {
-        below *= below_sheen(cover.sheen, max(cover.sheen_albedo, lit.sheen));
+        below *= below_sheen(cover.sheen, max(cover.sheen_albedo, towards_light.sheen));
     }
     return below;
 }
 
 // A diffuse lobe below the base's reflection, coat and sheen.
-vec3 below_all(vec3 diffuse, MattLobes lobes, MattCover cover, LayerAlbedos lit)
+vec3 below_all(vec3 diffuse, RoughLobes lobes, RoughCover cover, LayerAlbedos towards_light)
 {
-    diffuse *= below_base(lobes.e0, lobes.e90, lit.base);
+    diffuse *= below_base(lobes.e0, lobes.e90, towards_light.base);
     if (HAS_COATS) {
-        diffuse *= 1.0 - lit.coat;
+        diffuse *= 1.0 - towards_light.coat;
     }
     if (HAS_SHEEN) {
-        diffuse *= below_sheen(cover.sheen, max(cover.sheen_albedo, lit.sheen));
+        diffuse *= below_sheen(cover.sheen, max(cover.sheen_albedo, towards_light.sheen));
     }
     return diffuse;
 }

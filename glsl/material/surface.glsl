@@ -86,7 +86,7 @@ struct LayeredMaterial {
     float cutoff;
     uint is_unlit;
     // Somewhere it has a lobe that photon maps know. Density estimates beside such a place count photons elsewhere, too.
-    uint is_matt;
+    uint is_rough;
     // Its lookups, among the records of textures.
     uint first_lookup;
     uint end_lookup;
@@ -430,12 +430,12 @@ bool is_not_there(uint material)
 }
 
 // Whether photons are stored on a material, and so whether its area is what they are counted over: both ask here. Light leaves mirrors
-// and glass in single directions, so that no density can tell it.
+// and glass in single directions, so that no density can give it.
 bool keeps_photons(uint material)
 {
     uint kind = materials[material].surface;
     if (HAS_LAYERS && kind == SURFACE_LAYERED) {
-        return layered_materials[material].is_matt != 0;
+        return layered_materials[material].is_rough != 0;
     }
     return kind != SURFACE_MIRROR && kind != SURFACE_DIELECTRIC;
 }

@@ -16,7 +16,7 @@ use crate::scene::{Material, Mesh, Scene, bounds_of};
 /// How a document shows the baked light.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// Black materials that shine with the radiance that leaves them.
+    /// Black materials that emit the radiance that leaves them.
     Radiance,
     /// The scene's materials with MOZ_lightmap.
     Lightmap,
@@ -87,7 +87,7 @@ impl Geometry {
     }
 }
 
-/// Tangents as glTF has them, one a vertex; `None` where corners that meet at a vertex have several: they are computed again
+/// Tangents as glTF has them, one per vertex; `None` where corners that meet at a vertex have several: they are computed again
 /// where the file is read.
 fn vertex_tangents(mesh: &Mesh) -> Option<Vec<DVec4>> {
     let of_corners = if mesh.tangents.is_empty() { &mesh.coat_tangents } else { &mesh.tangents };

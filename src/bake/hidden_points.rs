@@ -94,11 +94,11 @@ impl Faces {
         let looked: Vec<Option<Option<[SurfacePoint; PHASE_COUNT]>>> =
             lightmap.texels.par_iter().map(|texel| self.points_left(number, lightmap, texel)).collect();
         let is_changed = looked.iter().any(Option::is_some);
-        let keep = |(texel, looked): (&CoveredTexel, Option<Option<[SurfacePoint; PHASE_COUNT]>>)| match looked {
+        let is_seen = |(texel, looked): (&CoveredTexel, Option<Option<[SurfacePoint; PHASE_COUNT]>>)| match looked {
             None => Some(*texel),
             Some(points) => Some(CoveredTexel { points: points?, ..*texel }),
         };
-        is_changed.then(|| lightmap.texels.iter().zip(looked).filter_map(keep).collect())
+        is_changed.then(|| lightmap.texels.iter().zip(looked).filter_map(is_seen).collect())
     }
 
     /// `None`: all count; `Some(None)`: none does.

@@ -3,7 +3,7 @@
 use super::{Layout, PHASE_COUNT, TexelEstimate};
 use crate::engine::scene::RunResult;
 use crate::error::{Error, Result};
-use crate::output::colour::ColourPicture;
+use crate::output::colour::ColourImage;
 use crate::records::Receiver;
 use crate::scene::Scene;
 use crate::scene::geometry::Geometry;
@@ -14,7 +14,7 @@ const USUAL_TEXELS: f64 = 65_536.0;
 /// Texels per metre; fails where there is nothing to bake in the scene of this name.
 pub(crate) fn usual_density(scene: &Scene, name: &str) -> Result<f64> {
     let kinds = scene.lobe_kinds();
-    let baked = scene.meshes.iter().filter(|mesh| kinds[mesh.material].matt);
+    let baked = scene.meshes.iter().filter(|mesh| kinds[mesh.material].rough);
     let area: f64 = baked.map(super::super::scene::mesh::Mesh::whole_area).sum();
     if area == 0.0 {
         let reason =
@@ -40,18 +40,18 @@ impl Layout {
 }
 
 /// What a run found for every texel.
-pub(crate) fn estimates(lit: &RunResult) -> Vec<TexelEstimate> {
-    let (errors, unseen) = (lit.film.stated_errors(), lit.film.unseen_bounds());
+pub(crate) fn estimates(result: &RunResult) -> Vec<TexelEstimate> {
+    let (errors, unseen) = (result.film.stated_errors(), result.film.unseen_bounds());
     let estimate = |texel: usize| TexelEstimate {
-        irradiance: lit.film.mean(texel).as_vec3(),
+        irradiance: result.film.mean(texel).as_vec3(),
         standard_error: errors(texel).as_vec3(),
         unseen: unseen(texel) as f32,
     };
-    (0..lit.film.pixels()).map(estimate).collect()
+    (0..result.film.pixels()).map(estimate).collect()
 }
 
 /// Stops that make the mean of white surfaces middle grey.
 pub(crate) fn usual_exposure(estimates: &[TexelEstimate]) -> f32 {
     let pixels = estimates.iter().map(|estimate| estimate.irradiance / std::f32::consts::PI).collect();
-    ColourPicture { width: estimates.len() as u32, height: 1, pixels }.usual_exposure()
+    ColourImage { width: estimates.len() as u32, height: 1, pixels }.usual_exposure()
 }

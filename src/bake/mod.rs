@@ -18,7 +18,7 @@
 //!
 //! # Files of a scene from a file
 //!
-//! [`IntoFile`] writes the file again with lightmap coordinates and, beside it, lightmaps as EXR: a picture an object, or
+//! [`IntoFile`] writes the file again with lightmap coordinates and, beside it, lightmaps as EXR: a picture per object, or
 //! pages that several share ([`pages`]). [`original`] says what is added to the file. The guide's page on lightmaps is the reference.
 //!
 //! # Files of a built-in scene
@@ -36,7 +36,7 @@
 //! and the scene, twice, because glTF has no place for a lightmap:
 //!
 //! - `scene.gltf` shows the baked light in every viewer and in Blender. The materials that
-//!   have a map are black and shine with `NAME_radiance.png`, so that lamps and environments of the
+//!   have a map are black and emit `NAME_radiance.png`, so that lamps and environments of the
 //!   viewer add nothing to them. A texture finer than the lightmap is as coarse as the lightmap there.
 //!   [`preview`] is the same in one file.
 //! - `scene_lightmap.gltf` is for engines. Its materials are the scene's, with `NAME_lightmap.png` as
@@ -125,7 +125,7 @@ pub(crate) struct Object {
 pub(crate) struct MeshLightmap {
     /// The scene's mesh: the same triangles in the same order, vertices doubled along seams.
     pub mesh: Mesh,
-    /// Lightmap coordinates from 0 to 1, one a vertex of `mesh`.
+    /// Lightmap coordinates from 0 to 1, one per vertex of `mesh`.
     pub uvs: Vec<DVec2>,
     /// Whether the coordinates are the mesh's own second set.
     pub is_second_set: bool,

@@ -28,7 +28,7 @@ pub(crate) struct Names {
 }
 
 impl Names {
-    /// Those of a built-in scene, one an object.
+    /// Those of a built-in scene, one per object.
     pub(super) fn new(scene: &Scene, layout: &Layout) -> Names {
         let mut taken: HashSet<String> = [GEOMETRY, RADIANCE_SCENE, LIGHTMAP_SCENE].map(str::to_owned).into();
         taken.extend((0..scene.textures.len()).map(texture_name));
@@ -57,7 +57,7 @@ impl Names {
 
 /// Beginnings of file names, so that with each ending they are unlike all others and those taken, which are lower case.
 pub(crate) fn stems<'a>(wanted: impl Iterator<Item = &'a str>, endings: &[&str], mut taken: HashSet<String>) -> Vec<String> {
-    // Those of one name are told apart by numbers that go on, so that many of them cost no search.
+    // Those of one name are distinguished by numbers that go on, so that many of them cost no search.
     let mut counts = HashMap::new();
     let mut unlike = |wanted: &str| {
         let wanted = sanitised(wanted);

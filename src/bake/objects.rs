@@ -88,7 +88,7 @@ fn objects(scene: &Scene) -> Vec<Vec<usize>> {
     let mut objects: Vec<Vec<usize>> = Vec::new();
     // Node and primitives of the last object.
     let mut last: Option<(usize, BTreeSet<usize>)> = None;
-    for (index, mesh) in scene.meshes.iter().enumerate().filter(|(_, mesh)| kinds[mesh.material].matt) {
+    for (index, mesh) in scene.meshes.iter().enumerate().filter(|(_, mesh)| kinds[mesh.material].rough) {
         // A primitive that comes again is of another instance.
         let is_of_last = match (&mesh.source, &mut last) {
             (Some(source), Some((node, primitives))) => source.node == *node && primitives.insert(source.primitive),

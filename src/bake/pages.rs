@@ -1,4 +1,4 @@
-//! Pictures that hold the maps: one an object, or pages of one size that objects share.
+//! Pictures that hold the maps: one per object, or pages of one size that objects share.
 
 use glam::{DVec2, Vec3};
 use guillotiere::{AtlasAllocator, size2};
@@ -42,7 +42,7 @@ pub(crate) struct Place {
 }
 
 /// What the texels of a page hold.
-pub(crate) struct Picture {
+pub(crate) struct PageTexels {
     pub width: u32,
     pub height: u32,
     pub irradiance: Vec<Vec3>,
@@ -125,12 +125,12 @@ impl Pages {
     }
 
     /// The pages with the maps' values. What belongs to no map is black.
-    pub(crate) fn pictures(&self, maps: &[Map]) -> Vec<Picture> {
+    pub(crate) fn pictures(&self, maps: &[Map]) -> Vec<PageTexels> {
         let blank = |[width, height]: &[u32; 2]| {
             let black = vec![Vec3::ZERO; *width as usize * *height as usize];
-            Picture { width: *width, height: *height, irradiance: black.clone(), error: black.clone(), unseen: black }
+            PageTexels { width: *width, height: *height, irradiance: black.clone(), error: black.clone(), unseen: black }
         };
-        let mut pictures: Vec<Picture> = self.sizes.iter().map(blank).collect();
+        let mut pictures: Vec<PageTexels> = self.sizes.iter().map(blank).collect();
         for map in maps {
             let Place { page, x, y } = self.places[map.object];
             let margin = self.margins[map.object];

@@ -11,7 +11,7 @@ pub(crate) struct Part {
     pub vertices: Vec<u32>,
     /// The same triangles in the same order.
     pub triangles: Vec<[u32; 3]>,
-    /// Coordinates of the map, from 0 to 1, one a vertex.
+    /// Coordinates of the map, from 0 to 1, one per vertex.
     pub uvs: Vec<DVec2>,
 }
 

@@ -52,8 +52,8 @@ pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
     let request = &args.request.0;
     let inputs = Inputs::open(request)?;
     let reporter = ProgressReporter::explaining(&args.messages);
-    let tell = |event: Event| reporter.event(event);
-    let observer = Observer { cancelled, tell: &tell };
+    let report = |event: Event| reporter.event(event);
+    let observer = Observer { cancelled, report: &report };
     let folder = Folder::open("-o", &args.output)?;
     let reports = args.report.open()?;
     let mut checkpoints = Checkpoints::open(request, &observer)?;

@@ -11,7 +11,7 @@ use super::{DeviceArgs, End, JsonArg, optional_file, say_beside};
 use crate::error::{Result, require};
 use crate::gpu::Gpu;
 use crate::measure::bench::experiments::{self, Experiment};
-use crate::measure::bench::{self, Request, Size, table};
+use crate::measure::bench::{self, BenchRequest, Size, table};
 use crate::output::destination::{Destination, Folder, check_distinct, write_all};
 use crate::render::Seconds;
 use crate::scene::Scene;
@@ -68,7 +68,7 @@ pub(super) fn run(args: &BenchArgs, cancelled: &AtomicBool) -> Result<End> {
     let gpu = Gpu::open(&args.device.steady())?;
     reporter.device(Some(&gpu));
     let usual = if gpu.facts().kind == "cpu" { WorkloadArg::Small } else { WorkloadArg::Full };
-    let request = Request {
+    let request = BenchRequest {
         command: std::iter::once("photonmill".to_owned()).chain(std::env::args().skip(1)).collect::<Vec<_>>().join(" "),
         size: match args.workload.unwrap_or(usual) {
             WorkloadArg::Small => Size::Small,

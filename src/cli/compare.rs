@@ -15,8 +15,8 @@ use crate::render::Percent;
 use crate::text::percent;
 use crate::verify::compare::Comparison;
 use crate::verify::compare::false_colour::Show;
+use crate::verify::compare::image::Image;
 use crate::verify::compare::pair::Pair;
-use crate::verify::compare::picture::Picture;
 use crate::verify::compare::z_scores::{self, ZScores};
 
 #[derive(Args)]
@@ -121,8 +121,8 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
     }
 }
 
-fn read(path: &Path) -> Result<Picture> {
-    Picture::read(path).map_err(|reason| Error::Picture { path: path.to_owned(), reason })
+fn read(path: &Path) -> Result<Image> {
+    Image::read(path).map_err(|reason| Error::Image { path: path.to_owned(), reason })
 }
 
 /// From the errors of one picture or both.
@@ -134,7 +134,7 @@ fn z_scores(args: &CompareArgs, pair: &Pair) -> Result<ZScores> {
     for ((errors, option), path) in errors.iter_mut().zip(ERRORS).zip([&args.errors_a, &args.errors_b]) {
         let Some(path) = path else { continue };
         let refuse = |reason: String| Error::setting(option, path.display(), reason);
-        let picture = Picture::read(path).map_err(refuse)?;
+        let picture = Image::read(path).map_err(refuse)?;
         z_scores::check(&picture, pair).map_err(refuse)?;
         *errors = Some(picture);
         let own = std::fs::read(path).ok().and_then(|content| exr_file::freedom(&content)).filter(|freedom| *freedom > 0);

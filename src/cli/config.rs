@@ -79,7 +79,7 @@ pub(super) fn expanded(known: &Command, arguments: Vec<OsString>) -> Result<(Vec
         format!("{}: is no TOML: {}", place(path, line), error.message().lines().collect::<Vec<_>>().join(", "))
     })?;
     let mut file =
-        File { known, path, line_of: &line_of, chosen: Vec::new(), origins: Origins { path: path.clone(), ..Origins::default() } };
+        File { known, path, line_of: &line_of, given: Vec::new(), origins: Origins { path: path.clone(), ..Origins::default() } };
     file.take(table.get_ref(), &selected)?;
     Ok((file.insert(arguments, &selected), file.origins))
 }
@@ -113,7 +113,7 @@ fn table_name(path: &[&str]) -> String {
 }
 
 /// An argument of the file.
-struct Chosen<'a> {
+struct GivenOption<'a> {
     argument: &'a Arg,
     /// `None` of a switch, and of an option without the value that it may have.
     values: Option<Vec<String>>,
@@ -123,7 +123,7 @@ struct File<'a> {
     known: &'a Command,
     path: &'a Path,
     line_of: &'a dyn Fn(usize) -> usize,
-    chosen: Vec<Chosen<'a>>,
+    given: Vec<GivenOption<'a>>,
     origins: Origins,
 }
 
@@ -188,18 +188,18 @@ impl<'a> File<'a> {
         let mut found = Vec::new();
         for (name, argument) in in_files(selected.command) {
             let Some((key, value)) = table.iter().find(|(key, _)| key.get_ref().as_ref() == name) else { continue };
-            let typed = selected.typed().chain(self.chosen.iter().map(|chosen| chosen.argument));
+            let typed = selected.typed().chain(self.given.iter().map(|given| given.argument));
             if value.get_ref().is_table() || typed.into_iter().any(|other| excludes(selected.command, argument, other)) {
                 continue;
             }
             let values = values(argument, value).map_err(|allowed| self.refuse(key.span().start, &name, allowed))?;
             if let Some(values) = values {
-                found.push(Chosen { argument, values });
+                found.push(GivenOption { argument, values });
                 let shown = if argument.is_positional() { format!("<{}>", name.to_uppercase()) } else { format!("--{name}") };
                 self.origins.lines.insert(shown, (self.line_of)(key.span().start));
             }
         }
-        self.chosen.extend(found);
+        self.given.extend(found);
         Ok(())
     }
 
@@ -207,7 +207,7 @@ impl<'a> File<'a> {
     /// stands at the end, as do arguments without names, behind `--`.
     fn insert(&self, arguments: Vec<OsString>, selected: &Selected) -> Vec<OsString> {
         let (mut first, mut last, mut unnamed) = (Vec::new(), Vec::new(), Vec::new());
-        for Chosen { argument, values } in &self.chosen {
+        for GivenOption { argument, values } in &self.given {
             match (argument.get_long(), values) {
                 (Some(long), Some(values)) => first.extend(values.iter().map(|value| OsString::from(format!("--{long}={value}")))),
                 (Some(long), None) => last.push(format!("--{long}").into()),

@@ -68,7 +68,7 @@ fn verdict(facts: &DeviceFacts) -> String {
     const WANTED: u32 = 100_000;
     let opened = Gpu::open(&Options { device: Some(facts.index.to_string()), ..Options::default() });
     match opened.and_then(|gpu| Ok((check::loop_count(&gpu, WANTED)?, gpu.facts().votes_in_loops))) {
-        Ok((_, false)) => "passed, but lanes do not vote right in loops: no --variant persistent".to_owned(),
+        Ok((_, false)) => "passed, but subgroup votes in loops return wrong results on this driver: no --variant persistent".to_owned(),
         Ok((count, true)) if count.done == WANTED => "passed".to_owned(),
         Ok((count, true)) => format!("passed; loops end after {} iterations (photonmill needs at most {LOOP_LIMIT})", count.done),
         Err(error) => error.to_string(),

@@ -8,7 +8,7 @@ use clap::Args;
 
 use super::complain;
 use crate::engine::run::saved::{SavedRun, WorldFilm};
-use crate::engine::run::watch::Later;
+use crate::engine::run::watch::Lazy;
 use crate::engine::scene::SceneFilm;
 use crate::error::Result;
 use crate::output::show::{Layer, Show};
@@ -48,7 +48,7 @@ pub(super) struct Display {
 
 impl Display {
     /// The picture so far.
-    pub(super) fn send(&mut self, run: Later<Arc<SavedRun>>) -> Result<()> {
+    pub(super) fn send(&mut self, run: Lazy<Arc<SavedRun>>) -> Result<()> {
         let show = self.show.clone();
         self.viewer.show(Box::new(move || show.channels(SceneFilm::of(&run().film), &[])))
     }

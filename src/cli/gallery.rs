@@ -10,10 +10,10 @@ use super::values::parse_integer;
 use super::{DeviceArgs, End, complain, say};
 use crate::error::{Result, require, within};
 use crate::gpu::Gpu;
-use crate::measure::gallery::{self, Request};
+use crate::measure::gallery::{self, GalleryRequest};
 use crate::output::destination::Folder;
 use crate::render::{Percent, Seconds};
-use crate::scene::picture_size::MAX_SIDE;
+use crate::scene::image_size::MAX_SIDE;
 
 #[derive(Args)]
 pub(super) struct GalleryArgs {
@@ -43,7 +43,7 @@ pub(super) fn run(args: &GalleryArgs, cancelled: &AtomicBool) -> Result<End> {
     let is_cpu = gpu.facts().kind == "cpu";
     // The commands open it for themselves.
     drop(gpu);
-    let request = Request {
+    let request = GalleryRequest {
         width: args.size.unwrap_or(if is_cpu { 160 } else { 640 }),
         error: 100.0 * args.error.map_or(if is_cpu { 0.05 } else { 0.01 }, Percent::share),
         seconds: args.time.map_or(if is_cpu { 30.0 } else { 5.0 }, |Seconds(seconds)| seconds),

@@ -80,8 +80,8 @@ struct LightEntry {
 pub(super) fn run(args: &InfoArgs) -> Result<()> {
     let json = optional_file("--json", args.json.json.as_ref())?;
     let reporter = ProgressReporter::new(&args.progress);
-    let tell = |event: Event| reporter.event(event);
-    let observer = Observer { tell: &tell, ..Observer::default() };
+    let report = |event: Event| reporter.event(event);
+    let observer = Observer { report: &report, ..Observer::default() };
     let reading = Reading { at: args.at, ..Reading::default() };
     let scene = Scene::open_with(&args.scene, reading, &mut stages(&args.scene, &observer))?;
     reporter.finish();

@@ -15,7 +15,7 @@ use crate::error::{Error, Result, require};
 use crate::output::destination::{Destination, check_not_read, write_all};
 use crate::output::photon_map;
 use crate::render::map::{USUAL_ROUNDS, WrittenMap};
-use crate::render::{Event, Inputs, Observer, Receivers, RenderRequest, prepare};
+use crate::render::{Event, Inputs, Observer, RenderRequest, RequestedReceivers, prepare};
 use crate::text::counted;
 
 /// A file is made of a scene, or another command given.
@@ -131,9 +131,9 @@ fn make(args: &MakeArgs, cancelled: &AtomicBool) -> Result<End> {
     let output = Destination::open_file("-o", &args.output)?;
     check_not_read(std::slice::from_ref(&output), request.inputs())?;
     let reporter = ProgressReporter::new(&args.progress);
-    let tell = |event: Event| reporter.event(event);
-    let observer = Observer { cancelled, tell: &tell };
-    let prepared = prepare(inputs, Receivers::Image(None), &observer)?;
+    let report = |event: Event| reporter.event(event);
+    let observer = Observer { cancelled, report: &report };
+    let prepared = prepare(inputs, RequestedReceivers::Image(None), &observer)?;
     let mut gpu = args.device.open(&reporter)?;
     let WrittenMap { header, filled, failed } = prepared.write_map(&mut gpu, &output, &observer)?;
     reporter.finish();

@@ -10,7 +10,7 @@ use super::values::{parse_integer, parse_threads};
 use super::{DeviceArgs, End, complain, say};
 use crate::error::{Error, Result, require};
 use crate::measure::paper::bench::Bench;
-use crate::measure::paper::{self, Reproduction, Request, published, tables, verdicts};
+use crate::measure::paper::{self, PaperRequest, Reproduction, published, tables, verdicts};
 use crate::output::destination::Folder;
 use crate::render::Seconds;
 use crate::render::values::Threads;
@@ -49,7 +49,7 @@ pub(super) fn run(args: &PaperArgs, cancelled: &AtomicBool) -> Result<End> {
     let gpu = args.device.open(&args.device.steady())?;
     reporter.device(gpu.as_ref());
     let is_cpu = gpu.as_ref().is_none_or(|gpu| gpu.facts().kind == "cpu");
-    let request = Request {
+    let request = PaperRequest {
         large: args.large.unwrap_or(if is_cpu { LARGE_ON_CPU } else { LARGE_ON_GPU }),
         repeats: args.repeats as usize,
         threads: args.threads.map_or(1, |Threads(threads)| threads),

@@ -12,7 +12,7 @@ use crate::output::destination::write_all;
 use crate::output::scene_report;
 use crate::plan::Limits;
 use crate::plan::radius::RadiusFrom;
-use crate::render::{Event, Inputs, Observer, Receivers, prepare};
+use crate::render::{Event, Inputs, Observer, RequestedReceivers, prepare};
 use crate::scene::light_tree::is_one_lamp;
 use crate::text::counted;
 
@@ -32,8 +32,8 @@ pub(super) fn run(args: &PlanArgs) -> Result<()> {
     let inputs = Inputs::open(&args.request.0)?;
     let json = optional_file("--json", args.json.json.as_ref())?;
     let reporter = ProgressReporter::new(&args.progress);
-    let tell = |event: Event| reporter.event(event);
-    let prepared = prepare(inputs, Receivers::Image(None), &Observer { tell: &tell, ..Observer::default() })?;
+    let report = |event: Event| reporter.event(event);
+    let prepared = prepare(inputs, RequestedReceivers::Image(None), &Observer { report: &report, ..Observer::default() })?;
     // A plan is data: it needs a device's limits, not the device.
     let limits = match Gpu::open(&args.device.options()) {
         Ok(gpu) => engine::limits(gpu.facts()),

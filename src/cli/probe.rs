@@ -17,7 +17,7 @@ use crate::output::destination::{Destination, check_distinct, write_all};
 use crate::output::scene_report;
 use crate::render::checkpoints::Checkpoints;
 use crate::render::points::{MAX_POINTS, point_of};
-use crate::render::{Event, Inputs, Observer, Receivers, prepare};
+use crate::render::{Event, Inputs, Observer, RequestedReceivers, prepare};
 use crate::text::{counted, echo, refusal};
 
 #[derive(Args)]
@@ -43,8 +43,8 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
     let request = &args.request.0;
     let inputs = Inputs::open(request)?;
     let reporter = ProgressReporter::explaining(&args.messages);
-    let tell = |event: Event| reporter.event(event);
-    let observer = Observer { cancelled, tell: &tell };
+    let report = |event: Event| reporter.event(event);
+    let observer = Observer { cancelled, report: &report };
     let output = Destination::open("-o", &args.output)?;
     let reports = args.report.open()?;
     let mut checkpoints = Checkpoints::open(request, &observer)?;
@@ -53,7 +53,7 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
     checkpoints.check_not_read(&all, request.inputs().chain([args.points.as_path()]))?;
     let points = read_points(&args.points)?;
 
-    let prepared = prepare(inputs, Receivers::Points(&points), &observer)?;
+    let prepared = prepare(inputs, RequestedReceivers::Points(&points), &observer)?;
     let mut gpus = args.device.open(&reporter)?;
     let run = prepared.run(&mut gpus, &mut checkpoints, &observer)?.result;
     reporter.finish();

@@ -23,7 +23,7 @@ use crate::output::scene_report;
 use crate::output::show::{Layer, Show};
 use crate::render::checkpoints::Checkpoints;
 use crate::render::image::{check_format, show};
-use crate::render::{Event, Image, Inputs, Observer, Receivers, Seconds, prepare};
+use crate::render::{Event, Image, Inputs, Observer, RequestedReceivers, Seconds, prepare};
 use crate::settings::scene::{Filter, Part, SceneSettings};
 use crate::verify::judge::{Judge, Verdict};
 
@@ -67,8 +67,8 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     let request = &args.request.0;
     let inputs = Inputs::open(request)?;
     let reporter = ProgressReporter::explaining(&args.messages);
-    let tell = |event: Event| reporter.event(event);
-    let observer = Observer { cancelled, tell: &tell };
+    let report = |event: Event| reporter.event(event);
+    let observer = Observer { cancelled, report: &report };
     if let Some(name) = args.replay {
         return show_photon(args, inputs, name, &observer, &reporter);
     }
@@ -79,7 +79,7 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     check_distinct(&outputs.all)?;
     checkpoints.check_not_read(&outputs.all, request.inputs())?;
 
-    let mut prepared = prepare(inputs, Receivers::Image(None), &observer)?;
+    let mut prepared = prepare(inputs, RequestedReceivers::Image(None), &observer)?;
     let show = show(request, prepared.size());
     let mut display = args.display.connect(args.output.as_deref(), &show)?;
     let mut gpus = args.device.open(&reporter)?;
@@ -193,7 +193,7 @@ impl RenderArgs {
 
 /// The path of one photon of the run that these options ask for.
 fn show_photon(args: &RenderArgs, inputs: Inputs, name: PhotonName, observer: &Observer, reporter: &ProgressReporter) -> Result<End> {
-    let prepared = prepare(inputs, Receivers::Image(None), observer)?;
+    let prepared = prepare(inputs, RequestedReceivers::Image(None), observer)?;
     let gpu = args.device.one.open(reporter)?;
     // A photon's path does not depend on the radius.
     let plan = prepared.plan_within(&engine::limits(gpu.facts()))?;

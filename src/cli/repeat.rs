@@ -35,7 +35,7 @@ pub(super) struct RepeatArgs {
 
 pub(super) fn run(args: RepeatArgs, cancelled: &AtomicBool) -> Result<End> {
     let path = args.file.clone();
-    let refuse = |reason: String| Error::Picture { path: path.clone(), reason };
+    let refuse = |reason: String| Error::Image { path: path.clone(), reason };
     let format = Format::of("FILE", &path)?;
     let content = file::read(&path).map_err(refuse)?;
     let made = Metadata::read(&content).map_err(refuse)?;
@@ -52,8 +52,8 @@ pub(super) fn run(args: RepeatArgs, cancelled: &AtomicBool) -> Result<End> {
         Repeat::Not(reason) => return Err(refuse(reason.clone())),
     };
     let reporter = ProgressReporter::new(&args.progress);
-    let tell = |event: Event| reporter.event(event);
-    let observer = Observer { cancelled, tell: &tell };
+    let report = |event: Event| reporter.event(event);
+    let observer = Observer { cancelled, report: &report };
     let repeated = match command.as_str() {
         "render" => {
             let rounds = RoundsOf { division, tiles };

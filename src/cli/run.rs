@@ -72,12 +72,12 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
         return show_photon(args, &settings, &scene, name);
     }
     let reporter = ProgressReporter::new(&args.progress);
-    let tell = |event: Event| reporter.event(event);
-    let observer = Observer { cancelled, tell: &tell };
+    let report = |event: Event| reporter.event(event);
+    let observer = Observer { cancelled, report: &report };
     let mut checkpoints = Checkpoints::open(request, &observer)?;
     let outputs = Outputs::open(args, &scene, &checkpoints)?;
     if let Some(warning) = settings.warning() {
-        observer.tell(Event::Warning(&warning));
+        observer.report(Event::Warning(&warning));
     }
     let mut gpus = if is_on_cpu { Vec::new() } else { args.device.open_or_none(&reporter)? };
     if gpus.is_empty() {
@@ -125,25 +125,25 @@ impl Outputs {
         Ok(outputs)
     }
 
-    fn write(self, mut outcome: RunResult, scene: &RoomScene, request: &RenderRequest) -> Result<()> {
+    fn write(self, mut result: RunResult, scene: &RoomScene, request: &RenderRequest) -> Result<()> {
         let began = Instant::now();
-        let walls = estimate_walls(&outcome.film, scene, &outcome.plan);
-        let error = room_report::error(&outcome, scene);
+        let walls = estimate_walls(&result.film, scene, &result.plan);
+        let error = room_report::error(&result, scene);
         let (destination, format) = self.picture;
         let picture = destination.path().display().to_string();
-        let mut files = vec![(destination, overview(scene, &walls).encode(format, Some(&metadata(request, &outcome, &error, format))))];
-        let confidence = outcome.plan.settings.stop.confidence;
-        let source = ErrorSource { degrees_of_freedom: outcome.film.error_freedom(), confidence };
+        let mut files = vec![(destination, overview(scene, &walls).encode(format, Some(&metadata(request, &result, &error, format))))];
+        let confidence = result.plan.settings.stop.confidence;
+        let source = ErrorSource { degrees_of_freedom: result.film.error_freedom(), confidence };
         for (folder, quantity) in [(&self.irradiance, Quantity::Irradiance), (&self.radiosity, Quantity::Radiosity)] {
             files.extend(folder.iter().flat_map(|folder| lightmap::files(folder, quantity, scene, &walls, source)));
         }
-        let run = outcome.timings.spans().iter().map(|span| span.start + span.duration).max().unwrap_or_default();
-        outcome.timings.count("output");
-        outcome.timings.add(Span::of_host("output", run, began.elapsed()));
+        let run = result.timings.spans().iter().map(|span| span.start + span.duration).max().unwrap_or_default();
+        result.timings.count("output");
+        result.timings.add(Span::of_host("output", run, began.elapsed()));
 
-        files.extend(self.reports.files(&outcome, || room_report::json(&outcome, &walls, &error)));
+        files.extend(self.reports.files(&result, || room_report::json(&result, &walls, &error)));
         let destinations: Vec<Destination> = files.iter().map(|(destination, _)| destination.clone()).collect();
-        let text = room_report::text(&outcome, &error);
+        let text = room_report::text(&result, &error);
         say_written(&destinations, &text, write_all(files).map(|()| format!("\nwrote {picture}")))
     }
 }

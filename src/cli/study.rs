@@ -11,7 +11,7 @@ use super::values::{parse_integer, parse_within};
 use super::{DeviceArgs, End, complain, help, say};
 use crate::error::Result;
 use crate::gpu::Gpu;
-use crate::measure::study::{self, Request, peers};
+use crate::measure::study::{self, StudyRequest, peers};
 use crate::output::destination::Folder;
 use crate::render::options::row;
 use crate::render::{Event, Observer, PreparedScene, Seconds};
@@ -63,38 +63,38 @@ pub(super) fn scene_help() -> String {
 }
 
 pub(super) fn run(args: &StudyArgs, cancelled: &AtomicBool) -> Result<End> {
-    let view = &args.request.0;
-    view.check_camera()?;
+    let render_request = &args.request.0;
+    render_request.check_camera()?;
     let folder = Folder::open("-o", &args.output)?;
     let budget = study::budget(args.budget.0)?;
     let request = |is_cpu: bool| {
-        let usual = Request::usual(&view.scene, is_cpu);
-        Request {
+        let usual = StudyRequest::usual(&render_request.scene, is_cpu);
+        StudyRequest {
             size: args.side.unwrap_or(usual.size),
             photons: args.photons.unwrap_or(usual.photons),
             repeats: args.repeats,
             seed: args.seed,
             reference_samples: args.reference_samples,
             budget,
-            view: view.words().split_off(1),
+            scene_options: render_request.words().split_off(1),
             most_rounds: args.rounds,
             ..usual
         }
     };
     request(true).validate()?;
     let reporter = ProgressReporter::new(&args.progress);
-    let tell = |event: Event| reporter.event(event);
-    let observer = Observer { cancelled, tell: &tell };
-    let mut scene = Scene::clone(&PreparedScene::read(view, &observer)?.scene);
-    if CAMERA.iter().any(|field| row(field).is_some_and(|row| row.text(view).is_some())) {
+    let report = |event: Event| reporter.event(event);
+    let observer = Observer { cancelled, report: &report };
+    let mut scene = Scene::clone(&PreparedScene::read(render_request, &observer)?.scene);
+    if CAMERA.iter().any(|field| row(field).is_some_and(|row| row.text(render_request).is_some())) {
         // The first camera is the one that is studied.
-        let (camera, _) = view.viewpoint(&scene, None, &observer)?;
+        let (camera, _) = render_request.viewpoint(&scene, None, &observer)?;
         scene.cameras.insert(0, camera);
     }
     let gpu = Gpu::open(&args.device.steady())?;
     reporter.device(Some(&gpu));
-    let peers = args.peers.as_ref().map_or(Ok(Vec::new()), |path| peers::read(path, &view.scene))?;
-    let request = Request { peers, ..request(gpu.facts().kind == "cpu") };
+    let peers = args.peers.as_ref().map_or(Ok(Vec::new()), |path| peers::read(path, &render_request.scene))?;
+    let request = StudyRequest { peers, ..request(gpu.facts().kind == "cpu") };
     reporter.note(&format!(
         "plan: {}, {side} along a side; {} photons per round, {} runs of each point; stops measuring after {} s",
         scene.name,

@@ -16,7 +16,7 @@ use crate::render::{Event, Inputs, Observer, Percent, PreparedScene, RenderReque
 use crate::scene::Camera;
 use crate::settings::RoomSettings;
 use crate::settings::scene::{SceneSettings, Stop};
-use crate::view::{self, Subject, ViewRequest};
+use crate::window::{self, ViewedScene, WindowRequest};
 
 pub(super) const HELP: &str = "\
 Examples:
@@ -58,30 +58,30 @@ fn check_box(request: &RenderRequest) -> Result<()> {
 pub(super) fn run(args: &ViewArgs, cancelled: &AtomicBool) -> Result<End> {
     let request = &args.request.0;
     let reporter = ProgressReporter::new(&args.progress);
-    let tell = |event: Event| reporter.event(event);
-    let observer = Observer { cancelled, tell: &tell };
+    let report = |event: Event| reporter.event(event);
+    let observer = Observer { cancelled, report: &report };
     let is_box = request.scene == BOX;
     let (error, seconds) = (args.error.map(Percent::share), args.time.map(|Seconds(seconds)| seconds));
     let stop = Stop { error, seconds, ..Stop::default() };
-    let (subject, size) = if is_box {
+    let (viewed, size) = if is_box {
         check_box(request)?;
         let settings = request.room_settings();
         RoomSettings { stop, ..settings }.validate()?;
         // Its camera is none of a scene.
         let camera = Camera::looking_at("box", DVec3::Z, DVec3::ZERO, DVec3::Y, 1.0);
         let size = request.size.map(|_| size_of(request.size, &camera, &observer)).transpose()?;
-        (Subject::Box, size.map(<[u32; 2]>::from))
+        (ViewedScene::Box, size.map(<[u32; 2]>::from))
     } else {
         request.check_camera()?;
         let settings = Inputs::open(request)?.settings;
         SceneSettings { stop, ..settings }.validate()?;
         let scene = Arc::new(PreparedScene::read(request, &observer)?);
         let (camera, size) = request.viewpoint(&scene.scene, None, &observer)?;
-        (Subject::Scene { scene, camera }, request.size.map(|_| size))
+        (ViewedScene::Scene { scene, camera }, request.size.map(|_| size))
     };
     reporter.finish();
     let scene = if is_box { String::new() } else { request.scene.clone() };
     let request = RenderRequest { scene, error: args.error, time: args.time, size: None, ..request.clone() };
-    view::run(ViewRequest { subject, request, size, options: args.device.options(), cancelled })?;
+    window::run(WindowRequest { viewed, request, size, options: args.device.options(), cancelled })?;
     Ok(End::Finished)
 }

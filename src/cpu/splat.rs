@@ -29,7 +29,7 @@ pub(crate) struct Splats<'a> {
 
 /// Most bytes of all tasks' steps.
 const STEPS_BYTES: usize = 1 << 28;
-/// Rows that a photon is held against at once: as many as the widest vector has numbers.
+/// Rows that a photon is checked against at once: as many as the widest vector has numbers.
 const LANES: usize = 16;
 
 /// The texels of a wall, row by row.

@@ -17,8 +17,8 @@ use super::emission::emit_from_disc;
 use super::room::{intersect_room, wall_frame};
 use super::sampling::{sample_cosine_hemisphere, to_world};
 use crate::constants::FACE_COUNT;
-use crate::path::Path;
 use crate::photon::Photon;
+use crate::photon_state::PhotonState;
 use crate::plan::{EmissionRange, RoomPlan};
 use crate::records::{DiscLight, RandomKey, Room, Tally, Wall};
 use crate::rng::{self, Rng, words};
@@ -57,7 +57,7 @@ pub(crate) struct Block {
 }
 
 /// Paths in flight.
-struct Paths {
+struct PhotonStates {
     position: [Column<f32>; 3],
     direction: [Column<f32>; 3],
     wall: Column<u32>,
@@ -108,14 +108,14 @@ impl<'a> Tracer<'a> {
         }
     }
 
-    /// Paths of a chunk as they leave their lights.
-    pub(crate) fn emit(&self, round: u32, ranges: &[EmissionRange]) -> Vec<Path> {
+    /// Paths of a chunk as lights emit them.
+    pub(crate) fn emit(&self, round: u32, ranges: &[EmissionRange]) -> Vec<PhotonState> {
         let key = self.plan.streams().key(round);
         let of_part = |range: EmissionRange| {
-            let mut paths = Paths::none();
+            let mut paths = PhotonStates::none();
             self.emit_paths(&key, &range, &mut paths);
             let flux = self.lights[range.light as usize].flux;
-            (0..range.count as usize).map(move |i| Path {
+            (0..range.count as usize).map(move |i| PhotonState {
                 position: vector(&paths.position, i),
                 wall: number(&paths.wall, i),
                 direction: vector(&paths.direction, i),
@@ -128,7 +128,7 @@ impl<'a> Tracer<'a> {
     }
 
     #[inline(always)]
-    fn emit_paths(&self, key: &RandomKey, range: &EmissionRange, paths: &mut Paths) {
+    fn emit_paths(&self, key: &RandomKey, range: &EmissionRange, paths: &mut PhotonStates) {
         match self.plan.settings.rng {
             Rng::Rand48 => self.emit_by(Rng::Rand48, key, range, paths),
             Rng::Mt => self.emit_by(Rng::Mt, key, range, paths),
@@ -139,7 +139,7 @@ impl<'a> Tracer<'a> {
 
     /// `rng` is a constant where this is inlined, so that the loop over paths has no branch.
     #[inline(always)]
-    fn emit_by(&self, rng: Rng, key: &RandomKey, range: &EmissionRange, paths: &mut Paths) {
+    fn emit_by(&self, rng: Rng, key: &RandomKey, range: &EmissionRange, paths: &mut PhotonStates) {
         let light = self.lights[range.light as usize];
         let wall = self.walls[light.wall as usize];
         let law = self.plan.settings.emission;
@@ -236,7 +236,7 @@ fn pick<T: Copy, const N: usize>(survivors: &[u8], from: &[Column<T>; N], to: &m
 }
 
 #[inline(always)]
-fn draw(rng: Rng, key: &RandomKey, bounce: u32, count: usize, paths: &mut Paths, hits: &mut Hits) {
+fn draw(rng: Rng, key: &RandomKey, bounce: u32, count: usize, paths: &mut PhotonStates, hits: &mut Hits) {
     match rng {
         Rng::Rand48 => draw_by(Rng::Rand48, key, bounce, count, paths, hits),
         Rng::Mt => draw_by(Rng::Mt, key, bounce, count, paths, hits),
@@ -246,7 +246,7 @@ fn draw(rng: Rng, key: &RandomKey, bounce: u32, count: usize, paths: &mut Paths,
 }
 
 #[inline(always)]
-fn draw_by(rng: Rng, key: &RandomKey, bounce: u32, count: usize, paths: &mut Paths, hits: &mut Hits) {
+fn draw_by(rng: Rng, key: &RandomKey, bounce: u32, count: usize, paths: &mut PhotonStates, hits: &mut Hits) {
     for group in 0..count.div_ceil(LANES) {
         let mut streams = [paths.stream[0][group], paths.stream[1][group]];
         let u = rng::draw_bounces(rng, key, &paths.photon[group], bounce, &mut streams);
@@ -256,7 +256,7 @@ fn draw_by(rng: Rng, key: &RandomKey, bounce: u32, count: usize, paths: &mut Pat
 }
 
 #[inline(always)]
-fn next_hits(room: &Room, count: usize, paths: &Paths, hits: &mut Hits) {
+fn next_hits(room: &Room, count: usize, paths: &PhotonStates, hits: &mut Hits) {
     for group in 0..count.div_ceil(LANES) {
         for lane in 0..LANES {
             let at = |columns: &[Column<f32>; 3]| Vec3::new(columns[0][group][lane], columns[1][group][lane], columns[2][group][lane]);
@@ -269,7 +269,7 @@ fn next_hits(room: &Room, count: usize, paths: &Paths, hits: &mut Hits) {
 
 /// The directions in which walls reflect.
 #[inline(always)]
-fn reflect(count: usize, u: &[Column<f32>; 2], paths: &mut Paths) {
+fn reflect(count: usize, u: &[Column<f32>; 2], paths: &mut PhotonStates) {
     for group in 0..count.div_ceil(LANES) {
         for lane in 0..LANES {
             let local = sample_cosine_hemisphere(u[0][group][lane], u[1][group][lane]);
@@ -278,9 +278,9 @@ fn reflect(count: usize, u: &[Column<f32>; 2], paths: &mut Paths) {
     }
 }
 
-impl Paths {
-    fn none() -> Paths {
-        Paths { position: [NO_NUMBERS; 3], direction: [NO_NUMBERS; 3], wall: NO_WORDS, photon: NO_WORDS, stream: [NO_WORDS; 2] }
+impl PhotonStates {
+    fn none() -> PhotonStates {
+        PhotonStates { position: [NO_NUMBERS; 3], direction: [NO_NUMBERS; 3], wall: NO_WORDS, photon: NO_WORDS, stream: [NO_WORDS; 2] }
     }
 
     fn are_finite(&self, i: usize) -> bool {
@@ -308,7 +308,7 @@ impl WithSimd for TraceBlock<'_> {
         odd.clear();
         tallies.clear();
         tallies.resize(settings.bounces as usize, Tally::default());
-        let (paths, next) = (&mut Paths::none(), &mut Paths::none());
+        let (paths, next) = (&mut PhotonStates::none(), &mut PhotonStates::none());
         let (mut paths, mut next) = (paths, next);
         let mut hits = Hits { position: [NO_NUMBERS; 3], wall: NO_WORDS, roulette: NO_NUMBERS, u: [NO_NUMBERS; 2] };
         let mut u = [NO_NUMBERS; 2];

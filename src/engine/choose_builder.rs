@@ -34,7 +34,7 @@ pub(crate) struct Candidate {
     pub ms: Spread,
 }
 
-/// Photons that are enough to tell builders apart: a card's change places up to there.
+/// Photons that are enough to distinguish builders: a card's change places up to there.
 fn most_photons(gpu: &Gpu) -> u32 {
     if gpu.facts().kind == "cpu" { 1 << 20 } else { 1 << 22 }
 }

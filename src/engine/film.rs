@@ -1,4 +1,4 @@
-//! The core of all films: exact sums over blocks of rounds and of the squares of what each block left, whose spread tells the
+//! The core of all films: exact sums over blocks of rounds and of the squares of what each block left, whose spread shows the
 //! error. Sums are integers, so that it does not matter in which order photons, chunks, blocks or devices add to them.
 
 use super::error::degrees_of_freedom::{DegreesOfFreedom, concentration};
@@ -70,7 +70,7 @@ impl BlockSums {
         })
     }
 
-    /// Independent numbers that tell a standard error: the blocks less one.
+    /// Independent numbers that give a standard error: the blocks less one.
     pub fn error_freedom(&self) -> u32 {
         self.blocks.saturating_sub(1)
     }

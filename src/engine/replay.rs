@@ -1,4 +1,4 @@
-//! `--replay`: the name of a photon, and what both worlds tell of it.
+//! `--replay`: the name of a photon, and what both worlds say of it.
 
 use super::nonfinite_values::NonfiniteValues;
 use crate::error::{Error, Result};
@@ -22,7 +22,7 @@ impl std::fmt::Display for PhotonName {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Replayed<Start, Vertex> {
     pub name: PhotonName,
-    /// As it leaves its light.
+    /// As a light emits it.
     pub start: Start,
     pub vertices: Vec<Vertex>,
     pub fate: &'static str,

@@ -1,5 +1,5 @@
 //! Fates of paths while kernels count them: a tally for each bounce in `TALLY_COPIES` copies, which work
-//! groups take in turn.
+//! groups use round-robin.
 
 use crate::constants::TALLY_COPIES;
 use crate::error::Result;

@@ -45,7 +45,7 @@ pub(super) fn prepare(gpu: &Gpu) -> Result<()> {
     gpu.prepare(&[MeasureFloat::MODULE], &Constants::new(GROUP_SIZE))
 }
 
-/// Keeps a card busy for a while, so that what follows at once runs at the clock of work. Does nothing on a software device,
+/// Keeps a card busy for a while, so that what follows at once runs at full clock. Does nothing on a software device,
 /// which has no clock of its own.
 pub(crate) fn warm_up(gpu: &Gpu, time: Duration) -> Result<()> {
     if gpu.facts().kind == "cpu" {

@@ -41,7 +41,7 @@ pub struct DeviceFacts {
     pub int64_atomics: bool,
     /// What brings the lanes of a subgroup together again after they went different ways.
     pub(crate) reconvergence: Reconvergence,
-    /// Lanes vote right in a loop in which they go different ways, as the start-up check found; false before it.
+    /// Subgroup votes are right in a loop in which lanes go different ways, as the start-up check found; false before it.
     #[serde(skip)]
     pub votes_in_loops: bool,
     /// What the device lacks of what every kernel needs; empty if it can be used.

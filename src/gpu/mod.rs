@@ -64,7 +64,7 @@ pub struct Options {
     pub validate: bool,
     /// Time every dispatch beside every pass; each costs two more timestamps.
     pub time_dispatches: bool,
-    /// Keep a card busy before the first round of every run, so that its times are those of a card at work.
+    /// Keep a card busy before the first round of every run, so that its times are taken at full clock.
     pub warm_up: bool,
     /// Bytes that all buffers of the device may take together; `None` for half of its memory.
     pub memory: Option<u64>,

@@ -17,7 +17,7 @@ pub(super) struct Pace {
 /// What is known of a scope.
 #[derive(Default)]
 struct Known {
-    /// That a unit of work took lately at most; 0 as long as all of it took too little time to tell.
+    /// That a unit of work took lately at most; 0 as long as all of it took too little time to measure.
     seconds: f64,
     /// Work that was done between two submissions at most.
     most: u64,

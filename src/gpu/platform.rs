@@ -20,7 +20,7 @@ const ELSEWHERE: &[&str] = if cfg!(target_os = "macos") {
     &[]
 };
 
-/// What is told to a user without the loader.
+/// What a user without the loader reads.
 pub(super) const NO_LOADER: &str =
     if cfg!(windows) { "the Vulkan loader (vulkan-1.dll) is not installed" } else { "the Vulkan loader (libvulkan) is not installed" };
 

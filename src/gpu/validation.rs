@@ -24,7 +24,7 @@ impl Messages {
         let info = vk::DebugUtilsMessengerCreateInfoEXT::default()
             .message_severity(vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR)
             .message_type(vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION | vk::DebugUtilsMessageTypeFlagsEXT::PERFORMANCE)
-            .pfn_user_callback(Some(keep))
+            .pfn_user_callback(Some(record_message))
             .user_data((&raw const *list).cast_mut().cast());
         // SAFETY: the callback gets the list, which lives as long as the messenger.
         let messenger = call("vkCreateDebugUtilsMessengerEXT", || unsafe { loader.create_debug_utils_messenger(&info, None) })?;
@@ -46,7 +46,7 @@ impl Messages {
 }
 
 /// Called by the layer on any thread.
-unsafe extern "system" fn keep(
+unsafe extern "system" fn record_message(
     _severity: vk::DebugUtilsMessageSeverityFlagsEXT,
     _kind: vk::DebugUtilsMessageTypeFlagsEXT,
     message: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,

@@ -20,7 +20,7 @@ use crate::text::percent;
 
 /// What each picture may take.
 #[derive(Debug, Clone)]
-pub(crate) struct Request {
+pub(crate) struct GalleryRequest {
     /// Pixels along the width.
     pub width: u32,
     /// In percent.
@@ -34,20 +34,25 @@ pub(crate) struct Request {
 const EXHIBITS: &str = include_str!("gallery.txt");
 
 /// Runs every command, and writes the page. False if it was interrupted; the page has what was done by then.
-pub(crate) fn make(folder: &Folder, request: &Request, cancelled: &AtomicBool, tell: &mut dyn FnMut(&str)) -> Result<bool> {
+pub(crate) fn make(
+    folder: &Folder,
+    request: &GalleryRequest,
+    cancelled: &AtomicBool,
+    report_progress: &mut dyn FnMut(&str),
+) -> Result<bool> {
     let path = folder.path();
     std::fs::create_dir_all(path).map_err(|error| Error::Output {
         option: "-o",
         path: path.to_owned(),
         reason: error.kind().to_string(),
     })?;
-    let Request { width, error, seconds, .. } = request;
+    let GalleryRequest { width, error, seconds, .. } = request;
     let in_full = EXHIBITS.replace("SIZE", &format!("--size {width}")).replace("END", &format!("--error {error}% --time {seconds}s"));
     let exhibits: Vec<Vec<&str>> = in_full.split("\n\n").map(|paragraph| paragraph.lines().collect()).collect();
     let (mut figures, mut device) = (Vec::new(), String::new());
     for (number, exhibit) in (1..).zip(&exhibits) {
         let [title, caption, command, files] = exhibit[..] else { unreachable!("four lines each") };
-        tell(&format!("[{number}/{}] {title}", exhibits.len()));
+        report_progress(&format!("[{number}/{}] {title}", exhibits.len()));
         let made = run(path, command, &request.device);
         if cancelled.load(Ordering::Relaxed) {
             break;
@@ -81,7 +86,7 @@ fn run(folder: &Path, command: &str, device: &[String]) -> Result<Value> {
 
 /// A picture; one of errors in false colours, which is kept as a PNG beside it.
 fn open(path: &Path) -> Result<RgbImage> {
-    let picture = image::open(path).map_err(|error| Error::Picture { path: path.to_owned(), reason: error.to_string() })?;
+    let picture = image::open(path).map_err(|error| Error::Image { path: path.to_owned(), reason: error.to_string() })?;
     if path.extension().is_none_or(|extension| extension != "exr") {
         return Ok(picture.into_rgb8());
     }

@@ -67,13 +67,13 @@ impl Tone {
 
 /// Row by row from the top, linear scene-referred values.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct ColourPicture {
+pub(crate) struct ColourImage {
     pub width: u32,
     pub height: u32,
     pub pixels: Vec<Vec3>,
 }
 
-impl ColourPicture {
+impl ColourImage {
     /// `stops` doubles the brightness of a PNG so many times, before the tone curve; an EXR holds the values untouched.
     pub(crate) fn encode(&self, format: Format, stops: f32, tone: Tone, metadata: Option<&Metadata>) -> Vec<u8> {
         match format {
@@ -240,7 +240,7 @@ mod tests {
     #[test]
     fn exr_values_come_back_untouched() {
         let pixels = vec![Vec3::new(0.0, 1e-6, 12345.678), Vec3::splat(3.0)];
-        let picture = ColourPicture { width: 2, height: 1, pixels: pixels.clone() };
+        let picture = ColourImage { width: 2, height: 1, pixels: pixels.clone() };
         let read = image::load_from_memory(&picture.encode(Format::Exr, 5.0, Tone::Neutral, None)).unwrap().into_rgb32f();
         let values: Vec<f32> = pixels.iter().flat_map(Vec3::to_array).collect();
         assert_eq!(read.into_raw(), values);
@@ -248,8 +248,8 @@ mod tests {
 
     #[test]
     fn usual_exposure_brings_a_grey_wall_to_the_middle() {
-        let picture = ColourPicture { width: 10, height: 1, pixels: [vec![Vec3::splat(4.0); 9], vec![Vec3::splat(1e6)]].concat() };
+        let picture = ColourImage { width: 10, height: 1, pixels: [vec![Vec3::splat(4.0); 9], vec![Vec3::splat(1e6)]].concat() };
         assert!((4.0 * picture.usual_exposure().exp2() - 0.18).abs() < 1e-5);
-        assert_eq!(ColourPicture { width: 1, height: 1, pixels: vec![Vec3::ZERO] }.usual_exposure(), 0.0);
+        assert_eq!(ColourImage { width: 1, height: 1, pixels: vec![Vec3::ZERO] }.usual_exposure(), 0.0);
     }
 }

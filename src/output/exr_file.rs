@@ -6,7 +6,7 @@ use exr::prelude::*;
 
 use super::metadata::Metadata;
 use crate::engine::error::bound::ErrorSource;
-use crate::scene::linear_picture::check_layers;
+use crate::scene::linear_image::check_layers;
 
 /// Of a file that is read: as many as a picture may have.
 const MOST_PIXELS: u64 = 1 << 28;

@@ -13,7 +13,7 @@ use crate::scene::room::{RoomScene, face_axis};
 
 /// A grey picture, row by row from the top.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Picture {
+pub(crate) struct GreyImage {
     pub width: usize,
     pub height: usize,
     pub values: Vec<f64>,
@@ -70,8 +70,8 @@ const VIEW_PIXELS: usize = 3 * WALL_PIXELS / 2;
 const RAYS: usize = 3;
 
 /// The unfolded walls on the left, four views on the right.
-pub(crate) fn overview(scene: &RoomScene, walls: &[WallEstimate]) -> Picture {
-    let mut picture = Picture::black(3 * WALL_PIXELS + 2 * VIEW_PIXELS, 3 * WALL_PIXELS);
+pub(crate) fn overview(scene: &RoomScene, walls: &[WallEstimate]) -> GreyImage {
+    let mut picture = GreyImage::black(3 * WALL_PIXELS + 2 * VIEW_PIXELS, 3 * WALL_PIXELS);
     picture.paste(&unfolded(scene, walls), 0, 0);
     for (place, eye) in VIEWS.iter().enumerate() {
         let view = perspective(scene, &illumination(walls), eye.1, VIEW_PIXELS);
@@ -81,12 +81,12 @@ pub(crate) fn overview(scene: &RoomScene, walls: &[WallEstimate]) -> Picture {
 }
 
 /// The box from one of [`VIEWS`].
-pub(crate) fn view(scene: &RoomScene, walls: &[WallEstimate], number: usize, pixels: usize) -> Picture {
+pub(crate) fn view(scene: &RoomScene, walls: &[WallEstimate], number: usize, pixels: usize) -> GreyImage {
     view_of_values(scene, &illumination(walls), number, pixels)
 }
 
 /// The same with values of any kind, of the texels of each face.
-pub(crate) fn view_of_values(scene: &RoomScene, walls: &[(usize, &[f64])], number: usize, pixels: usize) -> Picture {
+pub(crate) fn view_of_values(scene: &RoomScene, walls: &[(usize, &[f64])], number: usize, pixels: usize) -> GreyImage {
     perspective(scene, walls, VIEWS[number].1, pixels)
 }
 
@@ -95,10 +95,10 @@ fn illumination(walls: &[WallEstimate]) -> Vec<(usize, &[f64])> {
 }
 
 /// The walls folded out around the back wall, as one looks in through the opening.
-pub(crate) fn unfolded(scene: &RoomScene, walls: &[WallEstimate]) -> Picture {
+pub(crate) fn unfolded(scene: &RoomScene, walls: &[WallEstimate]) -> GreyImage {
     let (min, max) = (scene.min_corner, scene.max_corner);
     let side = WALL_PIXELS;
-    let mut picture = Picture::black(3 * side, 3 * side);
+    let mut picture = GreyImage::black(3 * side, 3 * side);
     for (face, texture) in Texture::of_walls(scene, &illumination(walls)) {
         // Column and row of the wall's square, and its point at (x, y), both from 0 to 1 with y up.
         type Unfold = fn(DVec3, DVec3, f64, f64) -> DVec3;
@@ -135,7 +135,7 @@ pub(crate) const VIEWS: [(&str, [f64; 3]); 4] = [
 ];
 
 /// Only the insides of walls are drawn, so that a wall between eye and box does not hide it.
-fn perspective(scene: &RoomScene, walls: &[(usize, &[f64])], eye: [f64; 3], pixels: usize) -> Picture {
+fn perspective(scene: &RoomScene, walls: &[(usize, &[f64])], eye: [f64; 3], pixels: usize) -> GreyImage {
     let centre = 0.5 * (scene.min_corner + scene.max_corner);
     let half = 0.5 * (scene.max_corner - scene.min_corner).max_element();
     let eye = centre + half * DVec3::from(eye);
@@ -165,7 +165,7 @@ fn perspective(scene: &RoomScene, walls: &[(usize, &[f64])], eye: [f64; 3], pixe
         });
         hits.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(0.0, |(_, value)| value)
     };
-    let mut picture = Picture::black(pixels, pixels);
+    let mut picture = GreyImage::black(pixels, pixels);
     for j in 0..pixels {
         for i in 0..pixels {
             let sum: f64 = (0..RAYS * RAYS)
@@ -181,13 +181,13 @@ fn perspective(scene: &RoomScene, walls: &[(usize, &[f64])], eye: [f64; 3], pixe
     picture
 }
 
-impl Picture {
-    pub(crate) fn black(width: usize, height: usize) -> Picture {
-        Picture { width, height, values: vec![0.0; width * height] }
+impl GreyImage {
+    pub(crate) fn black(width: usize, height: usize) -> GreyImage {
+        GreyImage { width, height, values: vec![0.0; width * height] }
     }
 
     /// Copies another picture in, its upper left corner at (column, row).
-    pub(crate) fn paste(&mut self, other: &Picture, column: usize, row: usize) {
+    pub(crate) fn paste(&mut self, other: &GreyImage, column: usize, row: usize) {
         for j in 0..other.height {
             let to = (row + j) * self.width + column;
             self.values[to..to + other.width].copy_from_slice(&other.values[j * other.width..(j + 1) * other.width]);
@@ -247,7 +247,7 @@ pub(crate) mod tests {
 
     #[test]
     fn an_exr_holds_the_values_untouched() {
-        let picture = Picture { width: 2, height: 1, values: vec![0.125, 7.5] };
+        let picture = GreyImage { width: 2, height: 1, values: vec![0.125, 7.5] };
         let read =
             image::load_from_memory_with_format(&picture.encode(Format::Exr, None), image::ImageFormat::OpenExr).unwrap().into_rgb32f();
         assert_eq!(read.into_raw(), [0.125, 0.125, 0.125, 7.5, 7.5, 7.5]);

@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::colour::Format;
 use super::destination::{Destination, Folder};
 use super::exr_file::{channels, encode_errors};
-use super::image::Picture;
+use super::image::GreyImage;
 use crate::engine::error::bound::ErrorSource;
 use crate::engine::room::film::WallEstimate;
 use crate::scene::room::RoomScene;
@@ -75,7 +75,7 @@ pub(crate) fn files(
             Quantity::Radiosity => (&wall.radiosity, &wall.radiosity_error),
         };
         let mesh = values.len().isqrt();
-        let picture = |values: Vec<f64>| Picture { width: mesh, height: mesh, values }.encode(Format::Exr, None);
+        let picture = |values: Vec<f64>| GreyImage { width: mesh, height: mesh, values }.encode(Format::Exr, None);
         let [file, error_file] = names(wall.name);
         files.push((folder.file(&file), picture(values.clone())));
         files.push((folder.file(&error_file), error_picture(mesh as u32, errors, source)));

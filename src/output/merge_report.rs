@@ -45,7 +45,7 @@ pub(crate) fn json(run: &SavedRun, film: &SceneFilm, missing: &[String]) -> Vec<
     serde_json::to_vec_pretty(&report).expect("a report is plain data")
 }
 
-/// `film` where its errors can be told without the scene.
+/// `film` where its errors are known without the scene.
 pub(crate) fn text(run: &SavedRun, files: usize, film: Option<&SceneFilm>) -> String {
     let SavedRun { identity, wanted, .. } = run;
     let (blocks, files) = (counted(run.done.count(), "block"), counted(files as u64, "file"));

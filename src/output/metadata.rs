@@ -33,7 +33,7 @@ pub struct Metadata {
     pub seed: u64,
     /// Rounds that the picture holds.
     pub rounds: u32,
-    /// Independent numbers that tell each standard error: the blocks of rounds less one.
+    /// Independent numbers that give each standard error: the blocks of rounds less one.
     pub degrees_of_freedom: u32,
     /// Relative error of the noise, and what it is at most with this confidence; `None` where it is not known.
     pub error: Option<f64>,

@@ -32,7 +32,7 @@ pub(super) struct Common<'a, Settings> {
     /// Why it ended, and rounds that the result holds.
     end: End,
     rounds: u32,
-    /// Whole blocks of rounds, of which the spread tells the errors; and photons of one that was cut short.
+    /// Whole blocks of rounds, of which the spread gives the errors; and photons of one that was cut short.
     blocks: u32,
     photons_left_out: u64,
     /// Light that limits kept from the result.

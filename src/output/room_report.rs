@@ -36,7 +36,7 @@ struct Report<'a> {
 struct PlanReport<'a> {
     decisions: &'a [Decision],
     light_photons: &'a [u32],
-    /// That the atomic builder's work groups take turns at.
+    /// That the atomic builder's work groups use round-robin.
     counters: u32,
     chunks_per_round: u32,
     photon_map_entries: u32,
@@ -58,13 +58,13 @@ struct WallReport {
 }
 
 /// The run as JSON.
-pub(crate) fn json(outcome: &RunResult, walls: &[WallEstimate], error: &FilmError) -> Vec<u8> {
-    let plan = &outcome.plan;
+pub(crate) fn json(result: &RunResult, walls: &[WallEstimate], error: &FilmError) -> Vec<u8> {
+    let plan = &result.plan;
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-    let driver = host_driver(outcome);
+    let driver = host_driver(result);
     let report = Report {
-        common: common(outcome, &plan.settings, error, plan.settings.stop.confidence, &driver),
-        device_facts: outcome.device.as_ref(),
+        common: common(result, &plan.settings, error, plan.settings.stop.confidence, &driver),
+        device_facts: result.device.as_ref(),
         seed: plan.settings.seed,
         plan: PlanReport {
             decisions: &plan.decisions,
@@ -78,9 +78,9 @@ pub(crate) fn json(outcome: &RunResult, walls: &[WallEstimate], error: &FilmErro
             film_channels: plan.channel_count,
             film_fixed_point_bits: plan.film_shift,
         },
-        cancelled: outcome.is_cancelled(),
-        ledger: outcome.ledger(),
-        bounces: &outcome.fates[0].bounces,
+        cancelled: result.is_cancelled(),
+        ledger: result.ledger(),
+        bounces: &result.fates[0].bounces,
         walls: walls
             .iter()
             .map(|wall| WallReport {
@@ -95,29 +95,29 @@ pub(crate) fn json(outcome: &RunResult, walls: &[WallEstimate], error: &FilmErro
 }
 
 /// What takes the place of a driver where the CPU runs alone.
-fn host_driver(outcome: &RunResult) -> String {
-    format!("photonmill on {}", counted(outcome.plan.settings.threads, "thread"))
+fn host_driver(result: &RunResult) -> String {
+    format!("photonmill on {}", counted(result.plan.settings.threads, "thread"))
 }
 
-/// What the film tells of its error. Of a box without light nothing is known.
-pub(crate) fn error(outcome: &RunResult, scene: &RoomScene) -> FilmError {
-    let RunResult { plan, film, .. } = outcome;
+/// What the film says of its error. Of a box without light nothing is known.
+pub(crate) fn error(result: &RunResult, scene: &RoomScene) -> FilmError {
+    let RunResult { plan, film, .. } = result;
     // W of a photon of relative flux 1.
     let watts = plan.flux_unit / film.emitted.max(1) as f64;
     let error = film.error(&irradiance_weights(scene, plan), watts, &plan.settings.stop);
     let is_lit = (0..film.point_count()).any(|point| !film.is_unreached(point));
-    FilmError { noise: if is_lit { error.noise } else { f64::INFINITY }, bias: outcome.bias, ..error }.stated()
+    FilmError { noise: if is_lit { error.noise } else { f64::INFINITY }, bias: result.bias, ..error }.stated()
 }
 
 /// The run in words: device, settings, ledger, errors and timing table.
-pub(crate) fn text(outcome: &RunResult, error: &FilmError) -> String {
-    let settings = &outcome.plan.settings;
-    let mut text = outcome.device.as_ref().map_or_else(|| format!("CPU, {}", host_driver(outcome)), DeviceFacts::label) + "\n";
-    outcome.more_devices.iter().for_each(|facts| writeln!(text, "{}", facts.label()).unwrap());
+pub(crate) fn text(result: &RunResult, error: &FilmError) -> String {
+    let settings = &result.plan.settings;
+    let mut text = result.device.as_ref().map_or_else(|| format!("CPU, {}", host_driver(result)), DeviceFacts::label) + "\n";
+    result.more_devices.iter().for_each(|facts| writeln!(text, "{}", facts.label()).unwrap());
     text += &format!(
         "open-box, {}: {} of {} photons, {}, radius {} m, {} gather{}, {} sums, {} seed {}\n",
         settings.builder.name(),
-        counted(outcome.film.rounds.max(1), "round"),
+        counted(result.film.rounds.max(1), "round"),
         settings.photons,
         counted(settings.bounces, "bounce"),
         settings.radius,
@@ -127,14 +127,14 @@ pub(crate) fn text(outcome: &RunResult, error: &FilmError) -> String {
         lower_case(settings.rng),
         settings.seed
     );
-    text += &ended(outcome.end, &settings.stop, outcome.film.rounds, settings.rounds);
-    for decision in &outcome.plan.decisions {
+    text += &ended(result.end, &settings.stop, result.film.rounds, settings.rounds);
+    for decision in &result.plan.decisions {
         let verb = if decision.kept { "with" } else { "without" };
         writeln!(text, "  {verb} {}: {}", decision.effect, decision.reason).unwrap();
     }
     text.push('\n');
-    text.push_str(&ledger(&outcome.ledger()));
-    text.push_str(&losses(&outcome.losses, settings.bounces));
-    text.push_str(&ending(outcome, error, &settings.stop, ("texel", "W/m2")));
+    text.push_str(&ledger(&result.ledger()));
+    text.push_str(&losses(&result.losses, settings.bounces));
+    text.push_str(&ending(result, error, &settings.stop, ("texel", "W/m2")));
     text
 }

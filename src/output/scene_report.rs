@@ -217,16 +217,16 @@ pub(crate) fn radius_warning(plan: &ScenePlan, geometry: &Geometry, point: &str)
 }
 
 /// One line on radii that differ from point to point.
-fn radii(lit: &RunResult) -> Option<String> {
+fn radii(result: &RunResult) -> Option<String> {
     let in_words = |map: &MapPlan| {
-        let (classes, (first, last)) = (map.classes?, lit.film.classes(map)?);
+        let (classes, (first, last)) = (map.classes?, result.film.classes(map)?);
         let times = |class: u32| match class.checked_sub(classes.usual) {
             None | Some(0) => (1u32 << (classes.usual - class)).to_string(),
             Some(halvings) => format!("1/{}", 1u32 << halvings),
         };
         (first != last).then(|| format!("{} to {} times the first radius ({})", times(last), times(first), map.name))
     };
-    let maps: Vec<String> = lit.plan.maps().filter_map(in_words).collect();
+    let maps: Vec<String> = result.plan.maps().filter_map(in_words).collect();
     (!maps.is_empty()).then(|| format!("radii by the density of photons: {}", maps.join(", ")))
 }
 
@@ -286,13 +286,13 @@ pub(crate) fn plan_json(plan: &ScenePlan) -> Vec<u8> {
 }
 
 /// A run as JSON.
-pub fn json(scene: &str, lit: &RunResult) -> Vec<u8> {
-    let RunResult { plan, film, fates, timings, .. } = lit;
+pub fn json(scene: &str, result: &RunResult) -> Vec<u8> {
+    let RunResult { plan, film, fates, timings, .. } = result;
     let confidence = plan.settings.stop.confidence;
-    let error = lit.error();
+    let error = result.error();
     let report = Report {
         scene,
-        common: common(lit, &plan.settings, &error, confidence, ""),
+        common: common(result, &plan.settings, &error, confidence, ""),
         plan: plan_report(plan, Some((timings, &film.part_totals))),
         ledgers: Ledgers { global: fates[0].ledger(), caustic: fates[1].ledger() },
         film: FilmReport {
@@ -305,51 +305,51 @@ pub fn json(scene: &str, lit: &RunResult) -> Vec<u8> {
 }
 
 /// A run in words; `point` is what its results are of: pixel, texel or point.
-pub fn text(scene: &str, lit: &RunResult, point: &str, explain: bool) -> String {
+pub fn text(scene: &str, result: &RunResult, point: &str, explain: bool) -> String {
     let mut text = String::new();
-    let settings = &lit.plan.settings;
-    lit.device.iter().chain(&lit.more_devices).for_each(|facts| writeln!(text, "{}", facts.label()).unwrap());
-    let maps = photons_of(&lit.plan);
+    let settings = &result.plan.settings;
+    result.device.iter().chain(&result.more_devices).for_each(|facts| writeln!(text, "{}", facts.label()).unwrap());
+    let maps = photons_of(&result.plan);
     let capped = if settings.bounces < MAX_BOUNCES { format!(", at most {}", counted(settings.bounces, "bounce")) } else { String::new() };
-    writeln!(text, "{scene}: {} of {maps}{capped}, seed {}", counted(lit.film.rounds, "round"), settings.seed).unwrap();
-    if lit.film.rounds == 1 && lit.end == End::Time {
-        let traced = lit.ledger().emitted;
-        let planned: u64 = lit.plan.maps().map(|map| u64::from(map.photons)).sum();
+    writeln!(text, "{scene}: {} of {maps}{capped}, seed {}", counted(result.film.rounds, "round"), settings.seed).unwrap();
+    if result.film.rounds == 1 && result.end == End::Time {
+        let traced = result.ledger().emitted;
+        let planned: u64 = result.plan.maps().map(|map| u64::from(map.photons)).sum();
         if traced < planned {
             text += &format!(
                 "time was up in the first round, after {traced} of {planned} photons, so the result is noisy and its error unknown; use fewer `photons`, so that several rounds fit into `time`\n"
             );
         }
     }
-    text += &ended(lit.end, &settings.stop, lit.film.rounds, settings.rounds);
+    text += &ended(result.end, &settings.stop, result.film.rounds, settings.rounds);
     if explain {
-        writeln!(text, "\n{}", plan_table(&lit.plan, Some((&lit.timings, &lit.film.part_totals)))).unwrap();
+        writeln!(text, "\n{}", plan_table(&result.plan, Some((&result.timings, &result.film.part_totals)))).unwrap();
     }
-    if let Some(line) = missing(&lit.plan) {
+    if let Some(line) = missing(&result.plan) {
         writeln!(text, "{line}").unwrap();
     }
-    for map in lit.plan.maps() {
-        let fates = &lit.fates[usize::from(map.caustic_only)];
+    for map in result.plan.maps() {
+        let fates = &result.fates[usize::from(map.caustic_only)];
         write!(text, "{} {}", map.name, ledger(&fates.ledger())).unwrap();
         if let Some(open) = fates.totals.map(|totals| totals.interrupted).filter(|open| *open > 0) {
             writeln!(text, "        {open} of those cut off were under way when the run ended, in a round that does not count").unwrap();
         }
     }
-    if let Some(line) = radii(lit) {
+    if let Some(line) = radii(result) {
         writeln!(text, "{line}").unwrap();
     }
-    text.push_str(&losses(&lit.losses, settings.bounces));
-    if lit.film.anomalies[0] > 0 {
-        writeln!(text, "warning: {} (NaN or infinity), added as 0", counted(lit.film.anomalies[0], "nonfinite value")).unwrap();
+    text.push_str(&losses(&result.losses, settings.bounces));
+    if result.film.anomalies[0] > 0 {
+        writeln!(text, "warning: {} (NaN or infinity), added as 0", counted(result.film.anomalies[0], "nonfinite value")).unwrap();
     }
-    if lit.film.anomalies[2] > 0 {
-        let count = counted(lit.film.anomalies[2], "estimate");
+    if result.film.anomalies[2] > 0 {
+        let count = counted(result.film.anomalies[2], "estimate");
         writeln!(text, "warning: no edge correction for {count} over too many triangles; a smaller `radius` mends it").unwrap();
     }
-    let unit = match lit.plan.sensor {
+    let unit = match result.plan.sensor {
         Sensor::Picture { .. } => "W/m2/sr",
         Sensor::Receivers { .. } => "W/m2",
     };
-    text.push_str(&ending(lit, &lit.error(), &settings.stop, (point, unit)));
+    text.push_str(&ending(result, &result.error(), &settings.stop, (point, unit)));
     text
 }

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::colour::{ColourPicture, Format, Tone};
+use super::colour::{ColourImage, Format, Tone};
 use super::exr_file::{self, Channel, channels};
 use super::metadata::Metadata;
 use crate::constants::PART_COUNT;
@@ -138,11 +138,11 @@ impl Show {
         self.denoised.as_ref().map_or_else(|| film.mean(pixel).as_vec3(), |denoised| denoised[pixel])
     }
 
-    fn image(&self, film: &SceneFilm) -> ColourPicture {
+    fn image(&self, film: &SceneFilm) -> ColourImage {
         self.of(film, |pixel| self.radiance(film, pixel))
     }
 
-    fn stops(&self, image: &ColourPicture) -> f32 {
+    fn stops(&self, image: &ColourImage) -> f32 {
         self.exposure.unwrap_or_else(|| image.usual_exposure())
     }
 
@@ -153,8 +153,8 @@ impl Show {
         exr_file::encode_errors(self.size, all, film.error_source())
     }
 
-    fn of(&self, film: &SceneFilm, value: impl Fn(usize) -> Vec3) -> ColourPicture {
+    fn of(&self, film: &SceneFilm, value: impl Fn(usize) -> Vec3) -> ColourImage {
         let (width, height) = self.size;
-        ColourPicture { width, height, pixels: (0..film.pixels()).map(value).collect() }
+        ColourImage { width, height, pixels: (0..film.pixels()).map(value).collect() }
     }
 }

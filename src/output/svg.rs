@@ -10,7 +10,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 /// Lines of the scale; the page gives them its own colour.
 pub(crate) const SCALE: RGBColor = RGBColor(0x99, 0x99, 0x98);
 
-/// Colours that the colour-blind tell apart (Okabe and Ito 2008); the first, grey, is for what the others are compared with. The style sheet
+/// Colours that the colour-blind distinguish (Okabe and Ito 2008); the first, grey, is for what the others are compared with. The style sheet
 /// has brighter ones for dark pages.
 pub(crate) const COLOURS: [RGBColor; 7] = [
     RGBColor(0x80, 0x80, 0x80),

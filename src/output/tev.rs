@@ -10,7 +10,7 @@ use std::time::Duration;
 use tev_client::{PacketCreateImage, PacketUpdateImage, TevClient};
 
 use super::exr_file::Channel;
-use crate::engine::run::watch::Later;
+use crate::engine::run::watch::Lazy;
 use crate::error::{Error, Result};
 
 /// Where tev listens unless it is started with another `--hostname`.
@@ -30,14 +30,14 @@ pub(crate) struct Address {
     pub port: u16,
 }
 
-/// A picture that is made when it is sent.
-type Picture = Later<Vec<Channel>>;
+/// A picture that is computed when it is sent.
+type LazyChannels = Lazy<Vec<Channel>>;
 
 /// A viewer that shows one picture.
 pub(crate) struct Viewer {
     typed: String,
     /// And who sends; `None` once it has gone.
-    sender: Option<(SyncSender<Picture>, JoinHandle<io::Result<()>>)>,
+    sender: Option<(SyncSender<LazyChannels>, JoinHandle<io::Result<()>>)>,
 }
 
 impl Viewer {
@@ -69,10 +69,10 @@ impl Viewer {
     }
 
     /// Sends the picture, unless another is still on its way. Fails once, when the viewer has gone.
-    pub(crate) fn show(&mut self, picture: Picture) -> Result<()> {
+    pub(crate) fn show(&mut self, picture: LazyChannels) -> Result<()> {
         match &self.sender {
             Some((sender, thread)) if !thread.is_finished() => {
-                // Not taken: busy, or just gone, which the next call tells.
+                // Not taken: busy, or just gone, which the next call shows.
                 let _ = sender.try_send(picture);
                 Ok(())
             }
@@ -80,7 +80,7 @@ impl Viewer {
         }
     }
 
-    /// Sends the last picture, and waits until it is there. Fails where the viewer has gone and no call before has told so.
+    /// Sends the last picture, and waits until it is there. Fails where the viewer has gone and no call before has said so.
     pub(crate) fn finish(mut self, picture: Vec<Channel>) -> Result<()> {
         if let Some((sender, _)) = &self.sender {
             // Not taken where the viewer has gone.
@@ -98,7 +98,7 @@ impl Viewer {
 }
 
 /// Until nobody has more, or the viewer has gone.
-fn send_all(mut client: TevClient, name: &str, (width, height): (u32, u32), pictures: &Receiver<Picture>) -> io::Result<()> {
+fn send_all(mut client: TevClient, name: &str, (width, height): (u32, u32), pictures: &Receiver<LazyChannels>) -> io::Result<()> {
     let mut shown: Vec<String> = Vec::new();
     for picture in pictures {
         let channels = picture();

@@ -15,8 +15,8 @@ use crate::constants::{
     FACE_COUNT, HIT_KINDS, MAX_NONFINITE_VALUES, NONFINITE_ESTIMATE, PART_COUNT, RADIUS_CLASSES, SCAN_ITEMS, TALLY_COPIES, TOTAL_WORDS,
     TREE_LEAF, TREE_RUN,
 };
-use crate::path::StoredPath;
 use crate::photon::{MapPhoton, Origin, StoredPhoton};
+use crate::photon_state::PackedPhotonState;
 use crate::records::*;
 use crate::scene::albedo;
 use crate::scene::geometry::Geometry;
@@ -79,7 +79,7 @@ pub(crate) mod room {
         LIGHTS: DiscLight = "lights",
         POINTS: Point = "points",
         STREAM_SEEDS: UVec2 = "stream seeds",
-        PATHS: StoredPath = "paths",
+        PATHS: PackedPhotonState = "paths",
         PHOTONS: StoredPhoton = "photons",
         ORIGINS: Origin = "origins",
         COUNTERS: u32 = "counters",
@@ -149,12 +149,12 @@ pub(crate) mod scene {
         PART_TOTALS: u64 = "part totals",
         PART_SUMS: u64 = "part sums",
         LATEST_BLOCKS: f32 = "latest blocks",
-        ONE_HITS: u32 = "one hits",
-        ONE_HITS_OF_BLOCKS: u32 = "one hits of blocks",
+        SINGLE_HITS: u32 = "one hits",
+        SINGLE_HITS_OF_BLOCKS: u32 = "one hits of blocks",
         PASS_SUMS: u64 = "pass sums",
         VISIBLE_POINTS: VisiblePoint = "visible points",
-        MATT_LOBES: MattLobes = "matt lobes",
-        MATT_COVERS: MattCover = "matt covers",
+        ROUGH_LOBES: RoughLobes = "matt lobes",
+        ROUGH_COVERS: RoughCover = "matt covers",
         ESTIMATES: u64 = "estimates",
         NEAR_SUMS: u64 = "near sums",
         DIFFERENCES: u64 = "differences",
@@ -164,14 +164,14 @@ pub(crate) mod scene {
         DISC_CUTS: [u32; 4] = "disc cuts",
         CAMERA_PATHS: CameraPath = "camera paths",
         RECEIVERS: Receiver = "receivers",
-        PATHS: LightPath = "paths",
+        PATHS: PhotonState = "paths",
         MAP: MapPhoton = "map",
         SORTED_MAP: MapPhoton = "sorted map",
         COUNTERS: u32 = "counters",
         DISPATCH_ARGS: DispatchArgs = "dispatch args",
         CELLS: u32 = "cells",
         RANKS: u32 = "ranks",
-        CROWDED_POINTS: u32 = "crowded points",
+        DENSE_POINTS: u32 = "crowded points",
         TALLIES: Tally = "tallies",
         TOTALS: u32 = "totals",
         TALLIES_OF_BLOCKS: Tally = "tallies of blocks",
@@ -355,17 +355,17 @@ impl ScenePlan {
         fn of<T: Pod>(declared: Declared<T>, content: &[T], is_kept: bool, why: &'static str) -> PlannedBuffer {
             declared.listed(if is_kept { content.len() as u64 } else { 0 }, why)
         }
-        let (textured, layered) = (self.keeps(Effect::Textures), self.keeps(Effect::Layers));
-        let has_tangents = textured || self.keeps(Effect::Anisotropy);
-        let has_texels = textured || (self.keeps(Effect::Environment) && geometry.has_sky_picture());
+        let (textured, layered) = (self.simulates(Effect::Textures), self.simulates(Effect::Layers));
+        let has_tangents = textured || self.simulates(Effect::Anisotropy);
+        let has_texels = textured || (self.simulates(Effect::Environment) && geometry.has_sky_picture());
         let (nodes, regions, shares) = self.lights().map_or((0, 0, 0), |of| (of.nodes.len(), of.regions.len(), of.shares.len() + 1));
         vec![
-            of(scene::NODES, &geometry.nodes, self.keeps(Effect::Bvh), "the triangles' hierarchy"),
+            of(scene::NODES, &geometry.nodes, self.simulates(Effect::Bvh), "the triangles' hierarchy"),
             of(scene::TRIANGLES, &geometry.triangles, true, "triangles"),
             scene::PLANES.listed(geometry.planes.len() as u64 + 1, "the triangles' planes"),
-            of(scene::NORMALS, &geometry.normals, self.keeps(Effect::SmoothNormals), "the triangles' normals"),
+            of(scene::NORMALS, &geometry.normals, self.simulates(Effect::SmoothNormals), "the triangles' normals"),
             of(scene::UVS, &geometry.uvs, textured, "the triangles' texture coordinates"),
-            of(scene::VERTEX_COLOURS, &geometry.colours, self.keeps(Effect::VertexColours), "the triangles' vertex colours"),
+            of(scene::VERTEX_COLOURS, &geometry.colours, self.simulates(Effect::VertexColours), "the triangles' vertex colours"),
             of(scene::MATERIALS, &geometry.materials, true, "materials"),
             of(scene::LAYERED_MATERIALS, &geometry.layered_materials, layered, "layers of materials"),
             of(scene::TRIANGLE_LAYERS, &geometry.triangle_layers, layered && has_tangents, "texture coordinates and tangents of layers"),
@@ -384,7 +384,7 @@ impl ScenePlan {
     }
 
     fn has_covers(&self) -> bool {
-        self.keeps(Effect::ClearCoat) || self.keeps(Effect::Sheen) || self.keeps(Effect::Iridescence)
+        self.simulates(Effect::ClearCoat) || self.simulates(Effect::Sheen) || self.simulates(Effect::Iridescence)
     }
 
     /// What grows with the pixels or receivers.
@@ -404,13 +404,13 @@ impl ScenePlan {
             scene::PART_TOTALS.listed(self.part_totals(), "light of each part of a path: in all, in some pixels, and where asked in each"),
             scene::PART_SUMS.listed(self.part_sums(), "sums of all blocks of parts of each pixel's light"),
             scene::LATEST_BLOCKS.listed(PART_VALUES * kept_values(pixels as usize) as u64, "some pixels of the latest blocks"),
-            scene::ONE_HITS.listed(u64::from(HIT_KINDS) * pixels, "what one hit would add where none has"),
-            scene::ONE_HITS_OF_BLOCKS.listed(u64::from(HIT_KINDS) * pixels, "the same as the latest whole block left it"),
+            scene::SINGLE_HITS.listed(u64::from(HIT_KINDS) * pixels, "what one hit would add where none has"),
+            scene::SINGLE_HITS_OF_BLOCKS.listed(u64::from(HIT_KINDS) * pixels, "the same as the latest whole block left it"),
             scene::PASS_SUMS
                 .listed(3 * (if self.film.sees_light { 2 } else { 1 }) * u64::from(self.paths()), "samples of pixels in a round"),
             scene::VISIBLE_POINTS.listed(points, "where photons are looked up"),
-            scene::MATT_LOBES.listed(if self.keeps(Effect::Layers) { points } else { 0 }, "how layered points weigh light"),
-            scene::MATT_COVERS.listed(if self.has_covers() { points } else { 0 }, "coats, sheen and films of visible points"),
+            scene::ROUGH_LOBES.listed(if self.simulates(Effect::Layers) { points } else { 0 }, "how layered points weigh light"),
+            scene::ROUGH_COVERS.listed(if self.has_covers() { points } else { 0 }, "coats, sheen and films of visible points"),
             scene::ESTIMATES.listed(3 * points * u64::from(self.arrival_sets), "what photons add there"),
             scene::NEAR_SUMS.listed(self.near_sums(), "the same within a smaller radius"),
             scene::DIFFERENCES.listed(if measures_bias { difference_words } else { 0 }, "sums that tell the bias"),
@@ -450,7 +450,7 @@ impl ScenePlan {
             scene::DISPATCH_ARGS.listed(1, "the size of the next dispatch"),
             scene::CELLS.listed(buckets + 1, "the first photon of each bucket"),
             scene::RANKS.listed(capacity, "each photon's place in its bucket"),
-            scene::CROWDED_POINTS.listed(2 + 2 * u64::from(self.points_at_once()), "points with many candidates"),
+            scene::DENSE_POINTS.listed(2 + 2 * u64::from(self.points_at_once()), "points with many candidates"),
             scene::TALLIES.listed(tallies, "fates of the global map's photons"),
             scene::TALLIES.listed(tallies, "fates of the caustic map's photons"),
             scene::TOTALS.listed(totals, "what limits cost the global map"),

@@ -5,8 +5,8 @@ use serde::Serialize;
 
 use crate::constants::{LOOP_LIMIT, MT_MIDDLE};
 use crate::error::{Result, require};
-use crate::path::StoredPath;
 use crate::photon::{Origin, StoredPhoton};
+use crate::photon_state::PackedPhotonState;
 use crate::rng::Rng;
 use crate::scene::room::RoomScene;
 use crate::settings::{Builder, Gather, RoomSettings, Sums};
@@ -30,7 +30,7 @@ pub(crate) struct Limits {
     pub lanes: u32,
     /// Counters that serve more work groups than one does.
     pub counters: u32,
-    /// Lanes vote right in a loop in which they go different ways, as those of the persistent builder do.
+    /// Subgroup votes are right in a loop in which lanes go different ways, as those of the persistent builder do.
     pub votes_in_loops: bool,
 }
 
@@ -172,7 +172,7 @@ pub(super) fn most_candidates(limits: &Limits) -> u32 {
 /// 1.8 times as fast from 2^22 photons on, and 0.9 times at 2^20, where gaps cost a launch a bounce; this lies between.
 const MANY_PHOTONS: u32 = 1 << 21;
 
-/// Counters that the atomic builder's work groups take turns at.
+/// Counters that the atomic builder's work groups use round-robin.
 pub(super) fn counters(settings: &RoomSettings, limits: &Limits, photons: u32) -> u32 {
     if settings.builder != Builder::Atomic {
         return 1;
@@ -223,7 +223,7 @@ pub(super) fn loops_to_begin(rng: Rng) -> u32 {
 /// can never be full: a round that does not fit is split here, and nothing is dropped there.
 pub(crate) fn chunk_photons(settings: &RoomSettings, limits: &Limits, work: &Work) -> Result<u32> {
     let bounces = u64::from(settings.bounces);
-    let path = size_of::<StoredPath>() as u64;
+    let path = size_of::<PackedPhotonState>() as u64;
     let by_buffer = (limits.buffer_bytes / path).min(limits.buffer_bytes / (PHOTON_BYTES * bounces));
     // Two path arrays, the photon map with the names that somebody may ask for, and its sorted copy.
     let copy = if settings.gather == Gather::KdTree { TREE_BYTES } else { PHOTON_BYTES + RANK_BYTES };

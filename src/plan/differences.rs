@@ -1,4 +1,4 @@
-//! How the sums that tell the bias of a scene's radii lie in their buffer (`engine::error::differences`). Twin of
+//! How the sums that give the bias of a scene's radii lie in their buffer (`engine::error::differences`). Twin of
 //! `glsl/film/differences.glsl` and
 //! `glsl/kernels/end_difference.comp`.
 

@@ -44,7 +44,7 @@ struct Cost {
 pub(crate) struct Measured {
     /// The pass that exists for it.
     pub pass: Option<&'static str>,
-    /// Its part of the light, among those that a film tells apart.
+    /// Its part of the light, among those that a film distinguishes.
     pub part: usize,
 }
 
@@ -290,7 +290,7 @@ fn indirect(facts: &Facts) -> Evidence {
     let is_bright = |material: &Material| {
         !material.is_not_there() && (material.surface == Surface::Layered || material.base_colour.max_element() > 0.0)
     };
-    match facts.named(|material, kinds| kinds.matt && is_bright(material)) {
+    match facts.named(|material, kinds| kinds.rough && is_bright(material)) {
         _ if !facts.is_lit() => (false, "no light source".into()),
         _ if !facts.receives() => (false, "no diffuse or glossy surface".into()),
         _ if !facts.wants(Part::Indirect) => facts.only_another_part(),
@@ -387,8 +387,8 @@ pub(super) fn with_cost(decision: &EffectDecision, plan: &ScenePlan, geometry: &
 }
 
 /// Specialization constants that say which effects are kept.
-pub(super) fn constants(keeps: &dyn Fn(Effect) -> bool) -> Vec<(&'static str, u32)> {
-    Effect::ALL.into_iter().filter_map(|effect| Some((row(effect).constant?, u32::from(keeps(effect))))).collect()
+pub(super) fn constants(simulates: &dyn Fn(Effect) -> bool) -> Vec<(&'static str, u32)> {
+    Effect::ALL.into_iter().filter_map(|effect| Some((row(effect).constant?, u32::from(simulates(effect))))).collect()
 }
 
 pub(crate) fn measured(effect: Effect) -> Option<Measured> {

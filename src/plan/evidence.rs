@@ -49,8 +49,8 @@ impl<'a> Facts<'a> {
         let mut used = vec![false; scene.materials.len()];
         geometry.triangles.iter().for_each(|triangle| used[triangle.material as usize] = true);
         let mut emitters = [0; 7];
-        let shining = scene.meshes.iter().filter(|mesh| scene.materials[mesh.material].is_emissive());
-        emitters[EMITTER_TRIANGLE as usize] = shining.map(|mesh| mesh.triangles.len()).sum();
+        let emissive = scene.meshes.iter().filter(|mesh| scene.materials[mesh.material].is_emissive());
+        emitters[EMITTER_TRIANGLE as usize] = emissive.map(|mesh| mesh.triangles.len()).sum();
         scene.lights.iter().for_each(|light| emitters[light.kind.code() as usize] += 1);
         let glossy = scene.materials.iter().zip(&used).any(|(material, used)| *used && matches!(material.surface, Surface::Glossy { .. }));
         Facts {
@@ -109,7 +109,7 @@ impl<'a> Facts<'a> {
 
     /// Photons are of use where something scatters them to a sensor.
     pub(super) fn receives(&self) -> bool {
-        !self.is_picture || self.has_kind(|kinds| kinds.matt)
+        !self.is_picture || self.has_kind(|kinds| kinds.rough)
     }
 
     /// Needed if some material is so.

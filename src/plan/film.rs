@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::settings::stop::{CONFIDENCES, Measure};
 
-/// What tells the bias of a scene's radii.
+/// What gives the bias of a scene's radii.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum BiasPlan {
     /// There is none, as no light comes from a photon map.
@@ -42,7 +42,7 @@ pub(crate) struct FilmPlan {
     /// How often at most a pixel's light is rounded to the film's unit in a round: each part of a path's direct light, and each
     /// map's at each visible point.
     pub roundings_per_round: f64,
-    /// Whether the eye may meet what shines by itself: of a picture.
+    /// Whether camera rays may hit emitters (pictures only).
     pub sees_light: bool,
     /// Radiance of the brightest that a camera path may meet over mirrors and glass, W/m2/sr, all channels together; 0 where none
     /// can. Such hits are rare and bright: they are the tail of the noise.

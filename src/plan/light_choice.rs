@@ -26,7 +26,7 @@ const PRIOR: f64 = 1.0 / 32.0;
 /// has no more than a half fewer.
 const EMISSION_BY_SIGHT: f64 = 0.5;
 const MOST_REGIONS: usize = 256;
-/// Shadow rays to a cluster that tell its share in a region, and points that do at least; fewer do where they have next to nothing in
+/// Shadow rays to a cluster that show its share in a region, and points that do at least; fewer do where they have next to nothing in
 /// common with those beside them: by cosine.
 const RAYS_OF_REGION: u32 = 32;
 const POINTS_OF_REGION: u32 = 2;
@@ -315,7 +315,7 @@ mod tests {
         region.next
     }
 
-    /// Two points in a room of their own are told apart from a hundred beside them, and none of those from each other.
+    /// Two points in a room of their own are distinguished from a hundred beside them, and none of those from each other.
     #[test]
     fn rooms_are_regions() {
         let samples = row(&[vec![[0.0, 1.0, 1e-6]; 2], vec![[1.0, 0.0, 1e-6]; 100]].concat(), Vec3::Y);

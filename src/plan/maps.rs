@@ -8,7 +8,7 @@ use super::scene::{Asked, MapPlan, SEGMENT_BOUNCES};
 use crate::constants::*;
 use crate::error::{Result, require};
 use crate::photon::MapPhoton;
-use crate::records::{CausticTarget, LightPath};
+use crate::records::{CausticTarget, PhotonState};
 use crate::scene::geometry::Geometry;
 use crate::scene::openings::OPENING_SHARE;
 use crate::scene::targets::{aimed_shares, caustic_targets};
@@ -38,18 +38,18 @@ pub(super) struct Maps {
 
 impl Maps {
     /// `settings` have a builder.
-    pub(super) fn new(asked: Asked, keeps: &dyn Fn(Effect) -> bool) -> Result<Maps> {
+    pub(super) fn new(asked: Asked, simulates: &dyn Fn(Effect) -> bool) -> Result<Maps> {
         let Asked { scene, geometry, settings, limits, .. } = asked;
         let builder = settings.builder.expect("the plan chose a builder");
         limits.check_builder(builder)?;
         let split = settings.illumination == Illumination::Split;
-        let caustic_surfaces = (u32::from(keeps(Effect::ReflectiveCaustics)) << SURFACE_MIRROR)
-            | (u32::from(keeps(Effect::RefractiveCaustics)) << SURFACE_DIELECTRIC);
+        let caustic_surfaces = (u32::from(simulates(Effect::ReflectiveCaustics)) << SURFACE_MIRROR)
+            | (u32::from(simulates(Effect::RefractiveCaustics)) << SURFACE_DIELECTRIC);
         let caustics = caustic_surfaces != 0;
         let of = |is_kept: bool, arrival: u32| if is_kept { arrival } else { 0 };
-        let stored = of(keeps(Effect::Direct) && !split, ARRIVED_DIRECT)
+        let stored = of(simulates(Effect::Direct) && !split, ARRIVED_DIRECT)
             | of(caustics && !split, ARRIVED_CAUSTIC)
-            | of(keeps(Effect::Indirect), ARRIVED_INDIRECT);
+            | of(simulates(Effect::Indirect), ARRIVED_INDIRECT);
 
         let landings = Landings::of(scene, settings.bounces);
         let map = |caustic_only, stored| map(caustic_only, stored, asked, &landings);
@@ -155,7 +155,7 @@ impl Landings {
             Surface::Layered => 0.7 * f64::from(material.base_colour.max_element()) + 0.3,
             _ => f64::from(material.base_colour.max_element()),
         };
-        let scatterers: Vec<_> = scene.materials.iter().zip(scene.lobe_kinds()).filter(|(_, kinds)| kinds.matt).collect();
+        let scatterers: Vec<_> = scene.materials.iter().zip(scene.lobe_kinds()).filter(|(_, kinds)| kinds.rough).collect();
         let most = scatterers.iter().map(brightest).fold(0.0, f64::max);
         let expected = (1.0 / (1.0 - most).max(1e-9)).min(f64::from(bounces));
         Landings { expected, some_pass: scatterers.iter().any(|(_, kinds)| kinds.passing) }
@@ -169,7 +169,7 @@ fn flights_of_an_invocation(limits: &Limits) -> u32 {
 
 /// Photons traced at once, so that their map can never be full.
 fn chunk_photons(photons: u32, landings: u64, settings: &SceneSettings, limits: &Limits) -> Result<u32> {
-    let (path, photon) = (size_of::<LightPath>() as u64, size_of::<MapPhoton>() as u64);
+    let (path, photon) = (size_of::<PhotonState>() as u64, size_of::<MapPhoton>() as u64);
     let by_buffer = (limits.buffer_bytes / path).min(limits.buffer_bytes / (photon * landings));
     // Two maps of a chunk, sorted and unsorted, and its paths twice, with room for the film.
     let by_memory = limits.memory_bytes / 2 / (4 * photon * landings + 4 * path);

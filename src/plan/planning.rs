@@ -94,13 +94,13 @@ impl Asked<'_> {
         require(settings.rounds < block || settings.rounds.is_multiple_of(block), "rounds", settings.rounds, whole)?;
         let facts = Facts::new(scene, geometry, settings, sensor);
         let decisions = Effect::ALL.map(|effect| effects::decide(effect, &facts, settings)).to_vec();
-        let keeps = |effect: Effect| decisions.iter().any(|decision| decision.effect == effect && decision.kept);
+        let simulates = |effect: Effect| decisions.iter().any(|decision| decision.effect == effect && decision.kept);
 
         let by_itself = if settings.math == Math::Strict || !limits.votes_in_loops { Builder::Ballot } else { Builder::Persistent };
         let settings = SceneSettings { builder: Some(settings.builder.unwrap_or(by_itself)), ..settings.clone() };
         let split = settings.illumination == Illumination::Split;
-        let maps = Maps::new(Asked { settings: &settings, limits: for_maps, ..self }, &keeps)?;
-        let gather_rays = match (keeps(Effect::Indirect), settings.final_gather, keeps(Effect::Glossy)) {
+        let maps = Maps::new(Asked { settings: &settings, limits: for_maps, ..self }, &simulates)?;
+        let gather_rays = match (simulates(Effect::Indirect), settings.final_gather, simulates(Effect::Glossy)) {
             (true, true, _) => GATHER_ALL,
             (true, false, true) if split => GATHER_GLOSSY,
             _ => GATHER_NONE,
@@ -109,7 +109,7 @@ impl Asked<'_> {
         let samples = if is_picture { settings.samples } else { 1 };
         // A software device counts loop iterations.
         let chain_steps = if limits.loop_iterations > LOOP_LIMIT { MAX_BOUNCES } else { SEGMENT_BOUNCES };
-        let mut constants = constants(geometry, &settings, &facts, &maps, &keeps);
+        let mut constants = constants(geometry, &settings, &facts, &maps, &simulates);
         constants.extend([("GATHER_RAYS", gather_rays), ("CHAIN_STEPS", chain_steps)]);
         constants.push(("HAS_SEEN_LIGHT", u32::from(is_picture)));
         let has_clusters = trial.is_some_and(|trial| trial.lights.is_some());
@@ -183,10 +183,10 @@ impl ScenePlan {
         let brightest = 4.0 * geometry.brightest().max(mean);
         let by_brightest = (self.film.limit / brightest).log2().floor() as i32;
         self.film.scale = 2f64.powi(by_mean.min(by_brightest).clamp(-112, 126));
-        let shows_lamps = self.keeps(Effect::SpecularChains) && facts.has_kind(LobeKinds::is_sharp);
+        let shows_lamps = self.simulates(Effect::SpecularChains) && facts.has_kind(LobeKinds::is_sharp);
         if shows_lamps && self.film.sees_light && self.settings.part as u32 & PART_SPECULAR != 0 {
             // A path of one channel stands for three.
-            let of_channel = if self.keeps(Effect::Dispersion) { 3.0 } else { 1.0 };
+            let of_channel = if self.simulates(Effect::Dispersion) { 3.0 } else { 1.0 };
             // Where a pixel has fewest samples, each counts more than where it has most.
             let fewest = f64::from(self.film.samples / self.samples());
             self.film.rare_radiance = fewest * of_channel * geometry.brightest_shown();
@@ -253,28 +253,28 @@ fn constants(
     settings: &SceneSettings,
     facts: &Facts,
     maps: &Maps,
-    keeps: &dyn Fn(Effect) -> bool,
+    simulates: &dyn Fn(Effect) -> bool,
 ) -> Vec<(&'static str, u32)> {
     let split = settings.illumination == Illumination::Split;
-    let mut constants = effects::constants(keeps);
+    let mut constants = effects::constants(simulates);
     constants.extend([
         ("HAS_OVERLAPS", u32::from(geometry.triangles.iter().any(|triangle| triangle.plane >= HIDDEN))),
         ("HAS_MANY_TEXELS", u32::from(geometry.texels.len() > TEXELS_PER_BUFFER as usize)),
-        ("HAS_LAYER_TEXTURES", u32::from(keeps(Effect::Layers) && keeps(Effect::Textures) && facts.has_layer_textures())),
-        ("HAS_PANES", u32::from(keeps(Effect::Transmission) && facts.has_kind(|kinds| kinds.pane))),
+        ("HAS_LAYER_TEXTURES", u32::from(simulates(Effect::Layers) && simulates(Effect::Textures) && facts.has_layer_textures())),
+        ("HAS_PANES", u32::from(simulates(Effect::Transmission) && facts.has_kind(|kinds| kinds.pane))),
         ("MEDIUM_BITS", geometry.medium_bits),
-        ("HAS_MEDIA_BY_SIZE", u32::from(keeps(Effect::Media) && geometry.has_media_by_size)),
-        ("HAS_PASSING", u32::from(keeps(Effect::Layers) && facts.has_kind(|kinds| kinds.passing))),
+        ("HAS_MEDIA_BY_SIZE", u32::from(simulates(Effect::Media) && geometry.has_media_by_size)),
+        ("HAS_PASSING", u32::from(simulates(Effect::Layers) && facts.has_kind(|kinds| kinds.passing))),
         ("HAS_MIRROR", u32::from(facts.has(|surface| surface == Surface::Mirror) || settings.forces(Effect::SpecularChains))),
         (
             "HAS_DIELECTRIC",
             u32::from(facts.has(|surface| matches!(surface, Surface::Dielectric { .. })) || settings.forces(Effect::SpecularChains)),
         ),
         ("HAS_PAPER_PHONG", u32::from(facts.has(|surface| matches!(surface, Surface::PaperPhong { .. })))),
-        ("HAS_SKY_PICTURE", u32::from(keeps(Effect::Environment) && geometry.has_sky_picture())),
+        ("HAS_SKY_PICTURE", u32::from(simulates(Effect::Environment) && geometry.has_sky_picture())),
         ("PARANOID", u32::from(settings.paranoid)),
         ("STRICT_MATH", settings.math as u32),
-        ("HAS_SHADOW_RAYS", u32::from(split && keeps(Effect::Direct))),
+        ("HAS_SHADOW_RAYS", u32::from(split && simulates(Effect::Direct))),
         ("KERNEL", settings.kernel as u32),
         ("HAS_EDGE_CORRECTION", u32::from(settings.edge_correction)),
         ("HAS_CAUSTIC_MAP", u32::from(maps.caustic.is_some())),

@@ -37,7 +37,7 @@ pub(crate) struct Trial {
     /// Of the global and of the caustic map, how these follow from photons.
     #[serde(skip)]
     pub reach: [TrialRadius; 2],
-    /// Its photons, of the global and of the caustic map: their density around a point tells the radius there.
+    /// Its photons, of the global and of the caustic map: their density around a point gives the radius there.
     #[serde(skip)]
     pub photons: [TrialPhotons; 2],
     /// How shadow rays choose lights; `None` where they choose one lamp, or none.
@@ -151,7 +151,7 @@ impl Classes {
 }
 
 impl FirstRadius {
-    /// What `option` asks for in metres, or a trial round found, or the scene's area tells.
+    /// What `option` asks for in metres, or a trial round found, or the scene's area gives.
     pub(super) fn new(
         geometry: &Geometry,
         (photons, neighbours): (u32, u32),

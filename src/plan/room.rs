@@ -52,7 +52,7 @@ pub(crate) struct RoomPlan {
     /// lights' power among them, so that each carries `flux_unit` / n.
     pub flux_unit: f64,
     pub chunks_per_round: u32,
-    /// Counters that the atomic builder's work groups take turns at.
+    /// Counters that the atomic builder's work groups use round-robin.
     pub counters: u32,
     /// What the path arrays hold: photons of the largest chunk, and the gaps that several counters leave.
     pub path_capacity: u32,
@@ -66,7 +66,7 @@ pub(crate) struct RoomPlan {
     pub pair_tests_per_submission: u64,
     /// How photons are dealt to invocations that keep them to their end.
     pub persistence: Persistence,
-    /// Whether entries of the photon map say which photon they are: the nearest photons are told apart by it, and so are
+    /// Whether entries of the photon map say which photon they are: the nearest photons are distinguished by it, and so are
     /// photons that somebody lists.
     pub keeps_origins: bool,
     /// Whether the run may go on later, or is a part of one.
@@ -235,7 +235,7 @@ impl RoomPlan {
         }
     }
 
-    /// Whether rounds are told apart, so that their spread tells the error: floats go on over all rounds.
+    /// Whether rounds are distinguished, so that their spread gives the error: floats go on over all rounds.
     pub(crate) fn keeps_squares(&self) -> bool {
         (self.settings.rounds > 1 || self.is_kept) && self.settings.sums == Sums::Integer
     }
@@ -251,10 +251,10 @@ impl RoomPlan {
         if self.settings.builder == Builder::Persistent { 1 } else { self.path_capacity }
     }
 
-    /// Length of the photon map, paths entering each bounce, and what is counted in turn.
+    /// Length of the photon map, paths entering each bounce, and the striped counters.
     pub(crate) fn counter_array_length(&self) -> u64 {
-        let in_turn = if self.counters > 1 { self.counters * COUNTER_STRIDE } else { 0 };
-        u64::from(self.settings.bounces) + 2 + u64::from(in_turn)
+        let striped_counters = if self.counters > 1 { self.counters * COUNTER_STRIDE } else { 0 };
+        u64::from(self.settings.bounces) + 2 + u64::from(striped_counters)
     }
 
     /// Entries of the photon map that say which photon they are.

@@ -66,7 +66,7 @@ pub(crate) struct MapPlan {
     pub neighbours: f64,
     /// Invocations that share the candidates of a visible point.
     pub lanes: u32,
-    /// Spheres that its photons are aimed at; 0: they leave their lights in all directions.
+    /// Spheres that its photons are aimed at; 0: lights emit them in all directions.
     pub target_count: u32,
     /// Those from beyond the scene are aimed at its openings.
     pub through_openings: bool,
@@ -179,7 +179,7 @@ const RAY_COST: u64 = 64;
 const TOO_WIDE: f64 = 0.1;
 
 impl ScenePlan {
-    pub fn keeps(&self, effect: Effect) -> bool {
+    pub fn simulates(&self, effect: Effect) -> bool {
         self.decisions.iter().any(|decision| decision.effect == effect && decision.kept)
     }
 

@@ -30,7 +30,7 @@ pub(crate) fn bias_before(
     let Some(wanted) = stop.error.filter(|_| is_asked) else { return Ok(None) };
     let mut rounds = FIRST_ROUNDS;
     for refinement in 0..=REFINEMENTS {
-        observer.tell(Event::Step(&format!("measuring the bias first: {BATCHES} batches of {} at two radii", counted(rounds, "round"))));
+        observer.report(Event::Step(&format!("measuring the bias first: {BATCHES} batches of {} at two radii", counted(rounds, "round"))));
         let Some(bias) = measure(rounds)? else { return Ok(None) };
         // More than half of the error wanted is then left for noise.
         let is_decided = bias.upper <= 0.85 * wanted || bias.lower > wanted || refinement == REFINEMENTS;

@@ -4,19 +4,19 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::events::{Event, Observer, Tell};
+use super::events::{Event, Observer, Report};
 use super::request::RenderRequest;
 use super::values::Seconds;
 use crate::engine::run::blocks::Share;
 use crate::engine::run::saved::SavedRun;
-use crate::engine::run::watch::{Keep, Later, SaveRun};
+use crate::engine::run::watch::{Checkpointing, Lazy, SaveRun};
 use crate::error::{Error, Result, require};
 use crate::output::destination::{Destination, check_not_read, write_synced};
 use crate::text::refusal;
 
 /// What writes checkpoints and snapshots while a run goes on.
 pub(crate) struct Checkpoints<'a> {
-    tell: Tell<'a>,
+    report: Report<'a>,
     checkpoint: Option<Destination>,
     every: Duration,
     resume: Option<(PathBuf, SavedRun)>,
@@ -33,7 +33,7 @@ pub(crate) struct Checkpoints<'a> {
 /// Writes the picture of a run that is under way.
 type Write<'a> = &'a mut dyn FnMut(&SavedRun) -> Result<()>;
 /// Shows it, beside the run that goes on.
-type Show<'a> = &'a mut dyn FnMut(Later<Arc<SavedRun>>) -> Result<()>;
+type Show<'a> = &'a mut dyn FnMut(Lazy<Arc<SavedRun>>) -> Result<()>;
 
 /// What happens again and again.
 struct Snapshot<W> {
@@ -54,10 +54,10 @@ impl<W> Snapshot<W> {
     }
 
     /// What fails is reported, and does not end the run.
-    fn write(&mut self, tell: Tell, write: impl FnOnce(&mut W) -> Result<()>) {
+    fn write(&mut self, report: Report, write: impl FnOnce(&mut W) -> Result<()>) {
         let result = write(&mut self.write);
         if let (Err(error), false) = (&result, self.is_absent) {
-            tell(Event::Warning(&format!("{error}; the run goes on")));
+            report(Event::Warning(&format!("{error}; the run goes on")));
         }
         self.is_absent = result.is_err();
         self.written = Instant::now();
@@ -99,7 +99,7 @@ impl<'a> Checkpoints<'a> {
         require((0.001..=1e6).contains(&every), "every", every, "must be from 1ms to 1000000s")?;
         let resume = request.resume.as_ref().map(|path| Ok((path.clone(), read("resume", path)?))).transpose()?;
         Ok(Checkpoints {
-            tell: observer.tell,
+            report: observer.report,
             checkpoint,
             every: Duration::from_secs_f64(every),
             resume,
@@ -144,42 +144,42 @@ impl<'a> Checkpoints<'a> {
     }
 
     /// For a run on a scene of this name.
-    pub(crate) fn keep<'b>(&'b mut self, scene: &'b str) -> Keep<'b> {
+    pub(crate) fn checkpointing<'b>(&'b mut self, scene: &'b str) -> Checkpointing<'b> {
         let of_checkpoint = self.checkpoint.as_ref().map(|_| self.every);
         let of_pictures = [self.snapshot.as_ref().map(|snapshot| snapshot.every), self.display.as_ref().map(|display| display.every)];
         let every = of_pictures.into_iter().chain([of_checkpoint]).flatten().min();
         let (share, resume) = (self.share, self.resume.take());
-        Keep { scene, share, resume, every: every.unwrap_or_default(), save: every.map(|_| self as &mut dyn SaveRun), dealt: None }
+        Checkpointing { scene, share, resume, every: every.unwrap_or_default(), save: every.map(|_| self as &mut dyn SaveRun), dealt: None }
     }
 
     /// Fails where the last checkpoint is not there; says so where there is none, as no block of rounds was done.
     pub(crate) fn finish(self) -> Result<()> {
         if let Some(file) = self.checkpoint.filter(|_| !self.has_checkpoint && self.failed.is_none()) {
             let path = file.path().display();
-            (self.tell)(Event::Warning(&format!("`checkpoint` {path}: is not written, as no block of rounds was done")));
+            (self.report)(Event::Warning(&format!("`checkpoint` {path}: is not written, as no block of rounds was done")));
         }
         self.failed.map_or(Ok(()), Err)
     }
 }
 
 impl SaveRun for Checkpoints<'_> {
-    /// Writes what is due. A checkpoint that cannot be written is told of, and does not end the run.
+    /// Writes what is due. A checkpoint that cannot be written is reported, and does not end the run.
     fn save(&mut self, run: &Arc<SavedRun>, is_last: bool) -> Result<()> {
         if let Some(file) = self.checkpoint.as_ref().filter(|_| is_last || self.written.elapsed() >= self.every) {
             let result = write_synced(file, &run.to_bytes());
             if let (Err(error), false, None) = (&result, is_last, &self.failed) {
-                (self.tell)(Event::Warning(&format!("{error}; the run goes on")));
+                (self.report)(Event::Warning(&format!("{error}; the run goes on")));
             }
             self.has_checkpoint |= result.is_ok();
             self.failed = result.err();
             self.written = Instant::now();
         }
         if let Some(snapshot) = self.snapshot.as_mut().filter(|snapshot| !is_last && snapshot.is_due()) {
-            snapshot.write(self.tell, |write| write(run));
+            snapshot.write(self.report, |write| write(run));
         }
         if let Some(display) = self.display.as_mut().filter(|display| !is_last && display.is_due()) {
             let run = run.clone();
-            display.write(self.tell, |show| show(Box::new(|| run)));
+            display.write(self.report, |show| show(Box::new(|| run)));
         }
         Ok(())
     }
@@ -190,12 +190,12 @@ impl SaveRun for Checkpoints<'_> {
         !is_written && !self.snapshot.as_ref().is_some_and(Snapshot::is_due)
     }
 
-    fn save_later(&mut self, run: Later<SavedRun>) -> Result<()> {
+    fn save_later(&mut self, run: Lazy<SavedRun>) -> Result<()> {
         if !self.may_wait() {
             return self.save(&Arc::new(run()), false);
         }
         if let Some(display) = self.display.as_mut().filter(|display| display.is_due()) {
-            display.write(self.tell, |show| show(Box::new(|| Arc::new(run()))));
+            display.write(self.report, |show| show(Box::new(|| Arc::new(run()))));
         }
         Ok(())
     }

@@ -1,5 +1,5 @@
 //! Direct light of a picture without its noise. Only there does the noise of a pixel say nothing of its neighbours'
-//! (src/guide/accuracy.md), and only such noise does a denoiser tell from detail.
+//! (src/guide/accuracy.md), and only such noise does a denoiser distinguish from detail.
 
 use glam::{DVec3, Vec3};
 
@@ -47,7 +47,7 @@ pub(super) fn denoised(
         observer.warn("`denoise`: is left out, as errors are unknown before two blocks of rounds are whole; ask for more `rounds`");
         return None;
     }
-    // What shines in the pixel itself is no noise of shadow rays; its sharp edges stay.
+    // What emits light in the pixel itself is no noise of shadow rays; its sharp edges stay.
     let scattered: Vec<DVec3> = direct
         .iter()
         .enumerate()

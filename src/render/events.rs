@@ -28,38 +28,38 @@ pub enum Event<'a> {
     Interruptible(bool),
 }
 
-pub type Tell<'a> = &'a dyn Fn(Event<'_>);
+pub type Report<'a> = &'a dyn Fn(Event<'_>);
 
 /// Whoever watches a run, and may end it early.
 #[derive(Clone, Copy)]
 pub struct Observer<'a> {
     /// Set from outside to end the run after the photons, or the round, under way.
     pub cancelled: &'a AtomicBool,
-    pub tell: Tell<'a>,
+    pub report: Report<'a>,
 }
 
 /// Lets a run go on to its end, in silence.
 impl Default for Observer<'_> {
     fn default() -> Self {
         static NEVER: AtomicBool = AtomicBool::new(false);
-        Observer { cancelled: &NEVER, tell: &|_| {} }
+        Observer { cancelled: &NEVER, report: &|_| {} }
     }
 }
 
 impl Observer<'_> {
-    pub fn tell(&self, event: Event) {
-        (self.tell)(event);
+    pub fn report(&self, event: Event) {
+        (self.report)(event);
     }
 
     pub(super) fn warn(&self, warning: impl AsRef<str>) {
-        self.tell(Event::Warning(warning.as_ref()));
+        self.report(Event::Warning(warning.as_ref()));
     }
 
     /// Does what looks at `cancelled`.
     pub(super) fn interruptible<T>(&self, body: impl FnOnce() -> T) -> T {
-        self.tell(Event::Interruptible(true));
+        self.report(Event::Interruptible(true));
         let result = body();
-        self.tell(Event::Interruptible(false));
+        self.report(Event::Interruptible(false));
         result
     }
 

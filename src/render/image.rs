@@ -7,7 +7,7 @@ use super::checkpoints::Checkpoints;
 use super::denoise::{self, denoised};
 use super::events::Observer;
 use super::options::ROWS;
-use super::prepare::{Inputs, Prepared, Receivers, Run};
+use super::prepare::{Inputs, Prepared, RequestedReceivers, Run};
 use super::request::RenderRequest;
 use super::scene::PreparedScene;
 use super::values::Form;
@@ -52,7 +52,7 @@ impl PreparedScene {
         let inputs = Inputs::open(request)?.ended(gpus[0].facts().kind);
         let mut checkpoints = Checkpoints::open(request, observer)?;
         let inputs = inputs.for_image(true, checkpoints.resumed())?;
-        let prepared = self.prepare(inputs, Receivers::Image(camera), observer)?;
+        let prepared = self.prepare(inputs, RequestedReceivers::Image(camera), observer)?;
         let image = prepared.image(gpus, &mut checkpoints, observer)?;
         checkpoints.finish()?;
         let asked = self.asked(request).filter(|_| camera.is_none());

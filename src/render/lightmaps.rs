@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::checkpoints::Checkpoints;
 use super::events::{Event, Observer};
-use super::prepare::{Inputs, Receivers, Run};
+use super::prepare::{Inputs, RequestedReceivers, Run};
 use super::request::RenderRequest;
 use super::scene::PreparedScene;
 use crate::bake::pages::{Atlas, Pages};
@@ -25,7 +25,7 @@ pub struct BakeRequest {
     pub texels_per_metre: Option<f64>,
     /// Folder for the files that the command writes; `None`: no files.
     pub folder: Option<Folder>,
-    /// Of the files of a scene from a file; `None`: one picture an object, or pages of more than 8 objects.
+    /// Of the files of a scene from a file; `None`: one picture per object, or pages of more than 8 objects.
     pub atlas: Option<Atlas>,
     /// Also write a copy that shows the light in any viewer.
     pub preview: bool,
@@ -87,7 +87,7 @@ impl PreparedScene {
         }
         let atlas = if file.is_none() { Atlas::Off } else { bake.atlas.unwrap_or(Atlas::Auto) };
         let density = bake::usual_density(scene, self.name())?;
-        observer.tell(Event::Status("laying out the lightmaps"));
+        observer.report(Event::Status("laying out the lightmaps"));
         let layout = Layout::of_file(scene, file.as_ref(), bake.texels_per_metre.unwrap_or(density), atlas.max_side())?;
         layout.warnings.iter().for_each(|warning| observer.warn(warning));
         let pages = Pages::new(&layout, atlas);
@@ -99,7 +99,7 @@ impl PreparedScene {
             let names = into_file.as_ref().map_or_else(|| bake::names(scene, &layout), |into| into.names(bake.preview));
             names.iter().try_for_each(|name| check_distinct(&[&[folder.file(name)], others].concat()))?;
         }
-        let prepared = self.prepare(inputs, Receivers::Texels(&layout), observer)?;
+        let prepared = self.prepare(inputs, RequestedReceivers::Texels(&layout), observer)?;
         let run = prepared.run(&mut *devices()?, checkpoints, observer)?;
 
         let estimates = bake::estimates(&run);

@@ -3,7 +3,7 @@
 use super::events::{Event, Observer};
 use super::prepare::Prepared;
 use crate::engine::run::retry::until_done;
-use crate::engine::run::watch::Keep;
+use crate::engine::run::watch::Checkpointing;
 use crate::engine::scene::fill_map::{Filled, fill};
 use crate::engine::scene::map_file::{Header, MapWriter};
 use crate::engine::scene::trial;
@@ -16,7 +16,7 @@ use crate::plan::sensor::Sensor;
 use crate::settings::stop::LEAST_BLOCKS;
 use crate::text::counted;
 
-/// Rounds of a file where nobody says how many: each is a block, and so many tell the error of an image well.
+/// Rounds of a file where nobody says how many: each is a block, and so many give the error of an image well.
 pub(crate) const USUAL_ROUNDS: u32 = 2 * LEAST_BLOCKS;
 
 /// A file that was written.
@@ -31,7 +31,7 @@ impl Prepared {
     /// Traces the photons of all rounds into a file. The rounds should be of a block each, as they know nothing of each other.
     pub(crate) fn write_map(&self, gpu: &mut Gpu, output: &Destination, observer: &Observer) -> Result<WrittenMap> {
         let (scene, geometry, settings) = (&*self.scene, &*self.geometry, &self.inputs.settings);
-        let find = |gpu: &Gpu| trial::find(gpu, scene, &self.view(), settings, self.sensor);
+        let find = |gpu: &Gpu| trial::find(gpu, scene, &self.viewpoint(), settings, self.sensor);
         let trial = until_done(gpu, &observer.failed(), find)?;
         // No picture is made, so that its buffers need no room.
         let sensor = Sensor::Picture { width: 1, height: 1 };
@@ -41,14 +41,14 @@ impl Prepared {
         let no_photons = "calls for no photons: nothing scatters light a second time, and nothing makes caustics";
         require(!maps.is_empty(), "SCENE", &self.inputs.request.scene, no_photons)?;
         let rounds = counted(settings.rounds, "round");
-        observer.tell(Event::Note(&format!("plan: {}, {rounds} of {}", scene.name, maps.join(" and "))));
+        observer.report(Event::Note(&format!("plan: {}, {rounds} of {}", scene.name, maps.join(" and "))));
 
-        observer.tell(Event::Status("making the pipelines"));
+        observer.report(Event::Status("making the pipelines"));
         let mut file = output.stage()?;
         let unwritten = |error: std::io::Error| output.failed(&error);
         let mut writer = MapWriter::new(file.file(), &scene.name, geometry, &plan, &gpu.facts().label()).map_err(unwritten)?;
-        let mut progress = |progress: &engine::Progress| observer.tell(Event::Progress(progress, "round"));
-        let mut control = Control { cancelled: observer.cancelled, progress: &mut progress, keep: Keep::default() };
+        let mut progress = |progress: &engine::Progress| observer.report(Event::Progress(progress, "round"));
+        let mut control = Control { cancelled: observer.cancelled, progress: &mut progress, checkpointing: Checkpointing::default() };
         let mut once = |gpu: &Gpu| fill(gpu, geometry, &plan_of(gpu)?, &mut writer, &unwritten, &mut control);
         let filled = observer.interruptible(|| until_done(gpu, &observer.failed(), &mut once));
         // A device that is gone for good leaves whole rounds too.
@@ -62,7 +62,7 @@ impl Prepared {
         file.finish()?;
         if filled.is_cancelled {
             let done = counted(filled.rounds, "round");
-            observer.tell(Event::Remark(&format!("ended early: the file holds {done} of {}", settings.rounds)));
+            observer.report(Event::Remark(&format!("ended early: the file holds {done} of {}", settings.rounds)));
         }
         Ok(WrittenMap { header, filled, failed })
     }

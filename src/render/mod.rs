@@ -58,11 +58,11 @@ pub mod tuned_settings;
 pub mod values;
 pub(crate) mod viewpoint;
 
-pub use events::{Event, Observer, Tell};
+pub use events::{Event, Observer, Report};
 pub use image::Image;
 pub use lightmaps::{BakeRequest, Lightmap, Lightmaps};
 pub use prepare::Run;
-pub(crate) use prepare::{Inputs, Prepared, Receivers, prepare};
+pub(crate) use prepare::{Inputs, Prepared, RequestedReceivers, prepare};
 pub use request::RenderRequest;
 pub use scene::PreparedScene;
 pub use values::{Percent, Seconds, Stops};

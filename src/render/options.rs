@@ -36,7 +36,7 @@ impl Group {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Decides {
     /// Its values, or its file: metadata keep it as it was given.
-    Picture,
+    Image,
     /// How much work is done: metadata have what came of it.
     Work,
     /// Neither: how and when it is computed.
@@ -67,11 +67,11 @@ const L: u32 = Command::Plan as u32;
 const X: u32 = Command::Box as u32;
 const S: u32 = Command::Study as u32;
 /// Those that light a scene to its end, and what they share with `plan`, which shows what they would do.
-const LIT: u32 = R | B | P;
-const RUNS: u32 = LIT | L;
+const ESTIMATES: u32 = R | B | P;
+const RUNS: u32 = ESTIMATES | L;
 const SEEN: u32 = R | V | L;
 const SCENES: u32 = RUNS | V | M;
-const ALL: u32 = LIT | V | M | X;
+const ALL: u32 = ESTIMATES | V | M | X;
 
 pub struct Row {
     /// As a field is called; a command's option has `-` for `_`.
@@ -114,92 +114,92 @@ macro_rules! rows {
 /// In the order of the help.
 pub const ROWS: &[Row] = rows! {
     Output {
-        exposure "STOPS" Picture R
+        exposure "STOPS" Image R
             "Exposure of a PNG in stops, each of which doubles the brightness" default "what makes the mean middle grey";
-        tone "CURVE" Picture R "Tone curve of a PNG" default "neutral";
-        layers "all|none|LAYER,..." Picture R
+        tone "CURVE" Image R "Tone curve of a PNG" default "neutral";
+        layers "all|none|LAYER,..." Image R
             "Layers of an EXR beside the light: all, none, or some of direct, specular, caustic, indirect, standard_error, unseen, albedo, normal and depth"
             default "all";
-        denoise "" Picture R
+        denoise "" Image R
             "Remove noise from direct light in the picture with Open Image Denoise, which must be installed. Other light, layers and errors stay as they were rendered"
             requires "output";
     }
     Scene {
-        radiometric "" Picture (SCENES | S)
+        radiometric "" Image (SCENES | S)
             "Take the intensities of the lights of a glTF file as W/sr and W/m2" default "candela and lux, divided by 683 lm/W";
-        at "SECONDS" Picture (SCENES | S)
+        at "SECONDS" Image (SCENES | S)
             "Take nodes, skins and morph targets as the file's first animation has them at this time" default "at rest";
-        environment "R,G,B|FILE" Picture (SCENES | S)
+        environment "R,G,B|FILE" Image (SCENES | S)
             "Light from beyond the scene in place of the file's own: W/m2/sr, one number or three for red, green and blue, or a picture of all directions (equirectangular, .hdr or .exr)"
             default "the file's; 1 if nothing in the file emits light";
-        sun "AZIMUTH,ELEVATION" Picture (SCENES | S)
+        sun "AZIMUTH,ELEVATION" Image (SCENES | S)
             "Add a sun, degrees clockwise from -z as seen from above and above the horizon, and the clear sky that belongs to it unless `environment` is given";
-        environment_rotate "DEGREES" Picture (SCENES | S)
+        environment_rotate "DEGREES" Image (SCENES | S)
             "Turn the environment's picture about the vertical, degrees, counter-clockwise as seen from above; not the sky of `sun`";
-        environment_strength "FACTOR" Picture (SCENES | S) "Multiply the environment's light, or that of `sun` and its sky";
-        camera "NAME" Picture (SEEN | S) "Camera by name" default "the first one; one that sees the whole scene if it has none";
-        eye "X,Y,Z" Picture (SEEN | X | S) "Where the camera stands, metres, in place of where the scene has it"
+        environment_strength "FACTOR" Image (SCENES | S) "Multiply the environment's light, or that of `sun` and its sky";
+        camera "NAME" Image (SEEN | S) "Camera by name" default "the first one; one that sees the whole scene if it has none";
+        eye "X,Y,Z" Image (SEEN | X | S) "Where the camera stands, metres, in place of where the scene has it"
             box "Position of the eye for the Phong weight, metres"
             default "0,0,1";
-        look_at "X,Y,Z" Picture (SEEN | S) "What it looks at, metres" default "straight on, as the scene's camera does";
-        up "X,Y,Z" Picture (SEEN | S) "What is up in its picture, as a direction" default "0,1,0 with `look_at`";
-        fov "DEGREES" Picture (SEEN | S)
+        look_at "X,Y,Z" Image (SEEN | S) "What it looks at, metres" default "straight on, as the scene's camera does";
+        up "X,Y,Z" Image (SEEN | S) "What is up in its picture, as a direction" default "0,1,0 with `look_at`";
+        fov "DEGREES" Image (SEEN | S)
             "Angle between the picture's lower and upper edge, degrees" default "that of the scene's camera";
-        orthographic "METRES" Picture (SEEN | S) "Height of what the picture shows by parallel rays, metres" conflicts ["fov"];
-        size "WIDTH[xHEIGHT]" Picture SEEN
+        orthographic "METRES" Image (SEEN | S) "Height of what the picture shows by parallel rays, metres" conflicts ["fov"];
+        size "WIDTH[xHEIGHT]" Image SEEN
             "Size of the picture in pixels; a width alone takes its height from the camera's aspect ratio"
             default "about 307200 pixels in the camera's aspect ratio, 640x480 if it has none";
-        aperture "METRES" Picture (SEEN | S)
+        aperture "METRES" Image (SEEN | S)
             "Diameter of the camera's lens, metres: what is not in focus is blurred" default "0, a pinhole";
-        focus "METRES" Picture (SEEN | S)
+        focus "METRES" Image (SEEN | S)
             "Distance of the plane in focus, metres" default "that of what the middle of the picture shows" requires "aperture";
-        emission "LAW" Picture X
+        emission "LAW" Image X
             "Angular distribution of emission: constant over the hemisphere, or proportional to the cosine" default "uniform";
-        shininess "N|N,N,N,N,N" Picture X
+        shininess "N|N,N,N,N,N" Image X
             "Phong exponent of all walls, or five of them for left,right,floor,ceiling,back"
             default "none, the walls are Lambertian; 2 with `preset` phong, 5 with `preset` rounds";
-        phong_direction "DIRECTION" Picture X
+        phong_direction "DIRECTION" Image X
             "Direction that the Phong weight compares with the direction to the eye: the mirror direction, or the sampled one"
             default "mirror";
-        reflectance "SHARE" Picture X "Probability that a wall reflects a photon" default "0.75";
-        light_radius "METRES" Picture X "Radius of the two disc lights, metres" default "0.05";
-        light_power "W,W" Picture X
+        reflectance "SHARE" Image X "Probability that a wall reflects a photon" default "0.75";
+        light_radius "METRES" Image X "Radius of the two disc lights, metres" default "0.05";
+        light_power "W,W" Image X
             "Power of the light on the floor and of the light on the left wall, watts" default "1,1";
     }
     WhenToStop {
-        error "PERCENT" Nothing (LIT | X)
+        error "PERCENT" Nothing (ESTIMATES | X)
             "Stop once the relative error is at most this: 2%. It is of light that surfaces scatter; lamps, the sky and unlit surfaces that are seen directly are left out";
-        measure "MEASURE" Picture (LIT | X)
+        measure "MEASURE" Image (ESTIMATES | X)
             "What the error is: the RMSE over the mean, or the root of relMSE, whose epsilon is (1 % of the mean)^2" default "rmse";
-        confidence "PERCENT" Picture (LIT | X) "Confidence level of the error bound" default "95%";
-        time "TIME" Nothing (LIT | X) "Stop after rounds of this time: 2s, 500ms, 3m. Does not include start-up and the pilot";
-        total_photons "N" Nothing (LIT | X) "Stop once this many photons have been traced, summed over all rounds and maps";
-        bias "" Nothing (LIT | X)
+        confidence "PERCENT" Image (ESTIMATES | X) "Confidence level of the error bound" default "95%";
+        time "TIME" Nothing (ESTIMATES | X) "Stop after rounds of this time: 2s, 500ms, 3m. Does not include start-up and the pilot";
+        total_photons "N" Nothing (ESTIMATES | X) "Stop once this many photons have been traced, summed over all rounds and maps";
+        bias "" Nothing (ESTIMATES | X)
             "Measure the bias, which is the blur by the search radius, in extra runs: of the paper's box, and where `measure` is relmse. Otherwise it is estimated from the run's own blocks. With `error` it counts as part of the error";
-        checkpoint "FILE" Nothing (LIT | X)
+        checkpoint "FILE" Nothing (ESTIMATES | X)
             "Write all sums into this file from time to time and at the end, so that `resume` can go on with them";
-        every "TIME" Nothing (LIT | X) "Time between two checkpoints" default "30s" requires "checkpoint";
-        resume "FILE" Nothing (LIT | X)
+        every "TIME" Nothing (ESTIMATES | X) "Time between two checkpoints" default "30s" requires "checkpoint";
+        resume "FILE" Nothing (ESTIMATES | X)
             "Go on with the blocks of rounds that a checkpoint holds; the result is that of a run without a break, to the bit";
-        shard "K/N" Nothing (LIT | X)
+        shard "K/N" Nothing (ESTIMATES | X)
             "Do every N-th block of rounds, from the K-th on (K from 1 to N); `photonmill merge` adds the checkpoints of all of them"
             requires "checkpoint";
     }
     Photons {
-        preset "NAME" Picture X "Experiment of the paper that sets the defaults" default "modified";
+        preset "NAME" Image X "Experiment of the paper that sets the defaults" default "modified";
         photons "N" Work (SCENES | X)
             "Photons of the global map, per round" default "131072; what a pilot finds best of a picture that ends at an error or a time"
             box "Photons per round, summed over all lights"
             default "5000";
         caustic_photons "N" Work SCENES
             "Photons of the caustic map, per round" default "the same as `photons`; what a pilot finds best";
-        bounces "N" Picture (SCENES | X) "Cut photons off after this many bounces" default "none; Russian roulette ends paths"
+        bounces "N" Image (SCENES | X) "Cut photons off after this many bounces" default "none; Russian roulette ends paths"
             box "Maximum number of bounces of a photon"
             default "15; 2 with `preset` naive";
-        aim "SWITCH" Picture SCENES
+        aim "SWITCH" Image SCENES
             "Aim photons of the caustic map at mirrors and glass (projection maps), and light of a sky or sun at the openings that it comes in through"
             default "on";
-        map "FILE" Picture RUNS
+        map "FILE" Image RUNS
             "Take the photons from a file of `photonmill map` instead of tracing them: the same light for another camera, radius or kernel"
             conflicts ["photons", "caustic_photons", "bounces", "aim", "illumination"];
         rounds "N" Work (RUNS | X)
@@ -207,29 +207,29 @@ pub const ROWS: &[Row] = rows! {
             default "as many as the goals take, up to 65536; 32 of points, texels and shards without a goal"
             box "Number of rounds, whose photons are summed"
             default "1; 100 with `preset` rounds; as many as needed with `error`, `time` or `total_photons`, 1048576 at most";
-        block "N" Picture RUNS
+        block "N" Image RUNS
             "Rounds of a block, a power of two. Samples are stratified over a block, and errors come from the spread of blocks; `rounds` is rounded up to whole blocks"
             default "4, less with more `samples`";
-        rng "GENERATOR" Picture X
+        rng "GENERATOR" Image X
             "Random number generator" default "rand48 with the paper's 5000 photons per round, otherwise philox";
-        seed "N" Picture ALL "Seed of the random numbers" default "1";
+        seed "N" Image ALL "Seed of the random numbers" default "1";
     }
     LightTransport {
-        illumination "METHOD" Picture SCENES "Source of direct light and caustics" default "split";
+        illumination "METHOD" Image SCENES "Source of direct light and caustics" default "split";
         settings "FILE" Work SCENES
             "Take what a pilot has chosen from a file of `save_settings`, and run no pilot; options that are given go before it";
-        with "EFFECT" Picture SCENES "Simulate an effect even if the scene does not need it; `photonmill plan` lists them";
-        without "EFFECT" Picture SCENES "Leave an effect out even if the scene needs it";
+        with "EFFECT" Image SCENES "Simulate an effect even if the scene does not need it; `photonmill plan` lists them";
+        without "EFFECT" Image SCENES "Leave an effect out even if the scene needs it";
         shadow_rays "N" Work RUNS
             "Shadow rays per visible point and round" default "4; what a pilot finds best of a picture that ends at an error or a time";
-        final_gather "" Picture RUNS
+        final_gather "" Image RUNS
             "Final gathering: take indirect light from one ray to the next surface, not from the map at the visible point";
-        part "PART" Picture (R | L) "Compute only this part of the light; the four parts sum to `all` exactly";
+        part "PART" Image (R | L) "Compute only this part of the light; the four parts sum to `all` exactly";
         samples "N" Work R
             "Camera paths per pixel and round, a power of two. Every path queries the caustic map; where all of them end on the first surface, only one queries the global map"
             default "1; what a pilot finds best of a run that ends at an error or a time";
         save_settings "FILE" Work R "Write what the pilot has chosen for `settings`. Without -o, only the pilot runs";
-        filter "FILTER" Picture R "Reconstruction filter of the pixels" default "box";
+        filter "FILTER" Image R "Reconstruction filter of the pixels" default "box";
     }
     DensityEstimate {
         neighbours "N" Work RUNS
@@ -237,40 +237,40 @@ pub const ROWS: &[Row] = rows! {
             default "24; what a pilot finds best of a picture that ends at an error or a time";
         caustic_neighbours "N" Work RUNS
             "The same for the caustic map" default "6, or a quarter of `neighbours`; or what a pilot finds best";
-        radius "METRES" Picture (RUNS | X)
+        radius "METRES" Image (RUNS | X)
             "Radius of the density estimate of the global map in the first round, metres" default "what holds `neighbours`"
             box "Radius of the density estimate, metres"
             default "0.05; 0.025 with `preset` rounds";
-        caustic_radius "METRES" Picture RUNS "The same for the caustic map" default "what holds `caustic_neighbours`";
-        alpha "ALPHA" Picture LIT
+        caustic_radius "METRES" Image RUNS "The same for the caustic map" default "what holds `caustic_neighbours`";
+        alpha "ALPHA" Image ESTIMATES
             "How the radius shrinks from round to round, as alpha of Knaus and Zwicker (2011): above 0 and at most 1, which keeps the radius"
             default "0.667" conflicts ["fixed_radius"];
-        fixed_radius "" Picture LIT "Keep the radius, like `alpha` 1";
-        kernel "KERNEL" Picture LIT "Kernel of the density estimate: weight of a photon by its distance" default "box";
-        edge_correction "SWITCH" Picture (RUNS | X)
+        fixed_radius "" Image ESTIMATES "Keep the radius, like `alpha` 1";
+        kernel "KERNEL" Image ESTIMATES "Kernel of the density estimate: weight of a photon by its distance" default "box";
+        edge_correction "SWITCH" Image (RUNS | X)
             "Divide by the part of the search disc that lies on the surface, not by the whole disc" default "on"
             box "Divide by the part of the search disc that lies on the wall, not by the whole disc, for irradiance and radiosity; the paper's illumination stays uncorrected"
             default "on";
-        full_light "N" Picture X
+        full_light "N" Image X
             "Photons within the radius, per round, that are shown as full illumination"
             default "90 per 5000 photons of a round; 10 per 5000 with `preset` rounds";
-        nearest "K" Picture X
+        nearest "K" Image X
             "Use only the K nearest photons of each round, 2 to 1024, none farther away than the radius; needs `gather` kdtree"
             default "all within the radius";
-        mesh "N" Picture X "Texels along each side of a wall" default "64";
+        mesh "N" Image X "Texels along each side of a wall" default "64";
     }
     Implementation {
         variant "BUILDER" Nothing (RUNS | V | X) "Builder of the photon maps; all give bit-identical results" default "auto"
             box "Builder of the photon map; all GPU builders give bit-identical results"
             default "atomic; naive with `preset` naive";
-        gather "SEARCH" Picture X
+        gather "SEARCH" Image X
             "How photons near a point are found; all give bit-identical results" default "grid";
-        sums "NUMBERS" Picture X "Number format of the film's sums" default "integer";
+        sums "NUMBERS" Image X "Number format of the film's sums" default "integer";
         counters "N" Nothing X
             "Counters of `variant` atomic, a power of two up to 64, which work groups use round-robin; the result is the same to the bit"
             default "1; on a GPU 8 from two million photons at once";
         threads "N|all" Nothing X "Threads of `variant` cpu, or `all`" default "1, as in the paper";
-        math "ROUNDING" Picture ALL "Rounding of the arithmetic" default "fast";
+        math "ROUNDING" Image ALL "Rounding of the arithmetic" default "fast";
         chunk "N" Nothing (SCENES | X)
             "Most photons traced at once; the result is the same to the bit" default "what fits on the device";
         group_size "N" Nothing (SCENES | X) "Invocations per work group, a power of two" default "128";
@@ -291,7 +291,7 @@ impl Row {
     /// Whether metadata keep what a request says of it. The paper's box has as many photons as are asked for, as no pilot chooses.
     pub fn is_kept(&self, request: &RenderRequest) -> bool {
         let is_of_box = request.scene.is_empty();
-        self.decides == Decides::Picture || (is_of_box && self.field == "photons")
+        self.decides == Decides::Image || (is_of_box && self.field == "photons")
     }
 
     /// Whether a command has it, by the command's number.
@@ -395,7 +395,7 @@ mod tests {
             assert_eq!(row.text(&request).as_deref(), Some(sample(row)), "{}", row.field);
             // Metadata keep what decides the picture, and give it back.
             let words = kept(&request).words();
-            assert_eq!(words.len() == 2, row.decides == Decides::Picture, "{words:?}");
+            assert_eq!(words.len() == 2, row.decides == Decides::Image, "{words:?}");
             assert_eq!(RenderRequest::of_words(&words), Ok(kept(&request)), "{words:?}");
         }
         let given = |name: &&'static str| *name == "output" || row(name).is_some();

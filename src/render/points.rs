@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::checkpoints::Checkpoints;
 use super::events::Observer;
-use super::prepare::{Inputs, Receivers, Run};
+use super::prepare::{Inputs, RequestedReceivers, Run};
 use super::request::RenderRequest;
 use super::scene::PreparedScene;
 use crate::error::{Result, require};
@@ -34,7 +34,7 @@ impl PreparedScene {
         require((1..=MAX_POINTS).contains(&points.len()), "points", points.len(), allowed)?;
         let inputs = Inputs::open(request)?;
         let mut checkpoints = Checkpoints::open(request, observer)?;
-        let run = self.prepare(inputs, Receivers::Points(points), observer)?.run(gpus, &mut checkpoints, observer)?;
+        let run = self.prepare(inputs, RequestedReceivers::Points(points), observer)?.run(gpus, &mut checkpoints, observer)?;
         checkpoints.finish()?;
         Ok(run)
     }

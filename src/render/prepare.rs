@@ -22,7 +22,7 @@ use crate::engine::run::retry::until_done;
 use crate::engine::run::saved::SavedRun;
 use crate::engine::scene::map_file::MapFile;
 use crate::engine::scene::pilot::{self, Pilot};
-use crate::engine::scene::{RunResult, Target, View, bias, light_from, light_on, scene_hash, trial};
+use crate::engine::scene::{Receivers, RunResult, Viewpoint, bias, light_from, light_on, scene_hash, trial};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::oidn::Denoiser;
@@ -33,10 +33,10 @@ use crate::plan::film::BiasPlan;
 use crate::plan::radius::mean_squared_radius;
 use crate::plan::scene::ScenePlan;
 use crate::plan::sensor::Sensor;
-use crate::plan::work_division::{Division, Free};
+use crate::plan::work_division::{Division, TunableSettings};
 use crate::records::Receiver;
 use crate::scene::geometry::Geometry;
-use crate::scene::picture_size::PictureSize;
+use crate::scene::image_size::ImageSize;
 use crate::scene::sensors::with_sensors;
 use crate::scene::{Camera, Scene};
 use crate::settings::scene::SceneSettings;
@@ -88,7 +88,7 @@ impl Inputs {
 
 /// What light is asked of.
 #[derive(Clone, Copy)]
-pub(crate) enum Receivers<'a> {
+pub(crate) enum RequestedReceivers<'a> {
     /// The image of the request's camera, or of another one: radiance, W/m2/sr.
     Image(Option<&'a Camera>),
     /// Points with the normals of their surfaces, metres: irradiance, W/m2.
@@ -110,7 +110,7 @@ pub(crate) struct Prepared {
     /// Pixel, texel or point.
     pub point: &'static str,
     /// What a pilot may choose.
-    free: Free,
+    tunable: TunableSettings,
 }
 
 /// A run and what is to be said of it.
@@ -131,8 +131,8 @@ impl std::ops::Deref for Run {
 }
 
 /// Reads the scene of a request and makes ready what is asked of it.
-pub(crate) fn prepare(inputs: Inputs, receivers: Receivers, observer: &Observer) -> Result<Prepared> {
-    if matches!(receivers, Receivers::Image(None)) {
+pub(crate) fn prepare(inputs: Inputs, receivers: RequestedReceivers, observer: &Observer) -> Result<Prepared> {
+    if matches!(receivers, RequestedReceivers::Image(None)) {
         inputs.request.check_camera()?;
     }
     let scene = PreparedScene::read(&inputs.request, observer)?;
@@ -141,12 +141,12 @@ pub(crate) fn prepare(inputs: Inputs, receivers: Receivers, observer: &Observer)
 
 impl PreparedScene {
     /// Makes ready what a request asks of this scene, whatever the scene's name in it. Refuses another light than the scene was read with.
-    pub(crate) fn prepare(&self, inputs: Inputs, receivers: Receivers, observer: &Observer) -> Result<Prepared> {
+    pub(crate) fn prepare(&self, inputs: Inputs, receivers: RequestedReceivers, observer: &Observer) -> Result<Prepared> {
         let (request, settings) = (&inputs.request, &inputs.settings);
         self.check_read_as(request)?;
         // Photons of a file are those of the scene alone.
         let scene = match receivers {
-            Receivers::Points(points) if inputs.map.is_none() => match with_sensors(&self.scene, points, settings) {
+            RequestedReceivers::Points(points) if inputs.map.is_none() => match with_sensors(&self.scene, points, settings) {
                 Cow::Borrowed(_) => self.scene.clone(),
                 Cow::Owned(scene) => Arc::new(scene),
             },
@@ -158,30 +158,32 @@ impl PreparedScene {
             geometry.place_warning(name, places).iter().for_each(|line| observer.warn(line));
         };
         let (camera, sensor, phases, point) = match receivers {
-            Receivers::Image(given) => {
+            RequestedReceivers::Image(given) => {
                 let (camera, [width, height]) = request.viewpoint(&scene, given, observer)?;
                 place("the camera", &mut [camera.eye].into_iter());
                 (Some(camera), Sensor::Picture { width, height }, Vec::new(), "pixel")
             }
-            Receivers::Points(points) => {
+            RequestedReceivers::Points(points) => {
                 place("points", &mut points.iter().map(|(position, _)| *position));
-                let target = Target::Points(points);
-                (None, target.sensor(), target.phases(&geometry), "point")
+                let receivers = Receivers::Points(points);
+                (None, receivers.sensor(), receivers.phases(&geometry), "point")
             }
-            Receivers::Texels(layout) => {
+            RequestedReceivers::Texels(layout) => {
                 let sensor = Sensor::Receivers { count: layout.texel_count() as u32 };
                 (None, sensor, layout.receivers(settings.rounds, &geometry), "texel")
             }
         };
-        let free = request.free(camera.is_some());
-        Ok(Prepared { inputs, scene, geometry, sensor, camera, phases, point, free })
+        let tunable = request.tunable(camera.is_some());
+        Ok(Prepared { inputs, scene, geometry, sensor, camera, phases, point, tunable })
     }
 
     /// The same with settings that are not of a request. A pilot may choose all that it can.
-    pub(crate) fn prepare_with(&self, settings: &SceneSettings, target: Target) -> Result<Prepared> {
-        let (size, receivers) = match target {
-            Target::Picture(camera, [width, height]) => (Some(PictureSize::WidthAndHeight(width, height)), Receivers::Image(Some(camera))),
-            Target::Points(points) => (None, Receivers::Points(points)),
+    pub(crate) fn prepare_with(&self, settings: &SceneSettings, receivers: Receivers) -> Result<Prepared> {
+        let (size, receivers) = match receivers {
+            Receivers::Image(camera, [width, height]) => {
+                (Some(ImageSize::WidthAndHeight(width, height)), RequestedReceivers::Image(Some(camera)))
+            }
+            Receivers::Points(points) => (None, RequestedReceivers::Points(points)),
         };
         let inputs = Inputs::open(&RenderRequest { size, ..RenderRequest::default() })?;
         self.prepare(Inputs { settings: settings.clone(), ..inputs }, receivers, &Observer::default())
@@ -189,8 +191,8 @@ impl PreparedScene {
 }
 
 impl Prepared {
-    pub(crate) fn view(&self) -> View<'_> {
-        View { geometry: &self.geometry, camera: self.camera.as_ref(), phases: &self.phases }
+    pub(crate) fn viewpoint(&self) -> Viewpoint<'_> {
+        Viewpoint { geometry: &self.geometry, camera: self.camera.as_ref(), phases: &self.phases }
     }
 
     /// Of an image, width and height in pixels.
@@ -209,17 +211,17 @@ impl Prepared {
 
     /// What a device does with these settings, and with what a trial round finds; of a device that works to its end.
     pub(crate) fn plan_on(&self, gpu: &Gpu, settings: &SceneSettings) -> Result<ScenePlan> {
-        self.of_map(trial::plan(gpu, &self.scene, &self.view(), settings, self.sensor)?)
+        self.of_map(trial::plan(gpu, &self.scene, &self.viewpoint(), settings, self.sensor)?)
     }
 
     /// What a pilot chooses; `None` where there is nothing to choose. Of a device that works to its end.
     pub(crate) fn choose(&self, gpu: &Gpu, cancelled: &AtomicBool) -> Result<Option<Pilot>> {
-        pilot::choose_for(gpu, &self.scene, &self.view(), &self.inputs.settings, self.sensor, self.free, cancelled)
+        pilot::choose_for(gpu, &self.scene, &self.viewpoint(), &self.inputs.settings, self.sensor, self.tunable, cancelled)
     }
 
     /// Runs a plan, and nothing before or after it; on a device that works to its end.
     pub(crate) fn light(&self, gpu: &Gpu, plan: ScenePlan, control: &mut Control) -> Result<RunResult> {
-        light_from(gpu, &self.view(), plan, self.inputs.map.as_ref(), control)
+        light_from(gpu, &self.viewpoint(), plan, self.inputs.map.as_ref(), control)
     }
 
     fn of_map(&self, plan: ScenePlan) -> Result<ScenePlan> {
@@ -230,12 +232,12 @@ impl Prepared {
     pub(crate) fn tune(&self, gpu: &mut Gpu, observer: &Observer) -> Result<(SceneSettings, Option<Pilot>)> {
         let Inputs { ref settings, ref tuned, ref save_settings, .. } = self.inputs;
         let mut found = None;
-        if settings.stop.has_goal() && self.free != Free::default() {
-            observer.tell(Event::Status("looking for the best settings"));
+        if settings.stop.has_goal() && self.tunable != TunableSettings::default() {
+            observer.report(Event::Status("looking for the best settings"));
             found = until_done(gpu, &observer.failed(), |gpu: &Gpu| self.choose(gpu, observer.cancelled))?;
         }
         if let Some(pilot) = &found {
-            observer.tell(Event::Pilot(pilot, &settings.stop, self.point));
+            observer.report(Event::Pilot(pilot, &settings.stop, self.point));
         }
         let best = found.as_ref().map_or_else(|| settings.clone(), |pilot| pilot.set(settings));
         if tuned.is_some() || save_settings.is_some() {
@@ -248,7 +250,7 @@ impl Prepared {
                 let block = best.rounds_per_block(self.camera.is_some());
                 TunedSettings::new(&best, rounds.next_multiple_of(block), &this).write(file.clone())?;
                 let path = file.path().display();
-                observer.tell(Event::Note(&format!("settings for about {}: wrote {path}", counted(rounds, "round"))));
+                observer.report(Event::Note(&format!("settings for about {}: wrote {path}", counted(rounds, "round"))));
             }
         }
         Ok((best, found))
@@ -256,22 +258,22 @@ impl Prepared {
 
     /// The settings of the run that this one goes on with, where nobody has set others; else what a pilot finds.
     fn settings(&self, gpu: &mut Gpu, resumed: Option<&SavedRun>, observer: &Observer) -> Result<(SceneSettings, Option<Pilot>)> {
-        let (settings, free) = (&self.inputs.settings, self.free);
+        let (settings, tunable) = (&self.inputs.settings, self.tunable);
         let Some(run) = resumed else { return self.tune(gpu, observer) };
         let of_run = |name: &str, own: u32, is_free: bool| {
             let value = run.identity.settings.get(name).and_then(|value| value.as_u64()?.try_into().ok());
             if is_free { value.unwrap_or(own) } else { own }
         };
         let division = Division {
-            samples: of_run("samples", settings.samples, free.samples),
-            shadow_rays: of_run("shadow_rays", settings.shadow_rays, free.shadow_rays),
-            photons: of_run("photons", settings.photons, free.photons),
-            caustic_photons: of_run("caustic_photons", settings.caustic_photons, free.caustic_photons),
-            neighbours: of_run("neighbours", settings.neighbours, free.neighbours),
-            caustic_neighbours: of_run("caustic_neighbours", settings.caustic_neighbours, free.caustic_neighbours),
+            samples: of_run("samples", settings.samples, tunable.samples),
+            shadow_rays: of_run("shadow_rays", settings.shadow_rays, tunable.shadow_rays),
+            photons: of_run("photons", settings.photons, tunable.photons),
+            caustic_photons: of_run("caustic_photons", settings.caustic_photons, tunable.caustic_photons),
+            neighbours: of_run("neighbours", settings.neighbours, tunable.neighbours),
+            caustic_neighbours: of_run("caustic_neighbours", settings.caustic_neighbours, tunable.caustic_neighbours),
         };
         let tiles = run.identity.settings.get("tiles").and_then(|tiles| serde_json::from_value(tiles.clone()).ok());
-        let tiles = tiles.filter(|_| free.samples).or_else(|| settings.tiles.clone());
+        let tiles = tiles.filter(|_| tunable.samples).or_else(|| settings.tiles.clone());
         Ok((SceneSettings { tiles, ..division.set(settings) }, None))
     }
 
@@ -286,7 +288,7 @@ impl Prepared {
         }
         if of_map.unwrap_or(wanted.rounds) != settings.rounds {
             let wanted = of_map.map_or(format!("`rounds` {} is", wanted.rounds), |most| format!("the {most} rounds of `map` are"));
-            observer.tell(Event::Note(&format!("{wanted} taken as {}: whole blocks of {block}", settings.rounds)));
+            observer.report(Event::Note(&format!("{wanted} taken as {}: whole blocks of {block}", settings.rounds)));
         }
         settings
     }
@@ -294,7 +296,7 @@ impl Prepared {
     /// Chooses settings by a pilot and radii by a trial round, runs all rounds, and measures the bias where that is asked for.
     pub(crate) fn run(&self, gpus: &mut Vec<Gpu>, checkpoints: &mut Checkpoints, observer: &Observer) -> Result<Run> {
         let started = Instant::now();
-        let (view, map) = (self.view(), self.inputs.map.as_ref());
+        let (viewpoint, map) = (self.viewpoint(), self.inputs.map.as_ref());
         let (wanted, pilot) = self.settings(&mut gpus[0], checkpoints.resumed(), observer)?;
         if observer.cancelled.load(Ordering::Relaxed) {
             return Err(Error::Interrupted);
@@ -311,12 +313,12 @@ impl Prepared {
         }
         let is_of_file = map.is_some();
         let line = scene_report::plan_line(&plan, &self.scene.name, self.geometry.unit, self.point, is_of_file);
-        observer.tell(Event::Note(&line));
+        observer.report(Event::Note(&line));
         bias::check(&settings.stop, plan.film.bias)?;
-        // The error asked for is noise and bias together, so what blocks do not tell must be known beforehand.
+        // The error asked for is noise and bias together, so what blocks do not show must be known beforehand.
         let takes_extra_runs = self.inputs.request.bias && plan.film.bias == BiasPlan::ExtraRuns;
         let measure = |gpu: &mut Gpu, plan: &ScenePlan, factor_and_rounds| {
-            let once = |gpu: &Gpu| bias::measure(gpu, &self.scene, &view, plan, factor_and_rounds, observer.cancelled);
+            let once = |gpu: &Gpu| bias::measure(gpu, &self.scene, &viewpoint, plan, factor_and_rounds, observer.cancelled);
             observer.interruptible(|| until_done(gpu, &observer.failed(), once))
         };
         let alpha = settings.alpha;
@@ -324,27 +326,30 @@ impl Prepared {
         let before = bias_before(&settings.stop, takes_extra_runs, alpha < 1.0, observer, of_first_round)?;
         plan.settings.stop.bias = before.map(|bias| bias.upper);
 
-        observer.tell(Event::Status("making the pipelines"));
-        let keep = checkpoints.keep(&self.scene.name);
-        let mut control =
-            Control { cancelled: observer.cancelled, progress: &mut |progress| observer.tell(Event::Progress(progress, "round")), keep };
-        let light = || light_on(gpus, (&self.scene, &view), &plan, map, &observer.failed(), &mut control);
+        observer.report(Event::Status("making the pipelines"));
+        let checkpointing = checkpoints.checkpointing(&self.scene.name);
+        let mut control = Control {
+            cancelled: observer.cancelled,
+            progress: &mut |progress| observer.report(Event::Progress(progress, "round")),
+            checkpointing,
+        };
+        let light = || light_on(gpus, (&self.scene, &viewpoint), &plan, map, &observer.failed(), &mut control);
         let mut result = observer.interruptible(light)?;
         if result.is_cancelled() {
             let rounds = counted(result.film.rounds, "round");
-            observer.tell(Event::Remark(&format!("ended early: the results are of {rounds} of {}", settings.rounds)));
+            observer.report(Event::Remark(&format!("ended early: the results are of {rounds} of {}", settings.rounds)));
         } else {
             let shrunk = mean_squared_radius(alpha, result.film.rounds);
             result.bias = match before {
                 Some(bias) => Some(bias.scaled(shrunk)),
                 // At the radius whose square is the mean of the rounds' squares.
                 None if takes_extra_runs => {
-                    observer.tell(Event::Status("measuring the bias"));
+                    observer.report(Event::Status("measuring the bias"));
                     measure(&mut gpus[0], &result.plan, (shrunk.sqrt(), rounds_after(result.film.rounds)))?
                 }
                 None => None,
             };
-            observer.tell(Event::Status("writing the results"));
+            observer.report(Event::Status("writing the results"));
         }
         Ok(Run { result, pilot, seconds: started.elapsed().as_secs_f64() })
     }

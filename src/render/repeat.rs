@@ -10,7 +10,7 @@ use super::denoise;
 use super::events::Observer;
 use super::image::show;
 use super::options::row;
-use super::prepare::{Inputs, Receivers, prepare};
+use super::prepare::{Inputs, RequestedReceivers, prepare};
 use super::request::RenderRequest;
 use super::room;
 use super::tuned_settings::TunedSettings;
@@ -42,7 +42,7 @@ impl RenderRequest {
     /// The request of an image, from what its metadata keep.
     pub fn of_picture(path: &Path, words: &[String]) -> Result<RenderRequest> {
         let damaged = |reason| format!("says otherwise than photonmill does how it was made ({reason})");
-        RenderRequest::of_words(words).map_err(|reason| Error::Picture { path: path.to_owned(), reason: damaged(reason) })
+        RenderRequest::of_words(words).map_err(|reason| Error::Image { path: path.to_owned(), reason: damaged(reason) })
     }
 
     /// The same; fails with what the words are not.
@@ -74,7 +74,7 @@ pub fn repeat<Devices: DerefMut<Target = Vec<Gpu>>>(
     devices_of: impl FnOnce() -> Result<Devices>,
     observer: &Observer,
 ) -> Result<Repeated> {
-    let refuse = |reason: String| Error::Picture { path: path.to_owned(), reason };
+    let refuse = |reason: String| Error::Image { path: path.to_owned(), reason };
     let damaged = |reason: &dyn Display| refuse(format!("says otherwise than photonmill does how it was made ({reason})"));
     let tuned = TunedSettings::of_picture(made, rounds.division, rounds.tiles.clone()).map_err(|error| damaged(&error))?;
     let mut request = RenderRequest::of_picture(path, arguments)?;
@@ -98,7 +98,7 @@ pub fn repeat<Devices: DerefMut<Target = Vec<Gpu>>>(
     {
         observer.warn(format!("was denoised by {before}, and now by {now}, which may leave other bits"));
     }
-    let prepared = prepare(inputs, Receivers::Image(None), observer)?;
+    let prepared = prepare(inputs, RequestedReceivers::Image(None), observer)?;
     let hash = prepared.scene_hash();
     if let Some(before) = made.scene_hash.as_ref().filter(|before| **before != hash) {
         let remedy = "restore the scene as it was, or name another file with `scene`";

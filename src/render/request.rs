@@ -7,10 +7,10 @@ use glam::DVec3;
 use super::values::{Layers, Percent, Seconds, Shininess, Stops, SunPosition, Threads, Variant, Watts};
 use crate::engine::run::blocks;
 use crate::output::colour::Tone;
-use crate::plan::work_division::Free;
+use crate::plan::work_division::TunableSettings;
 use crate::rng::Rng;
 use crate::scene::Reading;
-use crate::scene::picture_size::PictureSize;
+use crate::scene::image_size::ImageSize;
 use crate::scene::surroundings::{Environment, Surroundings};
 use crate::settings::scene::{Effect, Filter, Illumination, Kernel, MAX_ROUNDS, Part, SceneSettings, Stop};
 use crate::settings::stop::Measure;
@@ -41,7 +41,7 @@ pub struct RenderRequest {
     pub up: Option<DVec3>,
     pub fov: Option<f64>,
     pub orthographic: Option<f64>,
-    pub size: Option<PictureSize>,
+    pub size: Option<ImageSize>,
     pub aperture: Option<f64>,
     pub focus: Option<f64>,
     pub emission: Option<EmissionLaw>,
@@ -214,13 +214,13 @@ impl RenderRequest {
     }
 
     /// What a pilot may choose of a run that ends at an error or a time; shards must not choose each for itself.
-    pub(super) fn free(&self, of_picture: bool) -> Free {
+    pub(super) fn tunable(&self, of_picture: bool) -> TunableSettings {
         let is_fixed = self.rounds.is_some() || self.total_photons.is_some() || self.shard.is_some() || self.settings.is_some();
         if is_fixed {
-            return Free::default();
+            return TunableSettings::default();
         }
         let traces = self.map.is_none();
-        Free {
+        TunableSettings {
             samples: of_picture && self.samples.is_none(),
             shadow_rays: self.shadow_rays.is_none(),
             photons: traces && self.photons.is_none(),

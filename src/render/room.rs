@@ -97,7 +97,7 @@ impl PreparedRoom<'_> {
             let why = "has a radius of its own at each point, whose bias `bias` cannot measure; leave `bias` out";
             require(!measures_bias, "nearest", nearest, why)?;
         }
-        observer.tell(Event::Note(&plan_line(gpus.first(), scene, &settings)?));
+        observer.report(Event::Note(&plan_line(gpus.first(), scene, &settings)?));
         let cancelled = observer.cancelled;
         let measure = |gpu: Option<&mut Gpu>, settings: &RoomSettings, rounds| match gpu {
             Some(gpu) => until_done(gpu, &observer.failed(), |gpu| room::measure_bias(Some(gpu), scene, settings, rounds, cancelled)),
@@ -106,21 +106,22 @@ impl PreparedRoom<'_> {
         let of_first_round = |rounds| measure(gpus.first_mut(), &settings, rounds);
         let before = bias_before(&settings.stop, measures_bias, false, observer, of_first_round)?;
         settings.stop.bias = before.map(|bias| bias.upper);
-        observer.tell(Event::Status("making the pipelines"));
-        let keep = checkpoints.keep("open-box");
-        let mut control = Control { cancelled, progress: &mut |progress| observer.tell(Event::Progress(progress, "photon")), keep };
+        observer.report(Event::Status("making the pipelines"));
+        let checkpointing = checkpoints.checkpointing("open-box");
+        let mut control =
+            Control { cancelled, progress: &mut |progress| observer.report(Event::Progress(progress, "photon")), checkpointing };
         let mut result = match gpus.len() {
             0 => room::run(None, scene, &settings, &mut control)?,
             _ => light(gpus, scene, &settings, observer, &mut control)?,
         };
         result.bias = before;
         if before.is_none() && measures_bias && !result.is_cancelled() {
-            observer.tell(Event::Status("measuring the bias"));
+            observer.report(Event::Status("measuring the bias"));
             result.bias = measure(gpus.first_mut(), &settings, rounds_after(result.film.rounds))?;
         }
         if result.is_cancelled() {
             let (emitted, total) = (result.film.emitted, settings.total_photons());
-            observer.tell(Event::Remark(&format!("ended after {emitted} of {total} photons; the results are of these")));
+            observer.report(Event::Remark(&format!("ended after {emitted} of {total} photons; the results are of these")));
         }
         Ok(result)
     }
@@ -133,9 +134,9 @@ fn light(gpus: &mut Vec<Gpu>, scene: &RoomScene, settings: &RoomSettings, observ
     let plan = RoomPlan::new(scene, settings, &engine::limits(gpus[0].facts()))?;
     let run =
         |gpu: &Gpu, stop: Stop, control: &mut Control| room::run(Some(gpu), scene, &RoomSettings { stop, ..settings.clone() }, control);
-    let outcome = run_on(gpus, &room::task(scene, &plan), &run, &observer.failed(), control)?;
+    let result = run_on(gpus, &room::task(scene, &plan), &run, &observer.failed(), control)?;
     // With its goals, which no device had.
-    Ok(RunResult { plan: RoomPlan { settings: settings.clone(), ..outcome.plan }, ..outcome })
+    Ok(RunResult { plan: RoomPlan { settings: settings.clone(), ..result.plan }, ..result })
 }
 
 /// What will be traced, before it is.
@@ -162,13 +163,13 @@ fn plan_line(gpu: Option<&Gpu>, scene: &RoomScene, settings: &RoomSettings) -> R
 
 /// The builder that is fastest on this device; reports the time of each.
 fn fastest(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings, observer: &Observer) -> Result<Builder> {
-    observer.tell(Event::Status("timing each builder"));
+    observer.report(Event::Status("timing each builder"));
     let Choice { photons, candidates } = choose_builder(gpu, scene, settings)?;
     let times: Vec<String> =
         candidates.iter().map(|candidate| format!("{} {:.3}", candidate.builder.name(), candidate.ms.median)).collect();
     let taken = candidates[0].builder;
     let (name, times) = (taken.name(), times.join(", "));
-    observer.tell(Event::Note(&format!("`variant` auto takes {name}; the first {photons} photons, in ms: {times}")));
+    observer.report(Event::Note(&format!("`variant` auto takes {name}; the first {photons} photons, in ms: {times}")));
     Ok(taken)
 }
 
@@ -211,21 +212,21 @@ impl RoomImage<'_> {
 }
 
 /// What a picture of the box says of how it was made; its command line makes it again.
-pub(crate) fn metadata(request: &RenderRequest, outcome: &RunResult, error: &FilmError, format: Format) -> Metadata {
-    let settings = &outcome.plan.settings;
+pub(crate) fn metadata(request: &RenderRequest, result: &RunResult, error: &FilmError, format: Format) -> Metadata {
+    let settings = &result.plan.settings;
     let confidence = settings.stop.confidence;
     let [error, error_bound] = errors(error, confidence);
     let request = kept(request);
-    let builder = outcome.device.is_none().then_some(Variant::Of(Builder::Cpu));
-    let with_rounds = RenderRequest { rounds: Some(outcome.film.rounds), variant: builder, ..request.clone() };
+    let builder = result.device.is_none().then_some(Variant::Of(Builder::Cpu));
+    let with_rounds = RenderRequest { rounds: Some(result.film.rounds), variant: builder, ..request.clone() };
     Metadata {
         photonmill: env!("CARGO_PKG_VERSION").to_owned(),
-        devices: devices_of(outcome),
+        devices: devices_of(result),
         scene: "open-box".to_owned(),
         scene_hash: None,
         seed: settings.seed,
-        rounds: outcome.film.rounds,
-        degrees_of_freedom: outcome.film.error_freedom(),
+        rounds: result.film.rounds,
+        degrees_of_freedom: result.film.error_freedom(),
         error,
         error_bound,
         confidence,
@@ -236,7 +237,7 @@ pub(crate) fn metadata(request: &RenderRequest, outcome: &RunResult, error: &Fil
         },
         command: command_line("", &with_rounds, &["-o", name_in_text(format)]),
         settings: settings_with_effect(settings),
-        repeat: match outcome.end {
+        repeat: match result.end {
             End::Rounds | End::Error | End::Photons => Repeat::With {
                 command: String::new(),
                 arguments: request.words(),

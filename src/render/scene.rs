@@ -36,7 +36,7 @@ impl PreparedScene {
         let mut scene = Scene::open_with(&request.scene, request.reading(), &mut stages(&request.scene, observer))?;
         let remark = surroundings.light(&mut scene)?;
         scene.warnings.iter().for_each(|warning| observer.warn(warning));
-        remark.iter().for_each(|remark| observer.tell(Event::Remark(&format!("note: {remark}"))));
+        remark.iter().for_each(|remark| observer.report(Event::Remark(&format!("note: {remark}"))));
         Ok(PreparedScene { read_as: Some(request.clone()), ..PreparedScene::new(scene) })
     }
 
@@ -105,7 +105,7 @@ pub(crate) fn stages<'a>(what: &'a str, observer: &'a Observer) -> impl FnMut(&'
     move |stage, done| {
         let step = (stage, (10.0 * done) as u32);
         if reported.replace(step) != Some(step) {
-            observer.tell(Event::Status(&format!("{what}: {stage}, {} %", 10 * step.1)));
+            observer.report(Event::Status(&format!("{what}: {stage}, {} %", 10 * step.1)));
         }
     }
 }
@@ -113,7 +113,7 @@ pub(crate) fn stages<'a>(what: &'a str, observer: &'a Observer) -> impl FnMut(&'
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::{Inputs, Receivers};
+    use crate::render::{Inputs, RequestedReceivers};
     use crate::scene::surroundings::Environment;
 
     /// It would be as if it had not been asked for.
@@ -122,7 +122,7 @@ mod tests {
         let scene = PreparedScene::open("sky-over-plane").unwrap();
         let prepared = |request: &RenderRequest| {
             let inputs = Inputs::open(request).unwrap();
-            scene.prepare(inputs, Receivers::Image(None), &Observer::default()).map(|prepared| prepared.size())
+            scene.prepare(inputs, RequestedReceivers::Image(None), &Observer::default()).map(|prepared| prepared.size())
         };
         assert_eq!(prepared(&RenderRequest::default()).unwrap(), (640, 480));
         let other = RenderRequest { environment: Some(Environment::Colour([2.0; 3])), ..RenderRequest::default() };

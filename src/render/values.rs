@@ -13,7 +13,7 @@ use crate::engine::run::blocks;
 use crate::output::colour::Tone;
 use crate::output::show::Layer;
 use crate::rng::Rng;
-use crate::scene::picture_size::{PictureSize, parse_size};
+use crate::scene::image_size::{ImageSize, parse_size};
 use crate::scene::surroundings::Environment;
 use crate::settings::scene::{Effect, Filter, Illumination, Kernel, Part};
 use crate::settings::stop::Measure;
@@ -347,7 +347,7 @@ words! {
     DVec3 as Form::Numbers(3), |text| parse_numbers(text).map(DVec3::from_array), |point| commas(&point.to_array());
     SunPosition as Form::Numbers(2), parse_sun, |sun| commas(&[sun.azimuth, sun.elevation]);
     Environment as Form::Other, parse_environment, environment_word;
-    PictureSize as Form::Other, parse_size, size_word;
+    ImageSize as Form::Other, parse_size, size_word;
     blocks::Share as Form::Other, parse_shard, |shard| format!("{}/{}", shard.number + 1, shard.of);
     Layers as Form::Other, parse_layers, layers_word;
     Shininess as Form::Other, parse_shininess, |shininess| commas(&shininess.0);
@@ -386,7 +386,7 @@ fn parse_environment(text: &str) -> Parsed<Environment> {
     let is_picture =
         path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("hdr") || extension.eq_ignore_ascii_case("exr"));
     match is_picture {
-        true => Ok(Environment::Picture(path.to_owned())),
+        true => Ok(Environment::Image(path.to_owned())),
         false => parse_colour(text).map(Environment::Colour).map_err(|reason| format!("{reason}; or a file that ends in .hdr or .exr")),
     }
 }
@@ -394,14 +394,14 @@ fn parse_environment(text: &str) -> Parsed<Environment> {
 fn environment_word(environment: &Environment) -> String {
     match environment {
         Environment::Colour(colour) => commas(colour),
-        Environment::Picture(path) => path.to_string_lossy().into_owned(),
+        Environment::Image(path) => path.to_string_lossy().into_owned(),
     }
 }
 
-fn size_word(size: &PictureSize) -> String {
+fn size_word(size: &ImageSize) -> String {
     match size {
-        PictureSize::Width(width) => width.to_string(),
-        PictureSize::WidthAndHeight(width, height) => format!("{width}x{height}"),
+        ImageSize::Width(width) => width.to_string(),
+        ImageSize::WidthAndHeight(width, height) => format!("{width}x{height}"),
     }
 }
 

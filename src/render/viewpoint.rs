@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 use super::events::{Event, Observer};
 use super::request::RenderRequest;
 use crate::error::{Error, Result, require};
-use crate::scene::picture_size::PictureSize;
+use crate::scene::image_size::ImageSize;
 use crate::scene::{Camera, Lens, Projection, Scene};
 
 /// Metres. Rays through a lens are computed in 24 bits.
@@ -89,7 +89,7 @@ impl RenderRequest {
             let focus = scene.distance_along(origin, direction).ok_or_else(|| {
                 Error::setting("aperture", aperture, "needs `focus`: the middle of the picture shows nothing to focus on")
             })?;
-            observer.tell(Event::Status(&format!("focus at {focus:.4} m, on what the middle of the picture shows")));
+            observer.report(Event::Status(&format!("focus at {focus:.4} m, on what the middle of the picture shows")));
             Ok(focus)
         };
         Ok(Some(Lens { radius: 0.5 * aperture, focus: self.focus.map_or_else(in_the_middle, Ok)? }))
@@ -101,9 +101,9 @@ fn text(point: DVec3) -> String {
 }
 
 /// Width and height in pixels; says so if they change what the camera sees.
-pub(crate) fn size_of(size: Option<PictureSize>, camera: &Camera, observer: &Observer) -> Result<(u32, u32)> {
-    let (width, height, remark) = PictureSize::of(size, camera)?;
-    remark.iter().for_each(|remark| observer.tell(Event::Note(&format!("note: {remark}"))));
+pub(crate) fn size_of(size: Option<ImageSize>, camera: &Camera, observer: &Observer) -> Result<(u32, u32)> {
+    let (width, height, remark) = ImageSize::of(size, camera)?;
+    remark.iter().for_each(|remark| observer.report(Event::Note(&format!("note: {remark}"))));
     Ok((width, height))
 }
 

@@ -48,7 +48,7 @@ pub(crate) fn floor_irradiance(name: &str, x: f64, z: f64) -> Option<f64> {
     }
 }
 
-/// A closed cube of 1 m whose walls shine with 1 W/m2/sr and scatter [`WALL_ALBEDO`] of what arrives:
+/// A closed cube of 1 m whose walls emit 1 W/m2/sr and scatter [`WALL_ALBEDO`] of what arrives:
 /// radiance 1 / (1 - albedo) and irradiance pi / (1 - albedo) everywhere.
 fn furnace() -> Scene {
     let material = Material { emission: Vec3::ONE, ..Material::lambert("wall", Vec3::splat(WALL_ALBEDO)) };

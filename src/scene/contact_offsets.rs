@@ -156,7 +156,7 @@ fn levels(
 /// The offsets of a mesh's vertices.
 fn offsets_of(number: u32, mesh: &Mesh, steps: &HashMap<(usize, [u64; 3]), Vec<Step>>, in_plane: f64) -> Vec<((u32, u32), DVec3)> {
     let steps_at = |vertex: u32| steps.get(&(mesh.material, bits(mesh.positions[vertex as usize])));
-    // A solid that touches another of its material has vertices at the same places: whose they are, tells the side that their triangles
+    // A solid that touches another of its material has vertices at the same places: whose they are shows the side that their triangles
     // lie on.
     let mut others: HashSet<(u32, usize)> = HashSet::new();
     for (triangle, vertices) in mesh.triangles.iter().enumerate() {

@@ -31,7 +31,7 @@ const CELLS: usize = 1 << 16;
 pub(super) struct Sheet<'a> {
     pub(super) corners: [DVec3; 3],
     pub(super) normal: DVec3,
-    /// The height over its longest side: how well the corners tell the normal.
+    /// The height over its longest side: how well the corners show the normal.
     pub(super) altitude: f64,
     pub(super) of: Touching<'a>,
 }
@@ -88,7 +88,7 @@ fn for_classes(corners: [DVec3; 3], mut each: impl FnMut(u64)) {
     let altitude = altitude(&corners);
     let is_exact = (0..3).any(|axis| a[axis] == b[axis] && a[axis] == c[axis]);
     let uncertain = if is_exact { IN_PLANE } else { (0.25 * IN_PLANE / altitude).min(0.5 * CLASS) + IN_PLANE };
-    // A plane has two normals: that whose largest component is above 0 counts, and the class tells which that is.
+    // A plane has two normals: that whose largest component is above 0 counts, and the class shows which that is.
     let size = normal.abs();
     let least = if altitude > WIDTH { size.max_element() - 2.0 * uncertain } else { f64::INFINITY };
     for axis in (0..3).filter(|axis| size[*axis] >= least) {
@@ -131,7 +131,7 @@ pub(super) fn pairs(
     let members: Vec<Vec<u64>> = (0..corners.len() as u32).into_par_iter().fold(Vec::new, with_classes).collect();
     let mut members = members.concat();
     members.par_sort_unstable();
-    // Most that are near each other are neighbours in a mesh, which touch: that is quickly told.
+    // Most that are near each other are neighbours in a mesh, which touch: that is quickly found.
     let overlap = |a: u32, b: u32| {
         let (one, other) = (wide(a), wide(b));
         !separates(&one, &other) && !separates(&other, &one) && sheet(a).contact(&sheet(b)) == contact

@@ -23,7 +23,7 @@ pub enum LightKind {
     Spot { position: DVec3, direction: DVec3, intensity: Vec3, inner_angle: f32, outer_angle: f32 },
     /// Irradiance in W/m2 on a surface that faces it.
     Directional { direction: DVec3, irradiance: Vec3 },
-    /// A disc that shines to the side of its unit normal, `power` watts in all. It neither blocks light
+    /// A disc that emits to the side of its unit normal, `power` watts in all. It neither blocks light
     /// nor is seen itself, as the lamps in the walls of the paper's box.
     Disc { centre: DVec3, normal: DVec3, radius: f64, power: Vec3, law: EmissionLaw },
     /// The same radiance in W/m2/sr from everywhere beyond the scene.
@@ -36,7 +36,7 @@ pub enum LightKind {
 pub(crate) const LUMENS_PER_WATT: f32 = 683.0;
 
 impl LightKind {
-    /// Whether it shines from beyond the scene, in all directions.
+    /// Whether it emits from beyond the scene, in all directions.
     pub fn is_environment(&self) -> bool {
         matches!(self, LightKind::Environment { .. } | LightKind::Sky(_))
     }

@@ -56,7 +56,7 @@ pub struct Material {
     pub emission: Vec3,
     /// Multiplies the emission.
     pub emission_texture: Option<TextureUse>,
-    /// The back scatters (and shines) as the front does.
+    /// The back scatters (and emits) as the front does.
     pub two_sided: bool,
     /// Of [`Surface::Layered`], as all below. The texture of the base colour has alpha, too.
     pub coverage: Coverage,
@@ -69,7 +69,7 @@ pub struct Material {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct LobeKinds {
     /// Photon maps know these.
-    pub matt: bool,
+    pub rough: bool,
     /// Rays follow these.
     pub sharp_reflection: bool,
     pub sharp_transmission: bool,
@@ -90,7 +90,7 @@ impl LobeKinds {
     pub fn of(material: &Material, range: &mut impl FnMut(usize, usize) -> (f32, f32)) -> LobeKinds {
         let none = LobeKinds::default();
         match material.surface {
-            Surface::Lambert | Surface::PaperPhong { .. } | Surface::Glossy { .. } => LobeKinds { matt: true, ..none },
+            Surface::Lambert | Surface::PaperPhong { .. } | Surface::Glossy { .. } => LobeKinds { rough: true, ..none },
             Surface::Mirror => LobeKinds { sharp_reflection: true, ..none },
             Surface::Dielectric { .. } => LobeKinds { sharp_reflection: true, sharp_transmission: true, ..none },
             Surface::Layered => LobeKinds::of_layered(material, range),
@@ -129,15 +129,15 @@ impl LobeKinds {
         if of.is_unlit {
             return LobeKinds { passing: !is_covered, ..LobeKinds::default() };
         }
-        let matt = is_diffuse
+        let rough = is_diffuse
             || of.sheen_colour != Vec3::ZERO
             || (reflects && alpha.1 >= map_alpha && !is_stretched && !(transmits && !is_pane && transmission.0 >= 1.0))
             || (of.coat > 0.0 && coat_alpha.1 >= map_alpha);
         // A surface without a lobe is black; light still arrives there.
-        let is_black = !matt && !reflects && !transmits && !is_beyond && of.coat == 0.0;
+        let is_black = !rough && !reflects && !transmits && !is_beyond && of.coat == 0.0;
         let has_width = |alpha: (f32, f32)| alpha.1 >= delta_alpha;
         LobeKinds {
-            matt: matt || is_black,
+            rough: rough || is_black,
             sharp_reflection: (reflects && (alpha.0 < map_alpha || is_stretched || (transmits && !is_pane)))
                 || (of.coat > 0.0 && coat_alpha.0 < map_alpha),
             sharp_transmission: is_beyond || (transmits && !(is_pane && alpha.1 < delta_alpha)),
@@ -195,7 +195,7 @@ impl Material {
         self.enclosed_medium().is_some() && self.layers.transmission > 0.0 && self.layers.ior_spread() > 0.0
     }
 
-    /// Whether its back scatters and shines as the front does: what transmits lets light out there.
+    /// Whether its back scatters and emits as the front does: what transmits lets light out there.
     pub fn has_two_sides(&self) -> bool {
         self.two_sided || self.transmits()
     }

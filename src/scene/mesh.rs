@@ -14,13 +14,13 @@ pub struct Mesh {
     pub name: String,
     /// Metres, world.
     pub positions: Vec<DVec3>,
-    /// Unit shading normals, one a vertex; empty where the mesh is flat.
+    /// Unit shading normals, one per vertex; empty where the mesh is flat.
     pub normals: Vec<DVec3>,
-    /// Texture coordinates, one a vertex, of up to two sets; empty where there are none.
+    /// Texture coordinates, one per vertex, of up to two sets; empty where there are none.
     pub uvs: [Vec<DVec2>; 2],
-    /// Linear, one a vertex, each channel from 0 to 1; they multiply the material's base colour. Empty where there are none.
+    /// Linear, one per vertex, each channel from 0 to 1; they multiply the material's base colour. Empty where there are none.
     pub colours: Vec<DVec3>,
-    /// Alpha, one a vertex, which multiplies the material's. Empty where all are 1.
+    /// Alpha, one per vertex, which multiplies the material's. Empty where all are 1.
     pub alphas: Vec<f64>,
     /// Of each triangle's corners, for the texture of the material's normal map: a unit tangent and the sign of the bitangent,
     /// sign * (normal x tangent). Empty where the material has no normal map.
@@ -52,7 +52,7 @@ impl Source {
 }
 
 /// Triangles whose area is below this share of the scene's squared extent are lines: rounding of their corners
-/// alone gives so much. What single precision cannot tell from a line goes when the scene is normalised.
+/// alone gives so much. What single precision cannot distinguish from a line goes when the scene is normalised.
 const MIN_AREA_SHARE: f64 = 1.0 / (1u128 << 80) as f64;
 
 /// Triangles that are not worth sharing among threads.

@@ -18,16 +18,16 @@ pub(crate) mod film;
 pub(crate) mod frame;
 pub(crate) mod geometry;
 pub(crate) mod gltf;
+pub mod image_size;
 pub mod layers;
 pub mod light;
 pub(crate) mod light_tree;
-pub(crate) mod linear_picture;
+pub(crate) mod linear_image;
 pub mod material;
 pub mod mesh;
 pub(crate) mod open_box;
 pub(crate) mod openings;
 pub(crate) mod overlap;
-pub mod picture_size;
 mod planes;
 pub(crate) mod rectangle;
 pub(crate) mod room;
@@ -78,7 +78,7 @@ pub struct Scene {
     pub meshes: Vec<Mesh>,
     pub materials: Vec<Material>,
     pub textures: Vec<Texture>,
-    /// Lights that are no mesh; meshes of an emissive material shine as well.
+    /// Lights that are no mesh; meshes of an emissive material emit light as well.
     pub lights: Vec<Light>,
     pub cameras: Vec<Camera>,
     /// Extensions that the file uses.
@@ -161,7 +161,7 @@ impl Scene {
         self.meshes.iter().map(|mesh| mesh.triangles.len()).sum()
     }
 
-    /// What tells the meshes apart in messages: their names, with node, primitive and instance where several have one name.
+    /// What distinguishes the meshes in messages: their names, with node, primitive and instance where several have one name.
     pub fn mesh_names(&self) -> Vec<String> {
         type Place = (Option<usize>, usize);
         let places = |mesh: &Mesh| -> Place { mesh.source.as_ref().map_or((None, 0), |source| (Some(source.node), source.primitive)) };
@@ -213,7 +213,7 @@ impl Scene {
         self.meshes.par_iter().filter_map(of_mesh).min_by(f64::total_cmp)
     }
 
-    /// Whether anything shines.
+    /// Whether anything emits light.
     pub fn is_lit(&self) -> bool {
         !self.lights.is_empty() || self.meshes.iter().any(|mesh| self.materials[mesh.material].is_emissive())
     }

@@ -12,7 +12,7 @@ use crate::scene::geometry::Geometry;
 pub(crate) const OPENING_SHARE: f64 = 0.75;
 /// Where more rays than this share leave, the scene is open: there is nothing to aim at.
 const OPEN: f64 = 0.125;
-/// Fewer lines tell nothing.
+/// Fewer lines show nothing.
 const LEAST_LINES: usize = 24;
 /// Lines that are looked at, and places between two of them.
 const MOST_LINES: usize = 2048;

@@ -24,7 +24,7 @@ pub(crate) struct Covered {
     /// What remains visible: barycentric weights of the triangle's corners at the corners of each piece.
     pub pieces: Vec<[DVec3; 3]>,
     /// So many hide it that some were left out, and what only they hide counts as visible.
-    pub crowded: bool,
+    pub uncut: bool,
 }
 
 /// Triangles that are cut out of one, the largest first, where these hide each other as often: each then costs time with each
@@ -38,7 +38,7 @@ const CLIPS_AT_ONCE: usize = 4;
 /// Share of the time that goes into finding pairs, about; the rest goes into clipping.
 const PAIRS_SHARE: f64 = 0.5;
 
-/// Which of two overlapping surfaces counts, by mesh: the smaller number. What shines wins over what does not, so that a
+/// Which of two overlapping surfaces counts, by mesh: the smaller number. What emits light wins over what does not, so that a
 /// lamp in a ceiling's plane is seen; what is opaque over what lets light through, as nothing would be lit through it; a small mesh over a
 /// large one, as rugs lie on floors; and at last the first. What is hidden is so from both sides: from behind, a rug with
 /// one side on a floor with two is the rug's back.
@@ -127,19 +127,19 @@ pub(crate) fn find<'a>(
         let mut others: Vec<(u32, Sheet)> = own.iter().map(|(_, other)| (*other, sheet(*other))).collect();
         // How often others are hidden, in all.
         let hidden_count: usize = if others.len() > CLIPS_AT_ONCE { others.iter().map(|(other, _)| hider_count(*other)).sum() } else { 0 };
-        let crowded = others.len() > MOST_CLIPS && hidden_count > MOST_CLIPS * others.len();
-        if crowded {
+        let uncut = others.len() > MOST_CLIPS && hidden_count > MOST_CLIPS * others.len();
+        if uncut {
             let size = |[a, b, c]: &[DVec3; 3]| (*b - *a).cross(*c - *a).length_squared();
             others.sort_by(|(a, one), (b, other)| size(&other.corners).total_cmp(&size(&one.corners)).then(a.cmp(b)));
             others.truncate(MOST_CLIPS);
         }
         // Of a rug in a few layers, each hides a few of very many.
-        let overlaps_often = crowded || hidden_count > others.len() * CLIPS_AT_ONCE.max(others.len() / 8);
+        let overlaps_often = uncut || hidden_count > others.len() * CLIPS_AT_ONCE.max(others.len() / 8);
         let clips_at_once = if overlaps_often { CLIPS_AT_ONCE } else { others.len() };
         let (others, sheets): (Vec<u32>, Vec<Sheet>) = others.into_iter().unzip();
         let pieces = hidden.without(&sheets, clips_at_once)?;
         let alike = others.iter().zip(&sheets).filter(|(_, other)| other.normal.dot(hidden.normal) > 0.0);
-        Some(Covered { triangle: own[0].0 as usize, by: alike.map(|(other, _)| *other as usize).collect(), pieces, crowded })
+        Some(Covered { triangle: own[0].0 as usize, by: alike.map(|(other, _)| *other as usize).collect(), pieces, uncut })
     };
     let hidden: Vec<&[(u32, u32)]> = pairs.chunk_by(|a, b| a.0 == b.0).collect();
     let mut covered = Vec::new();

@@ -103,7 +103,7 @@ mod tests {
 
     /// Of so many, some that differ have the same hash: single ones, and pairs whose numbers then alternate.
     #[test]
-    fn equals_are_told_from_those_with_the_same_hash() {
+    fn equals_are_distinguished_from_those_with_the_same_hash() {
         const COUNT: u32 = 1 << 21;
         const PAIRS: u32 = COUNT / 4;
         let mut found = Vec::new();

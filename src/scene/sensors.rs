@@ -1,4 +1,4 @@
-//! Sheets for points in the air. Photons alone tell what mirrors and glass send to a point, and they are stored where they meet a surface;
+//! Sheets for points in the air. Photons alone show what mirrors and glass send to a point, and they are stored where they meet a surface;
 //! so such a point gets one of its own, in its plane, which all light passes as if it were not there.
 
 use std::borrow::Cow;
@@ -22,7 +22,7 @@ const ON_SURFACE_COSINE: f64 = 0.999_85;
 /// Points in one plane, by their normal and their height.
 const NORMAL_STEPS: f64 = (1u32 << 22) as f64;
 
-/// The scene with sheets for the points, with their normals, that lie on no surface, where photons alone tell some of the light. Without
+/// The scene with sheets for the points, with their normals, that lie on no surface, where photons alone show some of the light. Without
 /// the effects that let light pass a sheet there is none.
 pub(crate) fn with_sensors<'a>(scene: &'a Scene, points: &[(DVec3, DVec3)], settings: &SceneSettings) -> Cow<'a, Scene> {
     let passes = ![Effect::Layers, Effect::Alpha].into_iter().any(|effect| settings.leaves_out(effect));
@@ -65,7 +65,7 @@ impl Surfaces {
             let is_two_sided = scene.materials[mesh.material].has_two_sides();
             (0..mesh.triangles.len()).map(|triangle| (mesh.corners(triangle), mesh.normal(triangle), is_two_sided)).collect::<Vec<_>>()
         };
-        let meshes = scene.meshes.iter().filter(|mesh| kinds[mesh.material].matt);
+        let meshes = scene.meshes.iter().filter(|mesh| kinds[mesh.material].rough);
         let triangles: Vec<_> = meshes.flat_map(of_mesh).filter(|(_, normal, _)| normal.is_finite()).collect();
         Surfaces { tree: BoxTree::new(triangles.par_iter().map(|(corners, ..)| *corners), tolerance), triangles, tolerance }
     }

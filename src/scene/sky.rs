@@ -7,7 +7,7 @@ use std::path::Path;
 use glam::{DQuat, DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::linear_picture::{self, LinearPicture};
+use super::linear_image::{self, LinearImage};
 use super::texture::{Filter, Texels, Texture, Wrap};
 use crate::text::counted;
 
@@ -27,10 +27,10 @@ impl Sky {
     /// Reads a Radiance (`.hdr`) or OpenEXR (`.exr`) file; an error says what is wrong with it, and what to do.
     pub fn read(path: &Path) -> Result<Sky, String> {
         let content = super::file::read(path)?;
-        if !linear_picture::is_one(&content) {
+        if !linear_image::is_one(&content) {
             return Err("is neither a Radiance (.hdr) nor an OpenEXR (.exr) picture; convert it to one of them".into());
         }
-        let LinearPicture { width, height, colours, exposure, .. } = LinearPicture::decode(content)?;
+        let LinearImage { width, height, colours, exposure, .. } = LinearImage::decode(content)?;
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let mut sky = Sky::of(name, width, height, colours);
         sky.strength /= exposure;

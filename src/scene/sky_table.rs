@@ -187,7 +187,7 @@ mod tests {
     use super::*;
     use crate::scene::sky::tests::sky;
 
-    /// Every cell that can shine is chosen, shares sum to 1, and the integral is that of the picture.
+    /// Every cell that can emit is chosen, shares sum to 1, and the integral is that of the picture.
     #[test]
     fn tables_hold_all_light() {
         for (width, height, bright) in [(1u32, 1u32, 0u32), (2, 1, 1), (7, 5, 17), (64, 32, 1000), (4096, 2048, 5_000_000)] {

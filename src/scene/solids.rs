@@ -69,7 +69,7 @@ impl Shell {
         self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
     }
 
-    /// Whether it lies partly within another, as far as places just inside of it tell.
+    /// Whether it lies partly within another, as far as places just inside of it show.
     fn is_partly_in(&self, other: &Shell) -> bool {
         let mut is_inside = self.places_inside(PLACES_OF_A_PAIR).map(|(_, place)| other.winding(place) != 0);
         let first = is_inside.next();
@@ -146,7 +146,7 @@ pub(crate) fn turn_outwards(scene: &mut Scene) -> BTreeSet<String> {
     names
 }
 
-/// The most solids that lie in one another anywhere, as far as places just inside of their shells tell, if it may be more than `few`; and
+/// The most solids that lie in one another anywhere, as far as places just inside of their shells show, if it may be more than `few`; and
 /// a mesh that has so many around it.
 pub(crate) fn most_nested(scene: &Scene, few: usize, corners_of: impl Fn(u32, u32) -> [DVec3; 3]) -> Option<(usize, u32)> {
     let shells: Vec<Shell> = shells(scene, corners_of).into_values().flatten().collect();
@@ -187,7 +187,7 @@ pub(crate) fn medium(material: &Material) -> Option<(f32, f32, Medium)> {
     material.enclosed_medium().map(|medium| (material.layers.ior, material.layers.ior_spread(), medium))
 }
 
-/// As far as places just inside of their shells tell.
+/// As far as places just inside of their shells show.
 pub(crate) fn order(scene: &Scene) -> Order {
     let medium = |material: usize| medium(&scene.materials[material]);
     let mut media = scene.meshes.iter().filter_map(|mesh| medium(mesh.material));

@@ -28,7 +28,7 @@ pub enum Environment {
     /// The same radiance from everywhere, W/m2/sr.
     Colour([f32; 3]),
     /// A picture of all directions, .hdr or .exr.
-    Picture(PathBuf),
+    Image(PathBuf),
 }
 
 const ENVIRONMENT: &str = "environment";
@@ -52,7 +52,7 @@ impl Surroundings {
         let is_lit = scene.is_lit() || self.environment.is_some() || self.sun.is_some();
         let own = match &self.environment {
             Some(Environment::Colour(radiance)) => Some(LightKind::Environment { radiance: Vec3::from(*radiance) }),
-            Some(Environment::Picture(path)) => {
+            Some(Environment::Image(path)) => {
                 let sky = Sky::read(path).map_err(|reason| Error::setting(ENVIRONMENT, path.display(), reason))?;
                 scene.warnings.extend(sky.warnings.iter().cloned());
                 Some(LightKind::Sky(Arc::new(sky)))

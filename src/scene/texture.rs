@@ -1,4 +1,4 @@
-//! Colour textures: four bytes a texel, as in most files, or eight where they have no bound, and linear values where they are sampled.
+//! Colour textures: four bytes per texel, as in most files, or eight where they have no bound, and linear values where they are sampled.
 
 use std::sync::LazyLock;
 

@@ -170,7 +170,7 @@ with_defaults! {
         pub stop: Stop = Stop::default(),
         /// Invocations of a work group.
         pub group_size: u32 = 128,
-        /// Counters that the atomic builder's work groups take turns at; `None`: as many as serve the device.
+        /// Counters that the atomic builder's work groups use round-robin; `None`: as many as serve the device.
         pub counters: Option<u32> = None,
         /// Most photons traced at once; `None`: as many as the device's buffers hold.
         pub chunk: Option<u32> = None,

@@ -141,14 +141,14 @@ with_defaults! {
         pub shadow_rays: u32 = 4,
         /// Indirect light by a ray to the next surface instead of the map where the camera looks.
         pub final_gather: bool = false,
-        /// Photons of the caustic map leave their lights only towards mirrors and glass (projection maps, Jensen 1996).
+        /// Lights emit photons of the caustic map only towards mirrors and glass (projection maps, Jensen 1996).
         pub aim: bool = true,
         pub illumination: Illumination = Illumination::Split,
         pub part: Part = Part::All,
         /// Keep the parts of each pixel's light apart beside the whole: of a picture of all parts.
         pub keeps_parts: bool = false,
         pub filter: Filter = Filter::Box,
-        /// `None`: persistent; ballot where lanes do not vote right in loops, and with strict arithmetic, which needs so many registers
+        /// `None`: persistent; ballot where subgroup votes in loops return wrong results, and with strict arithmetic, which needs so many registers
         /// that few photons would be under way.
         pub builder: Option<Builder> = None,
         pub math: Math = Math::Fast,

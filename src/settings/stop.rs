@@ -6,11 +6,11 @@ use crate::error::{Result, require};
 
 named! {
     /// What `error` is of. Both are roots of means over pixels, texels or points and their three channels, of light that surfaces
-    /// scatter: what shines by itself and is seen straight is left out (a lamp, the sky, what is unlit).
+    /// scatter: what emits light and is seen straight is left out (a lamp, the sky, what is unlit).
     pub enum Measure {
         /// The root of the mean square of errors, over the mean.
         Rmse = "rmse",
-        /// The root of the mean of squares of errors, each over the square of its value and of a hundredth of the mean.
+        /// Root mean square of the relative errors (epsilon: 1 % of the mean).
         RelMse = "relmse",
     }
 }

@@ -51,12 +51,12 @@ pub const SCENES: [Named; 11] = [
     ("grazing disc", || bench(vec![tilted_disc(DVec3::new(0.9, -0.25, 0.0), EmissionLaw::Uniform)])),
     ("sun", || bench(vec![sun(DVec3::new(-0.3, -1.0, 0.2))])),
     ("sky", || bench(vec![LightKind::Environment { radiance: Vec3::ONE }])),
-    // A textured panel that faces the ball with one side, and two panels that only one side or none shines of.
+    // A textured panel that faces the ball with one side, and two panels that emit from one side only or from none.
     ("two-sided triangles", || {
         let mut scene = bench(vec![]);
         let emission_texture = Some(TextureUse::of(0, 0));
-        scene.materials.push(Material { two_sided: true, emission_texture, ..shining(0.0) });
-        scene.materials.push(shining(0.0));
+        scene.materials.push(Material { two_sided: true, emission_texture, ..emissive(0.0) });
+        scene.materials.push(emissive(0.0));
         scene.textures = vec![texture(2, vec![Vec3::ONE, Vec3::new(0.1, 0.4, 0.2)], [Wrap::Clamp; 2])];
         let (y, z) = (DVec3::Y * 0.4, DVec3::Z * 0.4);
         scene.meshes.push(Mesh::parallelogram("panel", DVec3::new(0.6, 0.8, -0.2), y, z, 3));

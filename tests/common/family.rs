@@ -51,7 +51,7 @@ impl Family {
         self.push(what.into(), found, expected, standard_error, None);
     }
 
-    /// The mean of independent values, of which the spread tells the error. No error is below rounding.
+    /// The mean of independent values, of which the spread gives the error. No error is below rounding.
     pub fn expect_mean(&mut self, what: impl Into<String>, values: &[f64], expected: f64) {
         let (mean, error) = mean_and_error(values);
         self.expect_estimate(what, mean, error, values.len() as u32, expected);
@@ -128,7 +128,7 @@ impl Family {
     /// Fails unless everything holds, and unless every test that `which` names fails, by itself, once its expected
     /// value is wrong by `share`.
     #[track_caller]
-    pub fn assert_tells(&self, share: f64, which: impl Fn(&str) -> bool) {
+    pub fn assert_detects(&self, share: f64, which: impl Fn(&str) -> bool) {
         if let Err(complaint) = self.check() {
             panic!("{complaint}");
         }
@@ -141,8 +141,8 @@ impl Family {
 
     /// The same for all tests and one per cent.
     #[track_caller]
-    pub fn assert_tells_one_per_cent(&self) {
-        self.assert_tells(0.01, |_| true);
+    pub fn assert_detects_one_per_cent(&self) {
+        self.assert_detects(0.01, |_| true);
     }
 }
 

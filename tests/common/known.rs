@@ -7,9 +7,9 @@ use glam::dvec3;
 
 use super::estimate_check;
 use super::lamps;
-use super::lit::sides;
 use super::prelude::*;
-use photonmill::engine::scene::{RunResult, Target};
+use super::rendered::sides;
+use photonmill::engine::scene::{Receivers, RunResult};
 use photonmill::verify::selfcheck::Estimate;
 
 /// Settings of which rooms of many triangles and few, with sheets of two sides and without, have one set of kernels.
@@ -35,9 +35,9 @@ pub fn kept(settings: SceneSettings) -> SceneSettings {
 
 /// Mean of points in one run, whose rounds are its independent values. Points share photons: as if their errors were one.
 pub fn mean_irradiance(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, points: &[(DVec3, DVec3)]) -> Estimate {
-    let lit = received(gpu, scene, settings, points);
-    let error = standard_errors(&lit).iter().map(|error| error.x).sum::<f64>() / points.len() as f64;
-    Estimate { mean: mean_red(&lit), standard_error: error }
+    let result = received(gpu, scene, settings, points);
+    let error = standard_errors(&result).iter().map(|error| error.x).sum::<f64>() / points.len() as f64;
+    Estimate { mean: mean_red(&result), standard_error: error }
 }
 
 /// A room of 1 m, grey, with a material for lamps.
@@ -50,7 +50,7 @@ pub fn lamp_in_a_box(gpu: &Gpu, illumination: Illumination) -> Check<Complaint> 
     let mut room = bright_room();
     // Numbers without rounding, so that the sides share their corners to the bit.
     let (corner, size) = (DVec3::splat(0.375), dvec3(0.25, 1.0 / 2048.0, 0.25));
-    // Both faces, as light must not pass either way. The lamp shines from below.
+    // Both faces, as light must not pass either way. The lamp emits from below.
     room.meshes.extend(sides(corner, size, true, [1, 0, 0, 0, 0, 0]));
     room.meshes.extend(sides(corner, size, false, [0; 6]));
     let settings = SceneSettings { photons: 20_000, rounds: 4, illumination, ..by_rounds() };
@@ -81,9 +81,9 @@ pub fn ridge(gpu: &Gpu) -> Check<Complaint> {
     let roof = scene_of(halves, vec![matt(0.0)], vec![sun(DVec3::NEG_Y)]);
     let settings = mapped(40_000, 64, 1, 0.1);
     let normal = DVec3::new(-slope.y, slope.x, 0.0);
-    let lit = received(gpu, &roof, &settings, &[(DVec3::NEG_X * 0.02, DVec3::Y), (slope * 0.02, normal)]);
-    red_check("beside the ridge", &lit, 0, 1.0, [0.03, 1e-3])?;
-    red_check("below the ridge", &lit, 1, slope.x, [0.03, 1e-3])
+    let result = received(gpu, &roof, &settings, &[(DVec3::NEG_X * 0.02, DVec3::Y), (slope * 0.02, normal)]);
+    red_check("beside the ridge", &result, 0, 1.0, [0.03, 1e-3])?;
+    red_check("below the ridge", &result, 1, slope.x, [0.03, 1e-3])
 }
 
 /// A spot between its cones, straight onto a plane 1 m off: I s^2 cos^3 where s is how far the cosine is from the outer
@@ -116,7 +116,7 @@ fn texel_at(wrap: Wrap, place: i32, size: i32) -> i32 {
 }
 
 /// A lamp that wears a picture of 3 x 2 texels five times along each side, from -2 to 3: at the middle of every texel
-/// shines that texel.
+/// emits that texel.
 pub fn wrapped_texture(gpu: &Gpu, wrap: [Wrap; 2], is_transformed: bool) -> Check<Complaint> {
     // Any two are half apart in some channel; 188 is the code of 0.503.
     let codes = [[0, 0, 0], [255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 0], [188, 188, 188]];
@@ -159,7 +159,7 @@ pub fn vertex_colours(gpu: &Gpu) -> Check<Complaint> {
     // A square of 2 m fills the picture, seen from far so that all pixels are looked at straight.
     let camera = Camera::looking_at("above", DVec3::Y * 200.0, DVec3::ZERO, DVec3::Z, 2.0 * (1.0f64 / 200.0).atan());
     let settings = SceneSettings { rounds: 4, part: Part::Direct, ..by_rounds() };
-    let lit = seen(gpu, &scene, &settings, &camera, [8, 8]);
+    let result = seen(gpu, &scene, &settings, &camera, [8, 8]);
     let Mesh { positions, triangles, colours, .. } = &scene.meshes[0];
     for pixel in 0..64u32 {
         let place = |k: u32| (f64::from(k) + 0.5) / 4.0 - 1.0;
@@ -173,7 +173,7 @@ pub fn vertex_colours(gpu: &Gpu) -> Check<Complaint> {
             let [a, b, c] = triangle.map(|vertex| colours[vertex as usize]);
             (v >= 0.0 && w >= 0.0 && v + w <= 1.0).then(|| 0.8 * (a * (1.0 - v - w) + b * v + c * w))
         });
-        let (found, expected) = (lit.film.mean(pixel as usize), expected.expect("the floor fills the picture"));
+        let (found, expected) = (result.film.mean(pixel as usize), expected.expect("the floor fills the picture"));
         // A pixel is an eighth of the floor, over which the filter takes the mean of four rounds' places.
         let is_near = (found - expected).abs().cmple(DVec3::splat(0.08)).all();
         Kind::WrongTexel.unless(on_diagonal || is_near, || format!("pixel {pixel}: {found} instead of {expected}"))?;
@@ -195,9 +195,9 @@ pub fn leaning_plane(gpu: &Gpu, illumination: Illumination) -> Check<Complaint> 
     for (what, degrees, cosine) in [("above", 30f64, lean.cos()), ("below", -70.0, 1.0)] {
         let eye = DVec3::new(degrees.to_radians().sin(), degrees.to_radians().cos(), 0.0);
         let camera = Camera::looking_at("eye", eye, DVec3::ZERO, DVec3::Z, 2e-4);
-        let lit = seen(gpu, &plane, &settings, &camera, [1, 1]);
+        let result = seen(gpu, &plane, &settings, &camera, [1, 1]);
         // Photons keep their direction in 30 bits.
-        red_check(&format!("{illumination:?}, from {what} the shading normals"), &lit, 0, 0.8 / PI * cosine, [0.03, 2e-4])?;
+        red_check(&format!("{illumination:?}, from {what} the shading normals"), &result, 0, 0.8 / PI * cosine, [0.03, 2e-4])?;
     }
     Ok(())
 }
@@ -212,7 +212,7 @@ pub fn leaning_scatterer(gpu: &Gpu) -> Check<Complaint> {
     let radius = 0.3;
     let settings = mapped(5000, 32, 2, radius);
     let middle = DVec3::new(lean.tan(), 1.0, 0.0);
-    let lit = received(gpu, &bench, &settings, &[(middle, DVec3::NEG_Y)]);
+    let result = received(gpu, &bench, &settings, &[(middle, DVec3::NEG_Y)]);
     // The mean over the disc of the estimate, by parts of equal area.
     let parts = 64;
     let place = |k: i32| (f64::from(k) + 0.5) / f64::from(parts);
@@ -221,7 +221,7 @@ pub fn leaning_scatterer(gpu: &Gpu) -> Check<Complaint> {
         (middle + DVec3::new(r * cos, 0.0, r * sin)).length_squared().powi(-2)
     });
     let exact = watts * lean.cos() * 0.8 / PI * samples.sum::<f64>() / f64::from(parts * parts);
-    red_check("a leaning scatterer", &lit, 0, exact, [0.03, 1e-3])
+    red_check("a leaning scatterer", &result, 0, exact, [0.03, 1e-3])
 }
 
 /// A white patch back to back with a white plane a hundred times its size, turned so that neither is in its plane to the
@@ -231,13 +231,13 @@ pub fn patch_in_a_plane(gpu: &Gpu) -> Check<Complaint> {
     let meshes = vec![level(0.0, [4.0; 2], false, 0), level(0.0, [0.04; 2], true, 0)];
     let spot = cone(turn * DVec3::new(0.1, 0.5, 0.2), turn * DVec3::new(-0.1, -0.5, -0.2).normalize(), 0.04);
     let sheets = moved(scene_of(meshes, vec![matt(1.0)], vec![spot]), |at| turn * at);
-    let lit = received(gpu, &sheets, &flights(40_000, 2), &[(DVec3::ZERO, turn * DVec3::Y)]);
-    none_returns("a patch in a plane", &lit)
+    let result = received(gpu, &sheets, &flights(40_000, 2), &[(DVec3::ZERO, turn * DVec3::Y)]);
+    none_returns("a patch in a plane", &result)
 }
 
 /// What a flat or convex surface scatters never meets it again: neither the triangle it left nor those beside it.
-pub fn none_returns(what: &str, lit: &RunResult) -> Check<Complaint> {
-    let [first, second] = [lit.fates[0].bounces[0], lit.fates[0].bounces[1]];
+pub fn none_returns(what: &str, result: &RunResult) -> Check<Complaint> {
+    let [first, second] = [result.fates[0].bounces[0], result.fates[0].bounces[1]];
     assert!(first.stored > 10_000, "{what}: only {} photons were scattered", first.stored);
     let met = second.stored + second.absorbed;
     let text = || format!("{what}: {met} of {} scattered photons met the surface again", first.stored);
@@ -251,7 +251,7 @@ fn by_tree_and_list(gpu: &Gpu, scene: &Scene, camera: &Camera, side: u32) -> [Ru
     let by_tree = SceneSettings { with: [with(), vec![Effect::Bvh]].concat(), ..usual() };
     let by_list = SceneSettings { without: vec![Effect::Bvh], ..usual() };
     let [tree, list] = [by_tree, by_list].map(|settings| seen(gpu, scene, &settings, camera, [side; 2]));
-    assert!(tree.plan.keeps(Effect::Bvh) && !list.plan.keeps(Effect::Bvh));
+    assert!(tree.plan.simulates(Effect::Bvh) && !list.plan.simulates(Effect::Bvh));
     [tree, list]
 }
 
@@ -339,10 +339,10 @@ pub fn coarse_sphere_in_a_furnace(gpu: &Gpu, material: Material, segments: u32) 
     let scene = coarse_sphere(material, segments, LightKind::Environment { radiance: Vec3::ONE });
     let camera = Camera::looking_at("front", DVec3::new(0.3, 0.4, 4.0), DVec3::ZERO, DVec3::Y, 0.55);
     let settings = of_coarse_spheres(SceneSettings { samples: 1, rounds: 16, photons: 1000, ..by_rounds() });
-    let lit = seen(gpu, &scene, &settings, &camera, [24, 24]);
-    let darkest = lit.film.means().map(|mean| mean.x).fold(f64::INFINITY, f64::min);
-    println!("{segments} segments: {} on the mean, {darkest} at the darkest pixel", mean_red(&lit));
-    estimate_check("the sphere", mean_red(&lit), 1.0, 0.0001)?;
+    let result = seen(gpu, &scene, &settings, &camera, [24, 24]);
+    let darkest = result.film.means().map(|mean| mean.x).fold(f64::INFINITY, f64::min);
+    println!("{segments} segments: {} on the mean, {darkest} at the darkest pixel", mean_red(&result));
+    estimate_check("the sphere", mean_red(&result), 1.0, 0.0001)?;
     estimate_check("its darkest pixel", darkest, 1.0, 0.0001)
 }
 
@@ -350,20 +350,20 @@ pub fn coarse_sphere_in_a_furnace(gpu: &Gpu, material: Material, segments: u32) 
 pub fn coarse_sphere_in_the_sun(gpu: &Gpu, material: Material, segments: u32) -> Check<Complaint> {
     let scene = coarse_sphere(material, segments, sun(DVec3::new(0.2, -1.0, 0.3)));
     let settings = of_coarse_spheres(SceneSettings { photons: 50_000, rounds: 1, illumination: Illumination::Photons, ..by_rounds() });
-    let lit = received(gpu, &scene, &settings, &[(DVec3::new(3.005, -3.0, 3.005), DVec3::Y)]);
-    let ledger = lit.fates[0].ledger();
+    let result = received(gpu, &scene, &settings, &[(DVec3::new(3.005, -3.0, 3.005), DVec3::Y)]);
+    let ledger = result.fates[0].ledger();
     assert!(ledger.closes(), "{ledger}");
     let ended = (ledger.absorbed + ledger.cut_off) as f64 / ledger.emitted as f64;
     // All that is under way at a bounce, on it and after it.
-    let entered = lit.fates[0].bounces.iter().map(|fates| fates.stored + fates.absorbed + fates.escaped);
-    let bounces = entered.skip(1).sum::<u64>() as f64 / lit.fates[0].bounces[0].stored as f64;
+    let entered = result.fates[0].bounces.iter().map(|fates| fates.stored + fates.absorbed + fates.escaped);
+    let bounces = entered.skip(1).sum::<u64>() as f64 / result.fates[0].bounces[0].stored as f64;
     println!("{segments} segments: {ended} of the photons end, {bounces} bounces on the mean");
     Kind::PhotonsLost.unless(ended <= 1e-4, || format!("{ended} of the photons end on a sphere that keeps all"))?;
     Kind::PhotonsAdded.unless(bounces <= 2.5, || format!("{bounces} bounces of a photon that meets the sphere"))
 }
 
 /// Photons that such a sphere passes on light the ground about it as paths from the ground do, which turn the other way.
-/// The judge has this many paths a point: with the fewer of them a tenth of the light is noticed.
+/// The judge has this many paths per point: with the fewer of them a tenth of the light is noticed.
 pub fn ground_by_a_coarse_sphere(gpu: &Gpu, material: Material, segments: u32, paths: u32) -> Check<Complaint> {
     let mut scene = coarse_sphere(material, segments, LightKind::Environment { radiance: Vec3::splat(1e-6) });
     scene.materials.push(Material { emission: Vec3::splat(10.0), ..matt(0.0) });
@@ -374,15 +374,15 @@ pub fn ground_by_a_coarse_sphere(gpu: &Gpu, material: Material, segments: u32, p
     let points: Vec<_> = places.iter().flat_map(|x| places.map(|z| (DVec3::new(*x, -1.2, z), DVec3::Y))).collect();
     let caustic = SceneSettings { caustic_photons: 5 * paths, caustic_radius: Some(0.2), rounds: 8, part: Part::Caustic, ..by_rounds() };
     let settings = of_coarse_spheres(caustic);
-    let lit = received(gpu, &scene, &settings, &points);
+    let result = received(gpu, &scene, &settings, &points);
     let truth = Judge::new(&scene, 64).irradiance_at(&points, paths, 1);
     let count = points.len() as f64;
     let expected = truth.iter().map(|point| point.mean.caustic.x).sum::<f64>() / count;
-    let error = (0..points.len()).map(|place| red(&lit, place).1.powi(2)).sum::<f64>();
+    let error = (0..points.len()).map(|place| red(&result, place).1.powi(2)).sum::<f64>();
     let error = (error + truth.iter().map(|point| point.standard_error.caustic.x.powi(2)).sum::<f64>()).sqrt() / count;
-    println!("{segments} segments: {} on the ground, {expected} +- {error} expected", mean_red(&lit));
+    println!("{segments} segments: {} on the ground, {expected} +- {error} expected", mean_red(&result));
     assert!(error < if paths < 10_000 { 0.04 } else { 0.02 } * expected, "{error} of {expected}");
-    estimate_check("the ground", mean_red(&lit), expected, error)
+    estimate_check("the ground", mean_red(&result), expected, error)
 }
 
 /// A block of glass and a mirror in a furnace are not to be seen: all directions are equally bright, whatever way a path
@@ -393,20 +393,20 @@ pub fn glass_in_a_furnace(gpu: &Gpu, samples: u32, final_gather: bool) -> Check<
     room.meshes.extend(sides(DVec3::new(0.1, 0.3, 0.1), DVec3::splat(0.25), false, [1; 6]));
     room.meshes.push(Mesh::parallelogram("mirror", DVec3::new(0.4, 0.1, 0.2), DVec3::X * 0.25, DVec3::Y * 0.25, 2));
     let settings = SceneSettings { samples, final_gather, shadow_rays: 2, photons: 20_000, rounds: 8, ..by_rounds() };
-    let lit = seen(gpu, &room, &settings, &room.cameras[0], [24, 24]);
+    let result = seen(gpu, &room, &settings, &room.cameras[0], [24, 24]);
     // Emission over what a wall absorbs.
     let expected = 1.0 / (1.0 - 0.5);
-    let errors = (0..lit.film.pixels()).map(|pixel| lit.film.standard_error(pixel).x.powi(2)).sum::<f64>();
-    let error = errors.sqrt() / lit.film.pixels() as f64;
-    println!("{samples} samples, gather {final_gather}: {} +- {error}, {expected} expected", mean_red(&lit));
+    let errors = (0..result.film.pixels()).map(|pixel| result.film.standard_error(pixel).x.powi(2)).sum::<f64>();
+    let error = errors.sqrt() / result.film.pixels() as f64;
+    println!("{samples} samples, gather {final_gather}: {} +- {error}, {expected} expected", mean_red(&result));
     assert!(error < 0.005 * expected, "{error}");
-    estimate_check("a furnace with glass", mean_red(&lit), expected, error.max(0.003 * expected))
+    estimate_check("a furnace with glass", mean_red(&result), expected, error.max(0.003 * expected))
 }
 
 /// All light of the photon map on the floors of a room and of a hall of its shape, 50 times as large, each with a lamp of as much power;
 /// four times as many points of the hall are asked. Radii follow the density of photons, and the light is the same but for a factor.
 pub fn room_beside_a_hall(gpu: &Gpu) -> Check<Complaint> {
-    let mut scene = scene_of(Vec::new(), vec![matt(0.5), shining(0.0), shining(0.0)], vec![]);
+    let mut scene = scene_of(Vec::new(), vec![matt(0.5), emissive(0.0), emissive(0.0)], vec![]);
     scene.materials[2].emission *= 2500.0;
     let places = [-1.6, -0.5, 0.7, 1.8].iter().flat_map(|x| [-1.9, -0.8, 0.9, 1.4].map(|z| DVec3::new(*x, 0.0, z)));
     let [hall, room] = [(50.0, DVec3::ZERO, 1), (1.0, DVec3::new(150.0, 0.0, 0.0), 2)].map(|(scale, way, lamp)| {
@@ -418,8 +418,8 @@ pub fn room_beside_a_hall(gpu: &Gpu) -> Check<Complaint> {
     });
     let points = [vec![hall.clone(); 4].concat(), room.clone()].concat();
     let settings = SceneSettings { photons: 1 << 15, rounds: 48, illumination: Illumination::Photons, ..by_rounds() };
-    let lit = lamps::lit(gpu, &scene, &settings, &points, true);
-    let mean = |point: usize| lit.film.mean(point).x;
+    let result = lamps::result_of(gpu, &scene, &settings, &points, true);
+    let mean = |point: usize| result.film.mean(point).x;
     let ratios: Vec<f64> = (0..room.len()).map(|point| mean(4 * hall.len() + point) / mean(point) / 2500.0).collect();
     let count = ratios.len() as f64;
     let (ratio, deviation) = (ratios.iter().sum::<f64>() / count, (ratios.iter().map(|r| (r - 1.0).powi(2)).sum::<f64>() / count).sqrt());
@@ -431,14 +431,14 @@ pub fn room_beside_a_hall(gpu: &Gpu) -> Check<Complaint> {
 /// A room of 1 m, lit on one side of a sheet across it at x = 1/2: the brightest place of the other side's floor, right behind the sheet.
 pub fn behind_a_wall(gpu: &Gpu) -> Check<Complaint> {
     let mut room = scene("furnace");
-    room.materials = vec![matt(0.7), shining(0.5), Material { two_sided: true, ..matt(0.7) }];
+    room.materials = vec![matt(0.7), emissive(0.5), Material { two_sided: true, ..matt(0.7) }];
     room.meshes.push(Mesh::parallelogram("wall", DVec3::X * 0.5, DVec3::Z, DVec3::Y, 2));
     room.meshes.push(Mesh::parallelogram("lamp", dvec3(0.1, 0.9, 0.3), DVec3::X * 0.2, DVec3::Z * 0.2, 1));
     let behind = [1e-5, 1e-4, 1e-3, 1e-2, 0.05];
     let points: Vec<_> =
         behind.iter().flat_map(|behind| [0.01, 0.3, 0.6, 0.999].map(|z| (dvec3(0.5 + behind, 0.0, z), DVec3::Y))).collect();
     let settings = SceneSettings { photons: 30_000, rounds: 4, radius: Some(0.1), ..by_rounds() };
-    let found = means(&render(gpu, &room, &settings, Target::Points(&points))?);
+    let found = means(&render(gpu, &room, &settings, Receivers::Points(&points))?);
     let (point, leaked) = pairs(&points, &found).max_by(|a, b| a.1.x.total_cmp(&b.1.x)).expect("points are asked for");
     Kind::Leak.unless(*leaked == DVec3::ZERO, || format!("{leaked} W/m2 at {}", point.0))
 }
@@ -455,10 +455,10 @@ pub fn tiny_plates(gpu: &Gpu) -> Check<Complaint> {
     let points: Vec<_> = places.iter().map(|at| (*at + dvec3(0.4, 0.0, 0.3) * width, DVec3::Y)).collect();
     let settings =
         SceneSettings { photons: 100_000, rounds: 4, radius: Some(0.4), alpha: 1.0, illumination: Illumination::Photons, ..by_rounds() };
-    let lit = render(gpu, &room, &settings, Target::Points(&points))?;
-    println!("plates: {} of 2 pi", mean_red(&lit) / TAU);
+    let result = render(gpu, &room, &settings, Receivers::Points(&points))?;
+    println!("plates: {} of 2 pi", mean_red(&result) / TAU);
     // Five hundred photons in all.
-    estimate_check("the mean plate", mean_red(&lit), TAU, 0.045 * TAU)
+    estimate_check("the mean plate", mean_red(&result), TAU, 0.045 * TAU)
 }
 
 /// In a furnace all light is the same everywhere, and half of it has been scattered: that half, around a box that stands on a floor which
@@ -475,11 +475,11 @@ pub fn beside_a_box(gpu: &Gpu) -> Check<Complaint> {
     };
     let points: Vec<_> = [0.001, 0.004, 0.01, 0.02].into_iter().flat_map(around).collect();
     let settings = SceneSettings { photons: 30_000, rounds: 32, radius: Some(0.1), part: Part::Indirect, ..by_rounds() };
-    let lit = render(gpu, &room, &settings, Target::Points(&points))?;
+    let result = render(gpu, &room, &settings, Receivers::Points(&points))?;
     for (place, (point, _)) in points.iter().enumerate() {
-        let error = lit.film.stated_error(place).x;
-        estimate_check(&format!("beside the box at {point}"), lit.film.mean(place).x, PI, error)?;
+        let error = result.film.stated_error(place).x;
+        estimate_check(&format!("beside the box at {point}"), result.film.mean(place).x, PI, error)?;
     }
     // The points lie within each other's discs, so that their mean is little better known than one of them.
-    estimate_check("all around the box", mean_red(&lit), PI, 0.02 * PI)
+    estimate_check("all around the box", mean_red(&result), PI, 0.02 * PI)
 }

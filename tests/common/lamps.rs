@@ -7,7 +7,7 @@ use glam::dvec3;
 use super::known::of_any_room;
 use super::prelude::*;
 use crate::tests::engine::unseen_light::room_without_floor;
-use photonmill::engine::scene::{RunResult, Target, View, trial};
+use photonmill::engine::scene::{Receivers, RunResult, Viewpoint, trial};
 
 fn lamp_of(radiance: f32) -> Material {
     Material { emission: Vec3::splat(radiance), ..matt(0.0) }
@@ -52,23 +52,27 @@ pub fn points() -> Vec<(DVec3, DVec3)> {
 
 /// What a device would do for points: by what a trial sees of the lights, or without one.
 pub fn planned(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, points: &[(DVec3, DVec3)], by_sight: bool) -> (Geometry, ScenePlan) {
-    let target = Target::Points(points);
+    let receivers = Receivers::Points(points);
     if !by_sight {
-        return scene_plan(gpu, scene, settings, target.sensor()).unwrap();
+        return scene_plan(gpu, scene, settings, receivers.sensor()).unwrap();
     }
     let geometry = Geometry::new(scene).unwrap();
-    let view = View { geometry: &geometry, camera: None, phases: &target.phases(&geometry) };
-    let plan = trial::plan(gpu, scene, &view, settings, target.sensor()).unwrap();
+    let viewpoint = Viewpoint { geometry: &geometry, camera: None, phases: &receivers.phases(&geometry) };
+    let plan = trial::plan(gpu, scene, &viewpoint, settings, receivers.sensor()).unwrap();
     (geometry, plan)
 }
 
 /// Irradiance at points by such a plan.
-pub fn lit_as(gpu: &Gpu, (geometry, plan): (Geometry, ScenePlan), points: &[(DVec3, DVec3)]) -> RunResult {
-    super::lit::light(gpu, &View { geometry: &geometry, camera: None, phases: &Target::Points(points).phases(&geometry) }, plan)
+pub fn result_of_plan(gpu: &Gpu, (geometry, plan): (Geometry, ScenePlan), points: &[(DVec3, DVec3)]) -> RunResult {
+    super::rendered::light(
+        gpu,
+        &Viewpoint { geometry: &geometry, camera: None, phases: &Receivers::Points(points).phases(&geometry) },
+        plan,
+    )
 }
 
-pub fn lit(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, points: &[(DVec3, DVec3)], by_sight: bool) -> RunResult {
-    lit_as(gpu, planned(gpu, scene, settings, points, by_sight), points)
+pub fn result_of(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, points: &[(DVec3, DVec3)], by_sight: bool) -> RunResult {
+    result_of_plan(gpu, planned(gpu, scene, settings, points, by_sight), points)
 }
 
 pub fn usual() -> SceneSettings {
@@ -99,9 +103,9 @@ pub fn same_light_and_noise(what: &str, found: &RunResult, expected: &RunResult,
 
 /// Direct light of a room beside one whose lamp is so many times as strong, compared with that of the room alone.
 pub fn dim_room(gpu: &Gpu, ratio: f32, by_sight: bool) -> Check<Complaint> {
-    let alone = lit(gpu, &rooms(&[1.0]), &direct(128), &points(), false);
+    let alone = result_of(gpu, &rooms(&[1.0]), &direct(128), &points(), false);
     let both = [points(), points().into_iter().map(|(at, normal)| (at + ROOM, normal)).collect()].concat();
-    let found = lit(gpu, &rooms(&[1.0, ratio]), &direct(128), &both, by_sight);
+    let found = result_of(gpu, &rooms(&[1.0, ratio]), &direct(128), &both, by_sight);
     same_light_and_noise(&format!("a room beside one of {ratio:e}"), &found, &alone, 3.0)
 }
 
@@ -122,8 +126,8 @@ pub fn cut_lamp(side: u32) -> Scene {
 
 /// Direct light of a lamp of many pieces, compared with that of the lamp as one.
 pub fn many_lamps(gpu: &Gpu, side: u32, by_sight: bool) -> Check<Complaint> {
-    let whole = lit(gpu, &cut_lamp(1), &direct(128), &points(), false);
-    let found = lit(gpu, &cut_lamp(side), &direct(128), &points(), by_sight);
+    let whole = result_of(gpu, &cut_lamp(1), &direct(128), &points(), false);
+    let found = result_of(gpu, &cut_lamp(side), &direct(128), &points(), by_sight);
     same_light_and_noise(&format!("{side} x {side} lamps"), &found, &whole, 2.0)
 }
 
@@ -132,12 +136,12 @@ pub fn missed_lamp(gpu: &Gpu) -> Check<Complaint> {
     let lamps = [-1.0, 1.0].map(|x| square_lamp(dvec3(x, 2.9, 0.5), 0.6, 1)).to_vec();
     let scene = scene_of([dark_room(DVec3::ZERO), lamps].concat(), vec![matt(0.5), lamp_of(1.0)], vec![]);
     let floor: Vec<_> = points().into_iter().take(25).collect();
-    let by_power = lit(gpu, &scene, &direct(256), &floor, false);
+    let by_power = result_of(gpu, &scene, &direct(256), &floor, false);
     let (geometry, mut plan) = planned(gpu, &scene, &direct(256), &floor, true);
     let lights = Arc::make_mut(plan.trial.as_mut().and_then(|trial| trial.lights.as_mut()).expect("a trial learned of lights"));
     assert_eq!(lights.clusters, 4);
     lights.shares = [0.5, 1.0, 1.0, 1.0, 0.0, 0.0, 0.5, 1.0].repeat(lights.shares.len() / 8);
-    let missed = lit_as(gpu, (geometry, plan), &floor);
+    let missed = result_of_plan(gpu, (geometry, plan), &floor);
     // One place in four asks for it, so that it has far more noise.
     same_light_and_noise("a lamp that the trial missed", &missed, &by_power, f64::INFINITY)
 }
@@ -154,16 +158,16 @@ pub fn screened(mut rooms: Scene) -> Scene {
 pub fn scattered_light(gpu: &Gpu, ratio: f32, by_sight: bool) -> Check<Complaint> {
     let settings = SceneSettings { photons: 1 << 15, ..usual() };
     let all = |scene: &Scene| match by_sight {
-        true => render(gpu, scene, &settings, Target::Points(&points())).unwrap(),
-        false => lit(gpu, scene, &settings, &points(), false),
+        true => render(gpu, scene, &settings, Receivers::Points(&points())).unwrap(),
+        false => result_of(gpu, scene, &settings, &points(), false),
     };
     let [alone, found] = [all(&rooms(&[1.0])), all(&rooms(&[1.0, ratio]))];
     let unknown = found.film.unknown(0.95);
     let is_known = unknown.unreached == 0 && unknown.absent.is_empty();
     Kind::TooDark.unless(is_known, || unknown.text("point", "W/m2", 0.95, found.film.rounds))?;
-    let sums = |lit: &RunResult, of: &dyn Fn(&RunResult, usize) -> f64| (0..points().len()).map(|point| of(lit, point)).sum::<f64>();
-    let means = [&alone, &found].map(|lit| sums(lit, &|lit, point| red(lit, point).0));
-    let noise = [&alone, &found].map(|lit| sums(lit, &|lit, point| (red(lit, point).1 / red(&alone, point).0).powi(2)));
+    let sums = |result: &RunResult, of: &dyn Fn(&RunResult, usize) -> f64| (0..points().len()).map(|point| of(result, point)).sum::<f64>();
+    let means = [&alone, &found].map(|result| sums(result, &|result, point| red(result, point).0));
+    let noise = [&alone, &found].map(|result| sums(result, &|result, point| (red(result, point).1 / red(&alone, point).0).powi(2)));
     println!("1:{ratio:e}: {:.4} of the light, {:.3} times the variance", means[1] / means[0], noise[1] / noise[0]);
     relative_check("all light", means[1], means[0], 0.03).map_err(|text| Complaint::new(Kind::TooDark, text))?;
     relative_check("variance", noise[1].max(noise[0]), noise[0], 2.0).map_err(|text| Complaint::new(Kind::TooNoisy, text))
@@ -173,8 +177,8 @@ pub fn scattered_light(gpu: &Gpu, ratio: f32, by_sight: bool) -> Check<Complaint
 pub fn hidden_lamp(gpu: &Gpu, ratio: f32, by_sight: bool) -> Check<Complaint> {
     let floor: Vec<_> = points().into_iter().take(25).collect();
     let settings = SceneSettings { photons: 1 << 14, rounds: 24, radius: Some(0.4), part: Part::Indirect, ..usual() };
-    let alone = lit(gpu, &screened(rooms(&[1.0])), &settings, &floor, false);
-    let found = lit(gpu, &screened(rooms(&[1.0, ratio])), &settings, &floor, by_sight);
+    let alone = result_of(gpu, &screened(rooms(&[1.0])), &settings, &floor, false);
+    let found = result_of(gpu, &screened(rooms(&[1.0, ratio])), &settings, &floor, by_sight);
     same_light_and_noise(&format!("a hidden lamp beside one of {ratio:e}"), &found, &alone, 4.0)
 }
 
@@ -197,7 +201,7 @@ pub fn bright_spot(gpu: &Gpu, wrap: Wrap, illumination: Illumination) -> Check<C
     let (texture, mesh) = (&scene.textures[0], &scene.meshes[1]);
     let points: Vec<_> = [(0.1, 0.0), (-0.9, 0.4), (0.6, 0.8)].map(|(x, z)| (dvec3(x, 0.0, z), DVec3::Y)).into();
     let settings = SceneSettings { illumination, photons: 1 << 14, rounds: 64, radius: Some(0.1), alpha: 1.0, ..by_rounds() };
-    let found = lit(gpu, &scene, &settings, &points, false);
+    let found = result_of(gpu, &scene, &settings, &points, false);
     // Between four places a texel samples are linear.
     let steps = 1024;
     let (origin, u, v) = (mesh.positions[0], mesh.positions[1] - mesh.positions[0], mesh.positions[3] - mesh.positions[0]);

@@ -409,7 +409,7 @@ fn of_both(error: DVec3, other: DVec3) -> DVec3 {
     (error * error + other * other).map(f64::sqrt)
 }
 
-/// Opaque plates under a sky that is 1 everywhere, or of which a dome that shines as much hides one half. Where they have a direction,
+/// Opaque plates under a sky that is 1 everywhere, or of which a dome that emits as much hides one half. Where they have a direction,
 /// it is along their rows.
 pub fn furnace(gpu: &Gpu, materials: &[Returns], within_a_dome: bool) -> Check<Complaint> {
     let mut plates = Plates::new(materials.len(), vec![LightKind::Environment { radiance: Vec3::ONE }]);
@@ -421,7 +421,7 @@ pub fn furnace(gpu: &Gpu, materials: &[Returns], within_a_dome: bool) -> Check<C
     }
     if within_a_dome {
         plates.scene.meshes.push(half_a_dome(plates.scene.materials.len()));
-        plates.scene.materials.push(shining(0.0));
+        plates.scene.materials.push(emissive(0.0));
     }
     let settings = under_samples();
     let (found, errors) = plates.seen(gpu, &settings);
@@ -451,11 +451,11 @@ pub fn transmission_in_half_a_dome(gpu: &Gpu) -> Check<Complaint> {
     let paper = Layers { diffuse_transmission: 0.7, diffuse_transmission_colour: Vec3::new(0.3, 0.9, 0.6), ..plastic(0.4) };
     for layers in [Layers { transmission: 0.6, ..plastic(0.4) }, Layers { transmission: 1.0, medium: CLEAR, ..plastic(0.4) }, paper] {
         let material = layered(Vec3::new(0.8, 0.5, 0.2), &layers);
-        let scene = scene_of(vec![level(0.0, [0.1; 2], true, 0), half.clone()], vec![material.clone(), shining(0.0)], Vec::new());
+        let scene = scene_of(vec![level(0.0, [0.1; 2], true, 0), half.clone()], vec![material.clone(), emissive(0.0)], Vec::new());
         let camera = Camera::looking_at("eye", wo, DVec3::ZERO, DVec3::Y, 1e-3);
-        let lit = seen(gpu, &scene, &under_samples(), &camera, [4, 4]);
+        let result = seen(gpu, &scene, &under_samples(), &camera, [4, 4]);
         let (expected, own) = under_the_sky(&lobes_at(&material, &Place::of_normal(DVec3::Y, wo), DVec3::Y), |wi| f64::from(wi.x < 0.0));
-        let (found, error) = mean_of_all(&means(&lit));
+        let (found, error) = mean_of_all(&means(&result));
         println!("{layers:?}: {found} +- {error}, {expected} +- {own} expected");
         let error = of_both(error, own).max(6e-4 * expected);
         colour_check(&format!("transmission {}", layers.transmission), found, expected, error)?;
@@ -471,9 +471,9 @@ pub fn photons_on_a_plate(gpu: &Gpu) -> Check<Complaint> {
     let plate = scene_of(vec![level(0.0, [2.0; 2], true, 0)], vec![material.clone()], vec![sun(-way)]);
     let wo = DVec3::new(0.6, 0.6, -0.5).normalize();
     let camera = Camera::looking_at("eye", wo, DVec3::ZERO, DVec3::Y, 1e-4);
-    let lit = seen(gpu, &plate, &mapped(20_000, 32, 1, 0.5), &camera, [1, 1]);
+    let result = seen(gpu, &plate, &mapped(20_000, 32, 1, 0.5), &camera, [1, 1]);
     let expected = in_the_sun(&lobes_at(&material, &Place::of_normal(DVec3::Y, wo), DVec3::Y), way);
-    let (found, error) = (lit.film.mean(0), lit.film.standard_error(0));
+    let (found, error) = (result.film.mean(0), result.film.standard_error(0));
     println!("photons on a plate: {found} +- {error}, {expected} expected");
     assert!((error / expected).max_element() < 0.02, "{error}");
     colour_check("photons on a plate", found, expected, error)
@@ -518,11 +518,11 @@ pub fn clear_furnace(gpu: &Gpu, is_clear: bool) -> Check<Complaint> {
         // Rough reflection of a single scattering leaves 0.1 % of what the dielectric mirrors, and density estimates blur.
         false => (SceneSettings { samples: 4, photons: 20_000, caustic_photons: 20_000, ..by_rounds() }, 2e-3),
     };
-    let lit = seen(gpu, &scene, &settings, &camera, [8 * count as u32, 8]);
+    let result = seen(gpu, &scene, &settings, &camera, [8 * count as u32, 8]);
     for k in 0..count {
         let pixels = || (0..8).flat_map(move |row| (0..8).map(move |column| 8 * (row * count + k) + column));
-        let mean = pixels().map(|at| lit.film.mean(at).x).sum::<f64>() / 64.0;
-        let error = pixels().map(|at| lit.film.standard_error(at).x.powi(2)).sum::<f64>().sqrt() / 64.0;
+        let mean = pixels().map(|at| result.film.mean(at).x).sum::<f64>() / 64.0;
+        let error = pixels().map(|at| result.film.standard_error(at).x.powi(2)).sum::<f64>().sqrt() / 64.0;
         println!("thing {k}, clear: {is_clear}: {mean} +- {error}");
         estimate_check(&format!("thing {k}, clear: {is_clear}"), mean, 1.0, error.max(blurred))?;
     }

@@ -14,7 +14,6 @@ pub mod gltf_file;
 pub mod known;
 pub mod lamps;
 pub mod layered;
-pub mod lit;
 pub mod pairwise;
 pub mod planted;
 pub mod plates;
@@ -22,6 +21,7 @@ pub mod prelude;
 pub mod program;
 pub mod rectangles;
 pub mod reference;
+pub mod rendered;
 pub mod rich_file;
 pub mod sheets;
 pub mod sources;
@@ -154,10 +154,10 @@ pub fn run_scene(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings) -> RunRe
 }
 
 /// What a run comes to, where it may fail: with `paranoid` no value may be infinite or no number.
-pub fn outcome_of(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings) -> Result<RunResult, Complaint> {
-    let outcome = room::on_gpu(gpu, scene, settings, &mut Control::default())?;
-    outcome.nonfinite_values.as_ref().map_or(Ok(()), nothing_odd)?;
-    Ok(outcome)
+pub fn room_result_of(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings) -> Result<RunResult, Complaint> {
+    let result = room::on_gpu(gpu, scene, settings, &mut Control::default())?;
+    result.nonfinite_values.as_ref().map_or(Ok(()), nothing_odd)?;
+    Ok(result)
 }
 
 pub fn nothing_odd(nonfinite_values: &NonfiniteValues) -> Check<Complaint> {
@@ -167,9 +167,9 @@ pub fn nothing_odd(nonfinite_values: &NonfiniteValues) -> Check<Complaint> {
 /// Whatever is run here comes to an end, and has no value that is infinite or no number.
 fn sound(settings: &RoomSettings, run: impl FnOnce(&RoomSettings, &mut Control) -> Result<RunResult, Error>) -> RunResult {
     let settings = RoomSettings { paranoid: true, ..settings.clone() };
-    let outcome = run(&settings, &mut Control::default()).unwrap_or_else(|error| panic!("{error}\n{settings:?}"));
-    assert_holds("the run", nothing_odd(outcome.nonfinite_values.as_ref().expect("somebody looked")));
-    outcome
+    let result = run(&settings, &mut Control::default()).unwrap_or_else(|error| panic!("{error}\n{settings:?}"));
+    assert_holds("the run", nothing_odd(result.nonfinite_values.as_ref().expect("somebody looked")));
+    result
 }
 
 /// Runs the open box on the CPU builder to its end.

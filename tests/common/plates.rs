@@ -1,8 +1,8 @@
 //! Plates of many materials in one picture, each with a pixel of its own: they lie in faces of one convex body, so that none sees
 //! another.
 
-use super::lit::{scene_of, seen};
 use super::prelude::*;
+use super::rendered::{scene_of, seen};
 
 /// Cosines between the normals of the plates of each row and the way to the eye.
 pub const COSINES: [f64; 5] = [1.0, 0.8, 0.5, 0.2, 0.05];
@@ -64,9 +64,9 @@ impl Plates {
         let size = [2 * self.columns - 1, 2 * COSINES.len() - 1];
         let half_height = 0.25 * PITCH * size[1] as f64;
         let camera = Camera::looking_at("eye", EYE, DVec3::ZERO, DVec3::Y, 2.0 * (half_height / EYE.z).atan());
-        let lit = seen(gpu, &self.scene, settings, &camera, size.map(|pixels| pixels as u32));
+        let result = seen(gpu, &self.scene, settings, &camera, size.map(|pixels| pixels as u32));
         let pixels = || self.places.iter().map(|place| (size[1] - 1 - 2 * place.row) * size[0] + 2 * place.column);
-        (pixels().map(|at| lit.film.mean(at)).collect(), pixels().map(|at| lit.film.standard_error(at)).collect())
+        (pixels().map(|at| result.film.mean(at)).collect(), pixels().map(|at| result.film.standard_error(at)).collect())
     }
 }
 

@@ -27,15 +27,15 @@ pub(crate) use photonmill::verify::judge::Judge;
 
 pub use super::aimed::{mean_and_error, mean_of_all};
 pub use super::family::Family;
-pub use super::lit::{
-    BOTH, assert_builders_agree, beam, by_rounds, cone, disc, every_kind_of_light, fixed_radius, flights, glass, grid, irradiances, lamp,
-    level, mapped, matt, mean_red, means, mirror, moved, point, radiances, received, red, red_check, render, same_light, scene, scene_of,
-    scene_plan, scene_plan_within, seen, shaft, shining, square_picture, standard_errors, sun, tessellated, texture,
-};
 pub use super::program::{Place, text};
+pub use super::rendered::{
+    BOTH, assert_builders_agree, beam, by_rounds, cone, disc, emissive, every_kind_of_light, fixed_radius, flights, glass, grid,
+    irradiances, lamp, level, mapped, matt, mean_red, means, mirror, moved, point, radiances, received, red, red_check, render, same_light,
+    scene, scene_of, scene_plan, scene_plan_within, seen, shaft, square_picture, standard_errors, sun, tessellated, texture,
+};
 pub use super::{
     Check, Complaint, Device, JUDGED, Kind, assert_complains, assert_complains_of, assert_holds, closed_box, device, device_with, draws_of,
-    equal_sums, fresh_device, gathered, in_order, is_long_run, no_gpu, of_run, on_back_wall, open, outcome_of, pairs, photons,
-    photons_on_cpu, plan_for, plan_for_host, relative_check, require, run, run_on_cpu, run_scene, run_scene_on_cpu, same_photons,
+    equal_sums, fresh_device, gathered, in_order, is_long_run, no_gpu, of_run, on_back_wall, open, pairs, photons, photons_on_cpu,
+    plan_for, plan_for_host, relative_check, require, room_result_of, run, run_on_cpu, run_scene, run_scene_on_cpu, same_photons,
     same_sums, share_check, streams_of, z_check,
 };

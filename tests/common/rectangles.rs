@@ -162,14 +162,14 @@ fn form_factor(polygon: &[DVec3], normal: DVec3) -> f64 {
 }
 
 /// A point of a surface and what stands before others as it sees them.
-struct Viewpoint {
+struct GatherPoint {
     at: DVec3,
     normal: DVec3,
     shadows: Vec<Shadow>,
 }
 
-impl Viewpoint {
-    fn new(room: &[Rectangle], at: DVec3, normal: DVec3) -> Viewpoint {
+impl GatherPoint {
+    fn new(room: &[Rectangle], at: DVec3, normal: DVec3) -> GatherPoint {
         let shadow = |rectangle: &Rectangle| {
             let facing = rectangle.normal();
             let corners = rectangle.corners().map(|corner| corner - at);
@@ -178,7 +178,7 @@ impl Viewpoint {
             let is_seen = rectangle.blocks && is_above && -facing.dot(corners[0]) > 1e-12 * rectangle.diagonal();
             is_seen.then(|| Shadow::new(corners, facing))
         };
-        Viewpoint { at, normal, shadows: room.iter().filter_map(shadow).collect() }
+        GatherPoint { at, normal, shadows: room.iter().filter_map(shadow).collect() }
     }
 
     /// Of what it sees of a rectangle's front.
@@ -229,8 +229,8 @@ impl Radiosity {
     pub fn solve(room: &[Rectangle], fineness: f64) -> Radiosity {
         let mut patches = patches(room, fineness);
         let row = |patch: &Patch| -> Vec<f64> {
-            let view = Viewpoint::new(room, patch.of.at(DVec2::splat(0.5)), patch.of.normal());
-            patches.iter().map(|other| view.form_factor(&other.of)).collect()
+            let gather_point = GatherPoint::new(room, patch.of.at(DVec2::splat(0.5)), patch.of.normal());
+            patches.iter().map(|other| gather_point.form_factor(&other.of)).collect()
         };
         let factors: Vec<Vec<f64>> = patches.iter().map(row).collect();
         let mut before = 0.0;
@@ -249,31 +249,31 @@ impl Radiosity {
 
     /// Irradiance at a point of a surface, W/m2.
     pub fn irradiance(&self, at: DVec3, normal: DVec3) -> DVec3 {
-        let view = Viewpoint::new(&self.room, at, normal);
-        let of_patch = |patch: &Patch| patch.of.albedo * self.gather(&view, &patch.of, patch);
+        let gather_point = GatherPoint::new(&self.room, at, normal);
+        let of_patch = |patch: &Patch| patch.of.albedo * self.gather(&gather_point, &patch.of, patch);
         direct(&self.room, at, normal) + self.patches.iter().map(of_patch).sum::<DVec3>()
     }
 
     /// Irradiance of a part of a patch times its form factor: near the point that asks lamps are looked at from smaller parts.
-    fn gather(&self, view: &Viewpoint, part: &Rectangle, patch: &Patch) -> DVec3 {
-        let factor = view.form_factor(part);
+    fn gather(&self, gather_point: &GatherPoint, part: &Rectangle, patch: &Patch) -> DVec3 {
+        let factor = gather_point.form_factor(part);
         if factor == 0.0 {
             return DVec3::ZERO;
         }
         let is_whole = part.diagonal() == patch.of.diagonal();
         if factor > FAR && part.diagonal() > patch.of.diagonal() / 16.0 {
-            return part.halves().iter().map(|half| self.gather(view, half, patch)).sum();
+            return part.halves().iter().map(|half| self.gather(gather_point, half, patch)).sum();
         }
-        let lit = if is_whole { patch.direct } else { direct(&self.room, part.at(DVec2::splat(0.5)), part.normal()) };
-        factor * (lit + patch.indirect)
+        let irradiance = if is_whole { patch.direct } else { direct(&self.room, part.at(DVec2::splat(0.5)), part.normal()) };
+        factor * (irradiance + patch.indirect)
     }
 }
 
 /// Irradiance straight from what emits light.
 pub fn direct(room: &[Rectangle], at: DVec3, normal: DVec3) -> DVec3 {
-    let view = Viewpoint::new(room, at, normal);
+    let gather_point = GatherPoint::new(room, at, normal);
     let lamps = room.iter().filter(|lamp| lamp.emission != DVec3::ZERO);
-    lamps.map(|lamp| PI * view.form_factor(lamp) * lamp.emission).sum()
+    lamps.map(|lamp| PI * gather_point.form_factor(lamp) * lamp.emission).sum()
 }
 
 /// Patches with their direct light, as fine near small things as these call for, and wherever much light differs within a patch.
@@ -298,14 +298,15 @@ fn patches(room: &[Rectangle], fineness: f64) -> Vec<Patch> {
             }
             let place = |i: u32| (f64::from(i) + 0.5) / f64::from(PLACES);
             let places = (0..PLACES * PLACES).map(|k| DVec2::new(place(k % PLACES), place(k / PLACES)));
-            let lit: Vec<DVec3> = places.map(|place| direct(room, patch.at(place), patch.normal())).collect();
-            let (least, most) = lit.iter().fold((lit[0], lit[0]), |(least, most), light| (least.min(*light), most.max(*light)));
+            let irradiance: Vec<DVec3> = places.map(|place| direct(room, patch.at(place), patch.normal())).collect();
+            let (least, most) =
+                irradiance.iter().fold((irradiance[0], irradiance[0]), |(least, most), light| (least.min(*light), most.max(*light)));
             let differing = (patch.albedo * (most - least)).max_element() * patch.area();
             if differing > DIFFERING * fineness * fineness * power {
                 open.extend(patch.halves());
                 continue;
             }
-            let direct = lit.iter().sum::<DVec3>() / f64::from(PLACES * PLACES);
+            let direct = irradiance.iter().sum::<DVec3>() / f64::from(PLACES * PLACES);
             patches.push(Patch { of: patch, direct, indirect: DVec3::ZERO });
         }
     }

@@ -131,8 +131,8 @@ pub fn sun_through_sheets(gpu: &Gpu, illumination: Illumination) -> Check<Compla
     edge.material = scene.materials.len() - 1;
     edge.uvs[0] = edge.positions.iter().map(|at| DVec2::new(0.51 + at.x / (0.8 * PITCH), 0.5)).collect();
     let settings = SceneSettings { shadow_rays: 1, illumination, part: Part::Direct, ..mapped(100_000, 8, 8, 0.35) };
-    let lit = received(gpu, &scene, &settings, &points(&stacks));
-    compare(&format!("{illumination:?}"), &stacks, &lit, &(0..stacks.len()).collect::<Vec<_>>(), cosine)
+    let result = received(gpu, &scene, &settings, &points(&stacks));
+    compare(&format!("{illumination:?}"), &stacks, &result, &(0..stacks.len()).collect::<Vec<_>>(), cosine)
 }
 
 /// A lamp of 1 W/sr, 1 m above a floor, through two sheets, with a third one above it.
@@ -152,22 +152,22 @@ pub fn photons_off_a_pane(gpu: &Gpu) -> Check<Complaint> {
     let direction = DVec3::new(1.0, 1.0, 0.0);
     // What reaches the floor passed 2 m beside it on the way up.
     let scene = scene_of(vec![level(0.0, [1.0; 2], true, 0), level(1.0, [3.0; 2], true, 1)], vec![matt(0.0), pane], vec![sun(direction)]);
-    let lit = received(gpu, &scene, &mapped(20_000, 32, 4, 0.3), &[(DVec3::ZERO, DVec3::Y)]);
+    let result = received(gpu, &scene, &mapped(20_000, 32, 4, 0.3), &[(DVec3::ZERO, DVec3::Y)]);
     let cosine = direction.normalize().y;
-    red_check("photons off a pane", &lit, 0, cosine * (0.5 + 0.5 * schlick(cosine)), [0.02, 0.0])
+    red_check("photons off a pane", &result, 0, cosine * (0.5 + 0.5 * schlick(cosine)), [0.02, 0.0])
 }
 
-/// A lamp with gaps of alpha shines with what is there of it.
+/// A lamp with gaps of alpha emits what is there of it.
 pub fn blended_lamp(gpu: &Gpu, illumination: Illumination) -> Check<Complaint> {
     let lamp = Material { emission: Vec3::ONE, ..blended(0.5, dull(0.0)) };
     let scene = scene_of(vec![level(0.0, [1.0; 2], true, 0), level(1.0, [0.1; 2], false, 1)], vec![matt(0.0), lamp], vec![]);
     let settings = SceneSettings { shadow_rays: 4, illumination, part: Part::Direct, ..mapped(20_000, 32, 1, 0.05) };
-    let lit = received(gpu, &scene, &settings, &[(DVec3::ZERO, DVec3::Y)]);
+    let result = received(gpu, &scene, &settings, &[(DVec3::ZERO, DVec3::Y)]);
     // It is small and far away, and what is within the radius sees all but the same.
-    red_check(&format!("a lamp with gaps, {illumination:?}"), &lit, 0, 0.5 * 0.01, [0.04, 1e-3])
+    red_check(&format!("a lamp with gaps, {illumination:?}"), &result, 0, 0.5 * 0.01, [0.04, 1e-3])
 }
 
-/// A shining floor through every stack, seen straight from above.
+/// An emissive floor through every stack, seen straight from above.
 pub fn floor_through_sheets(gpu: &Gpu) -> Check<Complaint> {
     let stacks = stacks();
     let scene = scene_with(&stacks, Material { emission: Vec3::ONE, ..matt(0.0) }, DVec3::Y, vec![]);
@@ -179,15 +179,15 @@ pub fn floor_through_sheets(gpu: &Gpu) -> Check<Complaint> {
     let camera = Camera::looking_at("above", middle + DVec3::Y * 1e3, middle, DVec3::NEG_Z, 2.0 * (half_height / 1e3).atan());
     let without = vec![Effect::Direct];
     let settings = SceneSettings { samples: 64, rounds: 32, part: Part::Direct, without, ..by_rounds() };
-    let lit = seen(gpu, &scene, &settings, &camera, size.map(|pixels| pixels as u32));
+    let result = seen(gpu, &scene, &settings, &camera, size.map(|pixels| pixels as u32));
     let pixels: Vec<usize> = (0..stacks.len()).map(|k| 4 * (k / COLUMNS) * size[0] + 4 * (k % COLUMNS)).collect();
-    compare("the floor", &stacks, &lit, &pixels, 1.0)
+    compare("the floor", &stacks, &result, &pixels, 1.0)
 }
 
 /// All of it is direct light.
-fn compare(what: &str, stacks: &[Stack], lit: &RunResult, places: &[usize], cosine: f64) -> Check<Complaint> {
+fn compare(what: &str, stacks: &[Stack], result: &RunResult, places: &[usize], cosine: f64) -> Check<Complaint> {
     for (stack, &place) in pairs(stacks, places) {
-        let (found, error) = (lit.film.mean(place), lit.film.standard_error(place));
+        let (found, error) = (result.film.mean(place), result.film.standard_error(place));
         let expected = (stack.share)(cosine);
         println!("{what}, {}: {found} +- {error}, {expected} expected", stack.what);
         assert!(error.max_element() < 0.04, "{error}");

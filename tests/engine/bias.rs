@@ -3,8 +3,8 @@
 use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
-use crate::common::lit::Viewed;
 use crate::common::prelude::*;
+use crate::common::rendered::Viewed;
 use photonmill::engine::error::bias::{Bias, BiasFrom};
 use photonmill::engine::error::bias_batches::{self, Batches};
 use photonmill::engine::room;
@@ -46,9 +46,9 @@ fn at_points() -> &'static [f64] {
 fn true_bias_in_box(gpu: Option<&Gpu>, radius: f64) -> f64 {
     let settings = RoomSettings { rounds: 48, ..in_box(radius, 8191, 4711) };
     let scene = open_box(&settings);
-    let outcome = room::run(gpu, &scene, &settings, &mut Control::default()).unwrap();
+    let result = room::run(gpu, &scene, &settings, &mut Control::default()).unwrap();
     let (mut off, mut light, mut count) = (0.0, 0.0, 0.0f64);
-    let walls = estimate_walls(&outcome.film, &scene, &outcome.plan);
+    let walls = estimate_walls(&result.film, &scene, &result.plan);
     let found = walls.iter().flat_map(|wall| pairs(&wall.irradiance, &wall.irradiance_error));
     for ((found, error), expected) in pairs(found, at_points()) {
         off += (found - expected).powi(2) - error * error;
@@ -122,8 +122,8 @@ fn the_allowance_covers_edges_shadows_and_bumps() {
         let bias = bias_batches::extrapolate(Measure::Rmse, CONFIDENCE, 1, |factor, _| Ok(Some(at(factor)))).unwrap().unwrap();
         let (found, truth) = (at(1.0), at(0.0));
         let off: f64 = pairs(&found, &truth).map(|(found, truth)| (found - truth).powi(2)).sum();
-        let lit = found.iter().filter(|value| **value > 0.0).count() as f64;
-        let relative = (off * lit).sqrt() / found.iter().sum::<f64>();
+        let positive = found.iter().filter(|value| **value > 0.0).count() as f64;
+        let relative = (off * positive).sqrt() / found.iter().sum::<f64>();
         println!("{what}: {:.3} of what is extrapolated", relative / bias.relative);
         assert!((relative / bias.relative - expected).abs() < 0.02, "{what}: {}", relative / bias.relative);
         assert_holds(what, interval_check(&bias, relative));
@@ -164,12 +164,12 @@ fn the_bias_of_scenes_lies_in_its_interval_as_often_as_stated() {
     let pictures = names.iter().flat_map(|name| BOTH.map(|illumination| (*name, illumination, 0.15)));
     let Some(gpu) = device() else { return };
     for (name, illumination, radius) in pictures.chain([("disc-over-plane", Illumination::Photons, 0.1)]) {
-        let long = Picture::new(name, illumination, radius, 20_000, 99, &gpu);
+        let long = PlannedImage::new(name, illumination, radius, 20_000, 99, &gpu);
         let batch = |factor: f64, number: u32| long.batch(&gpu, rounds, factor, number);
         let differences = bias_batches::difference(Measure::Rmse, CONFIDENCE, 0.2, batch).unwrap().unwrap();
         let [lower, middle, upper] = differences.map(|difference| difference / (1.0 - 0.04));
         let biases: Vec<Bias> =
-            (1..=seeds).map(|seed| Picture::new(name, illumination, radius, 4000, seed, &gpu).bias_of_blocks(&gpu, 16)).collect();
+            (1..=seeds).map(|seed| PlannedImage::new(name, illumination, radius, 4000, seed, &gpu).bias_of_blocks(&gpu, 16)).collect();
         println!("{name}: {lower:.4} to {upper:.4}");
         assert_coverage(&format!("{name}, {illumination:?}, radius {radius}"), &biases, middle);
     }
@@ -194,7 +194,7 @@ fn no_area_is_lost_where_a_wall_lies_between_the_two_radii() {
 fn the_bias_of_a_shrinking_radius_lies_in_the_scaled_interval() {
     let Some(gpu) = device() else { return };
     const ROUNDS: u32 = 32;
-    let long = Picture::new("disc-over-plane", Illumination::Photons, 0.15, 4000, 99, &gpu);
+    let long = PlannedImage::new("disc-over-plane", Illumination::Photons, 0.15, 4000, 99, &gpu);
     let alpha = by_rounds().alpha;
     let batch = |factor: f64, number: u32| {
         if factor < 1.0 {
@@ -202,11 +202,11 @@ fn the_bias_of_a_shrinking_radius_lies_in_the_scaled_interval() {
         }
         let seed = bias_batches::seed(long.plan.settings.seed, number);
         let settings = SceneSettings { rounds: ROUNDS, alpha, seed, ..long.plan.settings.clone() };
-        let lit = long.of.lit(&gpu, long.of.planned(&gpu, &settings, long.plan.sensor));
-        Ok(Some(lit.film.surface_means().flat_map(|mean| mean.to_array()).collect()))
+        let result = long.of.run(&gpu, long.of.planned(&gpu, &settings, long.plan.sensor));
+        Ok(Some(result.film.surface_means().flat_map(|mean| mean.to_array()).collect()))
     };
     let truth = bias_batches::difference(Measure::Rmse, CONFIDENCE, 0.2, batch).unwrap().unwrap()[1];
-    let of_seed = |seed| Picture::new("disc-over-plane", Illumination::Photons, 0.15, 4000, seed, &gpu).bias(&gpu, 2);
+    let of_seed = |seed| PlannedImage::new("disc-over-plane", Illumination::Photons, 0.15, 4000, seed, &gpu).bias(&gpu, 2);
     let first: Vec<Bias> = (1..=8).map(of_seed).collect();
     let scaled: Vec<Bias> = first.iter().map(|bias| bias.scaled(mean_squared_radius(alpha, ROUNDS))).collect();
     assert_coverage("a shrinking radius", &scaled, truth);
@@ -217,35 +217,35 @@ fn the_bias_of_a_shrinking_radius_lies_in_the_scaled_interval() {
 #[test]
 fn light_without_a_map_has_no_bias() {
     let Some(gpu) = device() else { return };
-    let lit = Picture::new("disc-over-plane", Illumination::Split, 0.1, 100, 1, &gpu);
-    assert_eq!(lit.bias(&gpu, 1).upper, 0.0);
+    let image = PlannedImage::new("disc-over-plane", Illumination::Split, 0.1, 100, 1, &gpu);
+    assert_eq!(image.bias(&gpu, 1).upper, 0.0);
 }
 
 /// A picture of a scene.
-struct Picture {
+struct PlannedImage {
     of: Viewed,
     plan: ScenePlan,
 }
 
-impl Picture {
+impl PlannedImage {
     /// `radius` as a share of the scene's extent.
-    fn new(name: &str, illumination: Illumination, radius: f64, photons: u32, seed: u64, gpu: &Gpu) -> Picture {
+    fn new(name: &str, illumination: Illumination, radius: f64, photons: u32, seed: u64, gpu: &Gpu) -> PlannedImage {
         let of = Viewed::new(scene(name));
         let (min, max) = of.scene.bounds();
         let radius = Some(radius * (max - min).max_element());
         let radii = SceneSettings { radius, caustic_radius: radius, shadow_rays: 1, stop: stop(), ..by_rounds() };
         let settings = SceneSettings { photons, caustic_photons: photons, illumination, seed, ..radii };
-        Picture { plan: of.planned(gpu, &settings, square_picture(16)), of }
+        PlannedImage { plan: of.planned(gpu, &settings, square_picture(16)), of }
     }
 
     fn bias(&self, gpu: &Gpu, rounds: u32) -> Bias {
-        scene::bias::measure(gpu, &self.of.scene, &self.of.view(), &self.plan, (1.0, rounds), &NEVER).unwrap().unwrap()
+        scene::bias::measure(gpu, &self.of.scene, &self.of.viewpoint(), &self.plan, (1.0, rounds), &NEVER).unwrap().unwrap()
     }
 
-    /// As so many blocks of a run tell it.
+    /// As so many blocks of a run give it.
     fn bias_of_blocks(&self, gpu: &Gpu, blocks: u32) -> Bias {
         let settings = SceneSettings { rounds: blocks, alpha: 1.0, ..self.plan.settings.clone() };
-        let bias = self.of.lit(gpu, self.of.planned(gpu, &settings, self.plan.sensor)).error().bias.unwrap();
+        let bias = self.of.run(gpu, self.of.planned(gpu, &settings, self.plan.sensor)).error().bias.unwrap();
         assert_eq!(bias.from, BiasFrom::Blocks(blocks));
         bias
     }
@@ -253,7 +253,8 @@ impl Picture {
     /// Values of a batch at radii times a factor.
     fn batch(&self, gpu: &Gpu, rounds: u32, factor: f64, number: u32) -> photonmill::error::Result<Option<Vec<f64>>> {
         let batches = Batches { seed: self.plan.settings.seed, measure: Measure::Rmse, confidence: CONFIDENCE, rounds, cancelled: &NEVER };
-        batches
-            .values(factor, number, |batch, control| scene::bias::batch(gpu, &self.of.scene, &self.of.view(), &self.plan, batch, control))
+        batches.values(factor, number, |batch, control| {
+            scene::bias::batch(gpu, &self.of.scene, &self.of.viewpoint(), &self.plan, batch, control)
+        })
     }
 }

@@ -3,15 +3,15 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use crate::common::lit::Viewed;
 use crate::common::prelude::*;
+use crate::common::rendered::Viewed;
 use crate::fuzz::seeds::Saved;
 use photonmill::engine::End;
 use photonmill::engine::film::{KeptBlock, LatestBlocks};
 use photonmill::engine::room;
 use photonmill::engine::run::blocks::Share;
 use photonmill::engine::run::saved::{SavedFilm, SavedRun};
-use photonmill::engine::run::watch::Keep;
+use photonmill::engine::run::watch::Checkpointing;
 use photonmill::engine::scene::{self, RunResult};
 use photonmill::error::Result;
 use photonmill::ledger::BounceFates;
@@ -31,12 +31,12 @@ const SCENE: &str = "cornell-spheres";
 
 /// A small picture of the scene, and what of it was saved.
 fn kept(gpu: &Gpu, settings: &SceneSettings, part: Part) -> (RunResult, SavedRun) {
-    let (lit, saved) = try_lit(gpu, settings, part);
-    (lit.unwrap(), saved.expect("a block was done"))
+    let (result, saved) = try_run(gpu, settings, part);
+    (result.unwrap(), saved.expect("a block was done"))
 }
 
 /// The same where it may fail, or not a block may be done.
-fn try_lit(gpu: &Gpu, settings: &SceneSettings, part: Part) -> (Result<RunResult>, Option<SavedRun>) {
+fn try_run(gpu: &Gpu, settings: &SceneSettings, part: Part) -> (Result<RunResult>, Option<SavedRun>) {
     let viewed = Viewed::new(scene(SCENE));
     let plan = viewed.tried(gpu, settings, square_picture(8));
     let (cancelled, mut all) = (AtomicBool::new(false), Saved::default());
@@ -46,9 +46,9 @@ fn try_lit(gpu: &Gpu, settings: &SceneSettings, part: Part) -> (Result<RunResult
         }
     };
     let resume = part.resume.map(|run| (PathBuf::from("a file"), run));
-    let keep = Keep { scene: SCENE, share: part.share, resume, every: Duration::ZERO, save: Some(&mut all), dealt: None };
-    let lit = scene::light(gpu, &viewed.view(), plan, &mut Control { cancelled: &cancelled, progress: &mut watch, keep });
-    (lit, all.0.pop())
+    let checkpointing = Checkpointing { scene: SCENE, share: part.share, resume, every: Duration::ZERO, save: Some(&mut all), dealt: None };
+    let result = scene::light(gpu, &viewed.viewpoint(), plan, &mut Control { cancelled: &cancelled, progress: &mut watch, checkpointing });
+    (result, all.0.pop())
 }
 
 fn small(block: u32, rounds: u32) -> SceneSettings {
@@ -164,9 +164,9 @@ fn parts_of_the_box_come_to_the_bits_of_one() {
     let try_run = |gpu: Option<&Gpu>, rounds, share, resume| -> Result<SavedRun> {
         let mut all = Saved::default();
         let resume = Option::map(resume, |run| (PathBuf::from("a file"), run));
-        let keep = Keep { scene: "open-box", share, resume, every: Duration::ZERO, save: Some(&mut all), dealt: None };
+        let checkpointing = Checkpointing { scene: "open-box", share, resume, every: Duration::ZERO, save: Some(&mut all), dealt: None };
         let settings = RoomSettings { rounds, ..settings.clone() };
-        room::run(gpu, &open_box(&settings), &settings, &mut Control { keep, ..Control::default() })?;
+        room::run(gpu, &open_box(&settings), &settings, &mut Control { checkpointing, ..Control::default() })?;
         Ok(all.0.pop().unwrap())
     };
     let run = |gpu, rounds, share, resume| try_run(gpu, rounds, share, resume).unwrap();
@@ -196,7 +196,7 @@ fn a_block_cut_short_leaves_nothing() {
     assert!(cut.ledger().closes() && cut.ledger().emitted == u64::from(4 * blocks) * photons);
     assert!(cut.left_out.is_multiple_of(photons) && cut.left_out < 4 * photons, "{}", cut.left_out);
     // Fewer rounds than a block has are all there is.
-    let [few, more] = [3, 4].map(|rounds| try_lit(&gpu, &small(4, rounds), Part::default()).0.unwrap());
+    let [few, more] = [3, 4].map(|rounds| try_run(&gpu, &small(4, rounds), Part::default()).0.unwrap());
     assert_eq!((few.end, few.film.rounds, few.film.blocks, few.left_out), (End::Rounds, 3, 0, 0));
     assert!(few.film.relative_error().is_infinite() && mean_red(&few) > 0.0);
     assert!((mean_red(&few) / mean_red(&more) - 1.0).abs() < 0.2);
@@ -206,7 +206,7 @@ fn a_block_cut_short_leaves_nothing() {
 #[test]
 fn samples_are_even_over_a_block() {
     let Some(gpu) = device() else { return };
-    let lamp = Scene { name: "a lamp".into(), ..scene_of(vec![level(0.0, [1.0; 2], true, 0)], vec![shining(1.0)], vec![]) };
+    let lamp = Scene { name: "a lamp".into(), ..scene_of(vec![level(0.0, [1.0; 2], true, 0)], vec![emissive(1.0)], vec![]) };
     // The edges cross pixels at odd places.
     let camera = Camera::looking_at("above", DVec3::new(0.013, 2.0, 0.007), DVec3::new(0.013, 0.0, 0.007), DVec3::Z, 0.93);
     let of = |block: u32, rounds: u32, seed| {
@@ -238,13 +238,13 @@ fn the_spread_of_blocks_is_the_error() {
     let runs: Vec<RunResult> = (1..13).map(of).collect();
     let (mut spread, mut stated) = (0.0, 0.0);
     for pixel in 0..64 {
-        let values: Vec<f64> = runs.iter().map(|lit| lit.film.surface_mean(pixel).x).collect();
+        let values: Vec<f64> = runs.iter().map(|result| result.film.surface_mean(pixel).x).collect();
         spread += 12.0 * mean_and_error(&values).1.powi(2);
-        stated += runs.iter().map(|lit| lit.film.surface_error(pixel).x.powi(2)).sum::<f64>() / 12.0;
+        stated += runs.iter().map(|result| result.film.surface_error(pixel).x.powi(2)).sum::<f64>() / 12.0;
     }
     println!("stated variance over that of runs {:.3}", stated / spread);
     assert!((0.75..1.33).contains(&(stated / spread)), "{stated} and {spread}");
-    assert!(runs.iter().all(|lit| lit.film.blocks == 16));
+    assert!(runs.iter().all(|result| result.film.blocks == 16));
 }
 
 /// Emission that is seen directly is no part of the error, and neither is how much of the picture shows it.
@@ -259,14 +259,14 @@ fn errors_are_of_what_surfaces_scatter() {
         room
     };
     let error = |scene: &Scene, camera: &Camera, size| {
-        let lit = seen(&gpu, scene, &shared(small(1, 32)), camera, size);
-        (lit.film.error(0.95).noise, lit)
+        let result = seen(&gpu, scene, &shared(small(1, 32)), camera, size);
+        (result.film.error(0.95).noise, result)
     };
     let camera = cornell.first_camera();
-    let (usual, lit) = error(&cornell, &camera, [16; 2]);
+    let (usual, result) = error(&cornell, &camera, [16; 2]);
     assert!((error(&bright(4.0), &camera, [16; 2]).0 / usual - 1.0).abs() < 1e-3, "scale");
     // The lamp is in the picture, and its pixels are no light of surfaces.
-    let shows_lamp = (0..lit.film.pixels()).any(|pixel| lit.film.mean(pixel).x > 2.0 * lit.film.surface_mean(pixel).x);
+    let shows_lamp = (0..result.film.pixels()).any(|pixel| result.film.mean(pixel).x > 2.0 * result.film.surface_mean(pixel).x);
     assert!(shows_lamp);
     // Sky around the same surfaces: four times as many pixels, all black or lit by themselves.
     let plane = |half: f64| Camera::looking_at("above", DVec3::new(0.0, 3.0, 0.0), DVec3::ZERO, DVec3::Z, half);
@@ -274,7 +274,7 @@ fn errors_are_of_what_surfaces_scatter() {
     floor.lights.push(Light { name: "sky".into(), kind: LightKind::Environment { radiance: Vec3::splat(50.0) } });
     let floor = Scene { meshes: vec![level(0.0, [1.0; 2], true, 0)], materials: vec![matt(0.5)], lights: floor.lights, ..floor };
     let [near, far] = [(0.66, 12), (1.2, 24)].map(|(angle, size)| error(&floor, &plane(angle), [size; 2]));
-    let share = |lit: &RunResult| lit.film.surface_means().filter(|mean| mean.x > 0.0).count();
+    let share = |result: &RunResult| result.film.surface_means().filter(|mean| mean.x > 0.0).count();
     println!("error {:.4} of {} pixels, {:.4} of {}", near.0, share(&near.1), far.0, share(&far.1));
     assert!((far.0 / near.0 - 1.0).abs() < 0.35, "{} and {}", near.0, far.0);
 }
@@ -315,7 +315,7 @@ fn damaged_files_are_refused() {
     }
     assert_eq!(film.blocks, 4);
     for (what, run) in forged(&saved) {
-        assert_refused(what, try_lit(&gpu, &small(1, 8), Part { resume: Some(run), ..Part::default() }).0);
+        assert_refused(what, try_run(&gpu, &small(1, 8), Part { resume: Some(run), ..Part::default() }).0);
     }
 }
 

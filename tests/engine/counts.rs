@@ -1,8 +1,8 @@
 //! What a run costs in counts, which no clock disturbs: dispatches, submissions, pipelines, events and bytes of a few
 //! small runs beside the numbers that they had. Whoever changes one of them on purpose writes the new one here.
 
-use crate::common::lit::{Viewed, light};
 use crate::common::prelude::*;
+use crate::common::rendered::{Viewed, light};
 use photonmill::measure::bench::room::{self, Counts};
 use photonmill::records::CameraPath;
 
@@ -12,7 +12,7 @@ struct Cost {
     dispatches: u64,
     submissions: u64,
     events: u64,
-    /// These tell if a record has grown: a plan has buffers of all of them.
+    /// These show if a record has grown: a plan has buffers of all of them.
     device_bytes: u64,
     /// Over the events, rounded.
     build_bytes_per_event: u64,
@@ -44,18 +44,18 @@ fn the_box_costs_what_it_did() {
         // Strict, so that every device traces the same photons to the bit.
         let strict = RoomSettings { mesh: 8, rng: Rng::Philox, math: Math::Strict, ..RoomSettings::default() };
         let settings = RoomSettings { builder, counters, photons: 1000, bounces: 4, rounds: 2, ..strict };
-        let outcome = run(&gpu, &settings);
-        let counts = Counts::of(&outcome.fates[0], settings.rounds);
-        let work = |pass| room::work(pass, &outcome.plan, &counts, 0.0).unwrap();
+        let result = run(&gpu, &settings);
+        let counts = Counts::of(&result.fates[0], settings.rounds);
+        let work = |pass| room::work(pass, &result.plan, &counts, 0.0).unwrap();
         let build = work("build");
         // The roofline's own counts are those of the run.
         let dispatches: f64 = ["build", "index", "gather", "film"].map(|pass| work(pass).dispatches).iter().sum();
-        assert_eq!(dispatches * f64::from(settings.rounds), outcome.dispatches as f64, "{}", builder.name());
+        assert_eq!(dispatches * f64::from(settings.rounds), result.dispatches as f64, "{}", builder.name());
         let found = Cost {
-            dispatches: outcome.dispatches,
-            submissions: outcome.submissions,
+            dispatches: result.dispatches,
+            submissions: result.submissions,
             events: (counts.events * f64::from(settings.rounds)).round() as u64,
-            device_bytes: outcome.plan.bytes(),
+            device_bytes: result.plan.bytes(),
             build_bytes_per_event: (build.cost.bytes / build.items).round() as u64,
         };
         assert_eq!(found, of_the_box(builder, counters), "{}", builder.name());
@@ -83,10 +83,10 @@ fn a_scene_costs_what_it_did() {
     let (spheres, plan) = small_scene(&gpu);
     assert_eq!(bytes_without_paths(&plan), 4_532_412);
     if is_long_run() {
-        let lit = light(&gpu, &spheres.view(), plan);
-        let events = [0, 1].map(|map: usize| Counts::of(&lit.fates[map], 1).events as u64);
+        let result = light(&gpu, &spheres.viewpoint(), plan);
+        let events = [0, 1].map(|map: usize| Counts::of(&result.fates[map], 1).events as u64);
         // Where one dispatch may leave camera paths under way, the host looks how many, each round.
-        let submissions = if lit.plan.chains_go_on() { 7 } else { 4 };
-        assert_eq!((lit.dispatches, lit.submissions, lit.pipelines, events), (88, submissions, 14, [3483, 2439]));
+        let submissions = if result.plan.chains_go_on() { 7 } else { 4 };
+        assert_eq!((result.dispatches, result.submissions, result.pipelines, events), (88, submissions, 14, [3483, 2439]));
     }
 }

@@ -21,7 +21,7 @@ fn the_start_up_check_passes() {
     assert_eq!(lesser.facts().timestamp_bits, 0);
 }
 
-/// Where lanes do not vote right in a loop, the persistent builder is refused, and nothing takes it by itself.
+/// Where subgroup votes in a loop return wrong results, the persistent builder is refused, and nothing takes it by itself.
 #[test]
 fn no_run_is_persistent_where_lanes_vote_wrong() {
     let healthy = device();
@@ -66,7 +66,7 @@ fn loops_count_right_up_to_the_limit() {
     assert!(long.done >= LOOP_LIMIT && long.done <= long.wanted);
 }
 
-/// Keeping a card busy before the first round changes no result, is held against no run's memory and counts in no run's time.
+/// Keeping a card busy before the first round changes no result, counts in no run's memory and counts in no run's time.
 #[test]
 fn a_warm_up_is_no_part_of_the_run() {
     let Some(plain) = device() else { return };
@@ -216,24 +216,24 @@ fn timings_nest_and_count() {
             }
             let small = RoomSettings { mesh: 16, photons: 2001, rng: Rng::Philox, ..RoomSettings::default() };
             let settings = RoomSettings { builder, rounds, bounces, chunk, gather, ..small };
-            let outcome = run(&gpu, &settings);
+            let result = run(&gpu, &settings);
             let what = format!("{builder:?}, {rounds} rounds");
-            assert_holds(&what, count_check(&outcome.timings, &settings, u64::from(outcome.plan.chunks_per_round)));
-            assert_holds(&what, nesting_check(outcome.timings.rows()));
-            assert!(outcome.submissions >= 1 && outcome.dispatches > u64::from(rounds));
+            assert_holds(&what, count_check(&result.timings, &settings, u64::from(result.plan.chunks_per_round)));
+            assert_holds(&what, nesting_check(result.timings.rows()));
+            assert!(result.submissions >= 1 && result.dispatches > u64::from(rounds));
             if gpu.facts().timestamp_bits != 0 {
                 for name in ["round", "round/build", "round/gather"] {
-                    assert!(outcome.timings.row(name).unwrap().gpu_ms.is_some_and(|ms| ms > 0.0), "{what}: {name}");
+                    assert!(result.timings.row(name).unwrap().gpu_ms.is_some_and(|ms| ms > 0.0), "{what}: {name}");
                 }
             }
-            let wall = outcome.timings.row("run").unwrap().wall_ms.unwrap();
-            let top = outcome.timings.rows().iter().filter(|row| !row.name.contains('/') && row.name != "run");
+            let wall = result.timings.row("run").unwrap().wall_ms.unwrap();
+            let top = result.timings.rows().iter().filter(|row| !row.name.contains('/') && row.name != "run");
             let waited: f64 = top.filter_map(|row| row.wall_ms).sum();
             assert!(waited <= wall, "{what}: waited {waited} ms of {wall}");
             // Spans of the trace file add up to the rows.
-            let spans = outcome.timings.spans().iter().filter(|span| span.clock == Clock::Gpu && *span.name == *"round");
+            let spans = result.timings.spans().iter().filter(|span| span.clock == Clock::Gpu && *span.name == *"round");
             let spans: f64 = spans.map(|span| span.duration.as_secs_f64() * 1e3).sum();
-            let row = outcome.timings.row("round").unwrap().gpu_ms.unwrap_or(0.0);
+            let row = result.timings.row("round").unwrap().gpu_ms.unwrap_or(0.0);
             assert!((spans - row).abs() <= 1e-6 * row.max(1.0), "{spans} and {row}");
         }
     }
@@ -256,12 +256,12 @@ fn a_run_makes_the_pipelines_of_its_plan_once() {
 #[test]
 fn the_cpu_builder_is_timed_on_the_host() {
     let settings = RoomSettings { builder: Builder::Cpu, rounds: 3, chunk: Some(1500), mesh: 16, ..RoomSettings::default() };
-    let outcome = run_on_cpu(&settings);
-    let (timings, chunks) = (&outcome.timings, u64::from(outcome.plan.chunks_per_round));
+    let result = run_on_cpu(&settings);
+    let (timings, chunks) = (&result.timings, u64::from(result.plan.chunks_per_round));
     assert_holds("cpu", count_check(timings, &settings, chunks));
     assert_holds("cpu", nesting_check(timings.rows()));
     assert!(timings.rows().iter().all(|row| row.gpu_ms.is_none() && row.wall_ms.is_some()));
-    assert!(outcome.device.is_none());
+    assert!(result.device.is_none());
 
     let spoiled = |name: &str, spoil: fn(&mut Row)| {
         let mut rows = timings.rows().to_vec();

@@ -17,7 +17,7 @@ fn ended_runs_go_on_to_the_same_bits() {
     let Some(_) = device() else { return };
     let (signals, kills) = of_run::<(&[_], _)>((&[("INT", 130)], 1), (&[("INT", 130), ("TERM", 143), ("HUP", 129)], 100));
     let place = Place::new();
-    // More rounds than any device does before it is told, and no more than may have other units.
+    // More rounds than any device does before it is reported, and no more than may have other units.
     let line = |rounds: u32, more: &str| on_device(&format!("render cornell {SMALL} --rounds {rounds} {more}"));
     let asked = signals.iter().map(|(signal, code)| (*signal, Some(*code), "1h"));
     let (mut done, mut done_when_asked) = (0, 0);
@@ -203,7 +203,7 @@ fn memory_is_kept_to() {
     ]);
 }
 
-/// Nothing that is read, and nothing that is no file, is lost to an output; what is asked for and cannot be had is told of.
+/// Nothing that is read, and nothing that is no file, is lost to an output; what is asked for and cannot be had is reported.
 #[test]
 fn inputs_and_pipes_stay_what_they_are() {
     let Some(_) = device() else { return };

@@ -1,6 +1,6 @@
 //! Same bits: the film's integer sums do not depend on the builder, the gather, the work groups, the
 //! split into dispatches, the run or the device's abilities, and hold exactly what lies in reach. Sums
-//! of floats are held against them.
+//! of floats are checked against them.
 
 use crate::common::prelude::*;
 use photonmill::cpu;
@@ -70,9 +70,9 @@ fn work_groups_and_chunks_give_the_same_bits() {
         let counters = [(2, 128, Gather::Grid), (8, 64, Gather::Brute), (64, 32, Gather::Grid)].map(striped);
         let chunks = [301, 1024, 4998].into_iter().enumerate().map(|(place, chunk)| RoomSettings { chunk: Some(chunk), ..by(place) });
         for other in groups.chain(counters).chain(chunks) {
-            let outcome = run(&gpu, &other);
-            assert!(other.chunk.is_none_or(|chunk| outcome.plan.chunks_per_round == settings.photons.div_ceil(chunk)), "{what}, {other:?}");
-            assert_same(what, &format!("{other:?}"), &outcome.film, &expected);
+            let result = run(&gpu, &other);
+            assert!(other.chunk.is_none_or(|chunk| result.plan.chunks_per_round == settings.photons.div_ceil(chunk)), "{what}, {other:?}");
+            assert_same(what, &format!("{other:?}"), &result.film, &expected);
         }
     }
 }
@@ -88,15 +88,15 @@ fn a_device_without_abilities_gives_the_same_bits() {
             // Without timestamps the kernels are the same.
             let gathers: &[Gather] = if without_int64_atomics { &[Gather::Grid, Gather::Brute, Gather::KdTree] } else { &[Gather::Grid] };
             for &gather in gathers {
-                let outcome = run(&lesser, &RoomSettings { gather, ..settings.clone() });
-                assert_same(what, &format!("64-bit atomics masked: {without_int64_atomics}, {gather:?}"), &outcome.film, &expected);
-                let rows = outcome.timings.rows();
+                let result = run(&lesser, &RoomSettings { gather, ..settings.clone() });
+                assert_same(what, &format!("64-bit atomics masked: {without_int64_atomics}, {gather:?}"), &result.film, &expected);
+                let rows = result.timings.rows();
                 assert!(!rows.is_empty());
                 if without_timestamps {
                     assert!(rows.iter().all(|row| row.gpu_ms.is_none()), "{rows:?}");
-                    assert!(outcome.timings.row("run").unwrap().wall_ms.is_some());
+                    assert!(result.timings.row("run").unwrap().wall_ms.is_some());
                 } else if lesser.facts().timestamp_bits != 0 {
-                    assert!(outcome.timings.row("round/gather").unwrap().gpu_ms.is_some(), "{rows:?}");
+                    assert!(result.timings.row("round/gather").unwrap().gpu_ms.is_some(), "{rows:?}");
                 }
             }
         }
@@ -260,9 +260,9 @@ fn long_photon_lists_are_gathered_to_the_end() {
     let plan = plan_for(&gpu, &open_box(&settings), &settings);
     let expected = gathered_on_cpu(&plan, &map);
     for gather in [Gather::Brute, Gather::Grid] {
-        let outcome = run(&gpu, &RoomSettings { gather, ..settings.clone() });
-        assert_eq!(outcome.plan.photon_capacity, plan.photon_capacity);
-        assert_holds(format!("{gather:?}"), equal_sums("200 000 photons", &outcome.film.sums, &expected));
+        let result = run(&gpu, &RoomSettings { gather, ..settings.clone() });
+        assert_eq!(result.plan.photon_capacity, plan.photon_capacity);
+        assert_holds(format!("{gather:?}"), equal_sums("200 000 photons", &result.film.sums, &expected));
     }
     // Every photon within reach of every point of its wall: a list of 60 000 for each, in many slices.
     let settings = RoomSettings { radius: 0.5, mesh: 2, ..settings };

@@ -38,7 +38,7 @@ fn rust_and_glsl_lay_out_every_record_alike() {
     let found = complaints(STRUCTS, LAYOUTS);
     assert!(found.is_empty(), "{}", found.join("\n"));
     // Only arrays have a stride, so only there is a Rust record's tail padding judged.
-    for name in ["Room", "Wall", "DiscLight", "LightPath", "Point", "Tally", "DispatchArgs"] {
+    for name in ["Room", "Wall", "DiscLight", "PhotonState", "Point", "Tally", "DispatchArgs"] {
         assert!(STRUCTS.iter().any(|(_, found)| found.name == name && found.stride_bytes.is_some()), "{name}");
     }
 }
@@ -49,12 +49,12 @@ type Spoil = (&'static str, &'static [&'static str], fn(&mut Layout, &mut Vec<Fi
 #[test]
 fn the_check_complains_about_spoiled_records() {
     let spoils: [Spoil; 7] = [
-        ("LightPath", &["GLSL has"], |_, fields| fields.swap(2, 3)),
+        ("PhotonState", &["GLSL has"], |_, fields| fields.swap(2, 3)),
         ("Tally", &["GLSL has"], |_, fields| (fields[1].name, fields[2].name) = (fields[2].name, fields[1].name)),
         // Where std430 would put what follows a vec3 in scalar layout.
-        ("LightPath", &["GLSL has"], |_, fields| fields[1].offset = 16),
-        ("LightPath", &["GLSL has"], |_, fields| fields[3].kind = "f32"),
-        ("LightPath", &["bytes apart"], |layout, _| layout.size_bytes += 4),
+        ("PhotonState", &["GLSL has"], |_, fields| fields[1].offset = 16),
+        ("PhotonState", &["GLSL has"], |_, fields| fields[3].kind = "f32"),
+        ("PhotonState", &["bytes apart"], |layout, _| layout.size_bytes += 4),
         ("GatherPush", &["fields, its twin"], |layout, fields| {
             fields.push(Field { name: "weight", kind: "f32", offset: layout.size_bytes });
         }),

@@ -27,7 +27,7 @@ fn closes(fates: &Fates, emitted: u64) -> Check {
 
 /// The fates of a run's photons, if its ledger closes.
 pub fn closed_fates(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings) -> Result<Fates, Complaint> {
-    let fates = outcome_of(gpu, scene, settings)?.fates[0].clone();
+    let fates = room_result_of(gpu, scene, settings)?.fates[0].clone();
     closes(&fates, settings.total_photons()).map_err(|text| Complaint::new(Kind::LedgerOpen, text))?;
     Ok(fates)
 }
@@ -124,12 +124,12 @@ fn a_round_larger_than_a_buffer_splits_and_drops_nothing() {
     let settings = RoomSettings { photons, rng: Rng::Philox, ..small() };
     let expected = run_on_cpu(&RoomSettings { threads: 2, ..settings.clone() }).fates[0].clone();
     for builder in Builder::ON_GPU {
-        let outcome = run(&gpu, &RoomSettings { builder, ..settings.clone() });
+        let result = run(&gpu, &RoomSettings { builder, ..settings.clone() });
         if largest < size_of::<StoredPhoton>() as u64 * 15 * u64::from(photons) {
-            assert!(outcome.plan.chunks_per_round > 1, "{builder:?}");
+            assert!(result.plan.chunks_per_round > 1, "{builder:?}");
         }
-        assert_holds(format!("{builder:?}"), closes(&outcome.fates[0], u64::from(photons)));
-        let flips: u64 = pairs(&outcome.fates[0].bounces, &expected.bounces).map(|(a, b)| a.stored.abs_diff(b.stored)).sum();
+        assert_holds(format!("{builder:?}"), closes(&result.fates[0], u64::from(photons)));
+        let flips: u64 = pairs(&result.fates[0].bounces, &expected.bounces).map(|(a, b)| a.stored.abs_diff(b.stored)).sum();
         assert!(flips <= 3, "{builder:?}: {flips} stored photons more or less than the CPU's");
     }
 }

@@ -8,7 +8,7 @@ use crate::common::prelude::*;
 use photonmill::constants::MAX_BOUNCES;
 use photonmill::engine::End;
 use photonmill::engine::scene::resources::SceneResources;
-use photonmill::engine::scene::{self, Round, RunResult, View, trace};
+use photonmill::engine::scene::{self, Round, RunResult, Viewpoint, trace};
 use photonmill::output::scene_report;
 use photonmill::plan::radius::{mean_squared_radius, of_round, squared_radius};
 use photonmill::settings::stop::Stop;
@@ -18,7 +18,7 @@ fn settings() -> SceneSettings {
     SceneSettings { photons: 8000, caustic_photons: 8000, rounds: 8, shadow_rays: 1, ..by_rounds() }
 }
 
-/// A closed room whose walls all shine.
+/// A closed room whose walls all emit.
 fn furnace(albedo: f32) -> Scene {
     let mut scene = scene("furnace");
     scene.materials[0].base_colour = Vec3::splat(albedo);
@@ -37,11 +37,11 @@ fn bright_rooms_lose_no_light() {
         let exact = PI / (1.0 - f64::from(albedo));
         let what = format!("albedo {albedo}, {}", builder.name());
         let settings = SceneSettings { builder: Some(builder), radius: Some(0.4), alpha: 1.0, ..settings() };
-        let lit = received(&gpu, &furnace(albedo), &settings, &POINT);
-        let (mean, error) = red(&lit, 0);
+        let result = received(&gpu, &furnace(albedo), &settings, &POINT);
+        let (mean, error) = red(&result, 0);
         assert!(error < 0.04 * exact, "{what}: {mean} +- {error}");
         assert_holds(&what, z_check(&what, mean, exact, error));
-        assert_eq!((lit.fates[0].ledger().cut_off, lit.losses.cut_off), (0, 0.0), "{what}");
+        assert_eq!((result.fates[0].ledger().cut_off, result.losses.cut_off), (0, 0.0), "{what}");
 
         let capped = received(&gpu, &furnace(albedo), &SceneSettings { bounces: 32, ..settings }, &POINT);
         let (mean, error) = red(&capped, 0);
@@ -58,8 +58,8 @@ fn what_a_cap_cuts_off_is_counted() {
     for &(illumination, albedo, bounces) in &cases[..of_run(2, 3)] {
         let what = format!("{illumination:?}, albedo {albedo}, {bounces} bounces");
         let settings = SceneSettings { illumination, bounces, radius: Some(0.4), alpha: 1.0, ..settings() };
-        let lit = received(&gpu, &furnace(albedo), &settings, &POINT);
-        let RunResult { losses, fates, .. } = &lit;
+        let result = received(&gpu, &furnace(albedo), &settings, &POINT);
+        let RunResult { losses, fates, .. } = &result;
         let survivors = f64::from(albedo).powi(bounces as i32);
         let emitted = fates[0].emitted as f64;
         // A binomial deviation of the photons that survive.
@@ -67,7 +67,7 @@ fn what_a_cap_cuts_off_is_counted() {
         assert_holds(&what, z_check(&what, losses.share(), survivors, error));
         assert_holds(&what, z_check(&what, fates[0].ledger().cut_off as f64 / emitted, survivors, error));
         let exact = PI / (1.0 - f64::from(albedo));
-        let lost = 1.0 - mean_red(&lit) / exact;
+        let lost = 1.0 - mean_red(&result) / exact;
         assert!(losses.relative >= lost, "{what}: {lost} is lost, at most {} is stated", losses.relative);
     }
 }
@@ -85,7 +85,7 @@ fn an_error_beyond_a_cap_is_refused() {
     for (scene, bounces, error, why) in [(furnace(0.9), 4, 0.01, "after 4 bounces"), (leaning, 64, 0.001, "shading normals")] {
         let stop = Stop { error: Some(error), ..Stop::default() };
         let settings = SceneSettings { bounces, photons: 500, rounds: 31, stop, ..settings() };
-        let refused = run(&gpu, &scene, &settings, 16, &AtomicBool::new(false)).map(|lit| lit.losses).unwrap_err().to_string();
+        let refused = run(&gpu, &scene, &settings, 16, &AtomicBool::new(false)).map(|result| result.losses).unwrap_err().to_string();
         assert!(refused.starts_with("`error` ") && refused.contains("cannot be reached") && refused.contains(why), "{refused}");
     }
 }
@@ -103,13 +103,13 @@ fn long_chains_of_mirrors_end_at_what_they_show() {
     let length = 50.0;
     let mut meshes = shaft(0.0, length, 0);
     meshes.push(level(length, [1.0; 2], false, 1));
-    let scene = scene_of(meshes, vec![mirror(1.0), shining(0.0)], vec![]);
+    let scene = scene_of(meshes, vec![mirror(1.0), emissive(0.0)], vec![]);
     // Two metres across for each one along: a hundred reflections.
     let camera = Camera::looking_at("ray", DVec3::new(0.0, 0.01, 0.1), DVec3::new(0.49, 0.255, 0.1), DVec3::Y, 1e-4);
-    let lit = seen(&gpu, &scene, &SceneSettings { rounds: 2, photons: 10, ..of_mirrors() }, &camera, [4, 4]);
-    let mean = mean_red(&lit);
+    let result = seen(&gpu, &scene, &SceneSettings { rounds: 2, photons: 10, ..of_mirrors() }, &camera, [4, 4]);
+    let mean = mean_red(&result);
     assert!((mean - 1.0).abs() < 1e-5, "{mean}");
-    assert_eq!(lit.losses.camera_paths, 0);
+    assert_eq!(result.losses.camera_paths, 0);
 }
 
 /// Where nothing ends a path, the hard end does, and counts everything.
@@ -121,15 +121,15 @@ fn light_trapped_for_ever_is_counted() {
     let lamp = LightKind::Point { position: DVec3::new(0.1, 0.4, 0.2), intensity: Vec3::ONE };
     let scene = scene_of(meshes, vec![mirror(1.0), matt(0.5), glass(1.5)], vec![lamp]);
     let camera = Camera::looking_at("ray", DVec3::new(0.0, 0.5, 0.1), DVec3::new(0.4, 0.8, 0.2), DVec3::Y, 0.5);
-    let lit = seen(&gpu, &scene, &SceneSettings { rounds: 1, photons: 40, ..of_mirrors() }, &camera, [2, 1]);
+    let result = seen(&gpu, &scene, &SceneSettings { rounds: 1, photons: 40, ..of_mirrors() }, &camera, [2, 1]);
     // Roulette ends what the eye sees there.
-    assert_eq!(lit.losses.camera_paths, 0);
-    let ledger = lit.fates[0].ledger();
+    assert_eq!(result.losses.camera_paths, 0);
+    let ledger = result.fates[0].ledger();
     assert_eq!((ledger.emitted, ledger.cut_off), (40, 40));
     // Each went as far as any may.
-    let survived = lit.fates[0].bounces.iter().map(|bounce| bounce.stored).sum::<u64>();
+    let survived = result.fates[0].bounces.iter().map(|bounce| bounce.stored).sum::<u64>();
     assert_eq!(survived, 40 * u64::from(MAX_BOUNCES));
-    assert!((lit.losses.cut_off / lit.losses.emitted - 1.0).abs() < 1e-5, "{:?}", lit.losses);
+    assert!((result.losses.cut_off / result.losses.emitted - 1.0).abs() < 1e-5, "{:?}", result.losses);
 }
 
 /// The ledger's photons stored are those that lie in the map.
@@ -143,13 +143,13 @@ fn photons_stored_are_the_length_of_the_map() {
         .flat_map(|illumination| [Builder::Ballot, Builder::Persistent].map(|builder| (illumination, builder)));
     for (illumination, builder) in ways {
         let settings = SceneSettings { builder: Some(builder), illumination, photons: 3000, rounds: 1, chunk: Some(700), ..settings() };
-        let lit = run(&gpu, &scene, &settings, 8, &AtomicBool::new(false)).unwrap();
+        let result = run(&gpu, &scene, &settings, 8, &AtomicBool::new(false)).unwrap();
         let geometry = Geometry::new(&scene).unwrap();
-        let mut commands = Commands::new(&gpu, scene::constants(&lit.plan), Instant::now()).unwrap();
-        let resources = SceneResources::new(&mut commands, &geometry, &lit.plan, &[]).unwrap();
+        let mut commands = Commands::new(&gpu, scene::constants(&result.plan), Instant::now()).unwrap();
+        let resources = SceneResources::new(&mut commands, &geometry, &result.plan, &[]).unwrap();
         let buffers = resources.photons.as_ref().unwrap();
-        let round = Round { resources: &resources, geometry: &geometry, plan: &lit.plan, number: 0 };
-        for map in lit.plan.maps() {
+        let round = Round { resources: &resources, geometry: &geometry, plan: &result.plan, number: 0 };
+        for map in result.plan.maps() {
             let mut stored = 0;
             for chunk in map.chunks() {
                 let mut count = |commands: &mut Commands, _: Option<u32>| {
@@ -158,7 +158,7 @@ fn photons_stored_are_the_length_of_the_map() {
                 };
                 trace::trace(&mut commands, round, map, chunk, &mut count).unwrap();
             }
-            let fates = &lit.fates[usize::from(map.caustic_only)];
+            let fates = &result.fates[usize::from(map.caustic_only)];
             assert!(stored > 100, "{builder:?}, {illumination:?}, {}: {stored}", map.name);
             assert_eq!(fates.ledger().stored, stored, "{builder:?}, {illumination:?}, {}", map.name);
         }
@@ -185,8 +185,8 @@ fn radii_take_no_sum_over_earlier_rounds() {
 
 fn run(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, size: u32, cancelled: &AtomicBool) -> Result<RunResult, Error> {
     let (geometry, plan) = scene_plan(gpu, scene, settings, square_picture(size))?;
-    let view = View { geometry: &geometry, camera: Some(&scene.first_camera()), phases: &[] };
-    scene::light(gpu, &view, plan, &mut Control { cancelled, progress: &mut |_| {}, ..Control::default() })
+    let viewpoint = Viewpoint { geometry: &geometry, camera: Some(&scene.first_camera()), phases: &[] };
+    scene::light(gpu, &viewpoint, plan, &mut Control { cancelled, progress: &mut |_| {}, ..Control::default() })
 }
 
 /// What becomes of a run that is cancelled after so long, if nothing else has ended it.
@@ -216,25 +216,25 @@ fn long_rounds_end_soon_after_they_are_asked_to() {
         let radii = SceneSettings { radius: Some(0.05), caustic_radius: Some(0.02), ..settings() };
         SceneSettings { photons, caustic_photons: photons.min(1 << 20), rounds, stop, ..radii }
     };
-    let lit = |settings: &SceneSettings, cancelled: &AtomicBool| run(&gpu, &scene, settings, 16, cancelled);
+    let result_of = |settings: &SceneSettings, cancelled: &AtomicBool| run(&gpu, &scene, settings, 16, cancelled);
     // Pipelines are made before the time is taken.
-    let reference = lit(&of(50_000, 2, None), &AtomicBool::new(false)).unwrap();
-    let refused = cancelled_after(Duration::from_millis(300), |cancelled| lit(&of(1 << 31, 4, None), cancelled)).unwrap_err();
+    let reference = result_of(&of(50_000, 2, None), &AtomicBool::new(false)).unwrap();
+    let refused = cancelled_after(Duration::from_millis(300), |cancelled| result_of(&of(1 << 31, 4, None), cancelled)).unwrap_err();
     assert!(matches!(refused, Error::Interrupted), "{refused}");
 
     // In its first round a run ends with the photons that it has.
     let long = of(1 << 31, 4, Some(1.0));
-    let lit = cancelled_after(Duration::from_secs(600), |cancelled| lit(&long, cancelled)).unwrap();
-    assert_eq!((lit.end, lit.film.rounds), (End::Time, 1));
-    let photons = lit.fates[0].emitted;
-    assert!(photons < u64::from(long.photons) && lit.fates[1].emitted > 0);
-    let report = scene_report::text("cornell-spheres", &lit, "pixel", false);
+    let result = cancelled_after(Duration::from_secs(600), |cancelled| result_of(&long, cancelled)).unwrap();
+    assert_eq!((result.end, result.film.rounds), (End::Time, 1));
+    let photons = result.fates[0].emitted;
+    assert!(photons < u64::from(long.photons) && result.fates[1].emitted > 0);
+    let report = scene_report::text("cornell-spheres", &result, "pixel", false);
     assert!(report.contains("time was up in the first round") && report.contains("use fewer `photons`"), "{report}");
     // It ended long before the last chunk of photons.
-    let chunks = lit.plan.global.as_ref().unwrap().chunks().count();
+    let chunks = result.plan.global.as_ref().unwrap().chunks().count();
     assert!(chunks > 100 && photons < u64::from(long.photons) / 4, "{photons} photons, {chunks} chunks");
     // Fewer photons are no less light.
-    let (found, expected) = (mean_red(&lit), mean_red(&reference));
+    let (found, expected) = (mean_red(&result), mean_red(&reference));
     println!("{photons} photons: {found} where {expected} is right");
     assert!((found / expected - 1.0).abs() < 0.05, "{found}, {expected}");
 }
@@ -249,10 +249,10 @@ fn no_dispatch_takes_long() {
     }
     let (photons, size) = if gpu.facts().kind == "cpu" { (60_000, 48) } else { (10_000_000, 512) };
     let wide = SceneSettings { photons, rounds: 2, radius: Some(0.4), ..settings() };
-    let lit = run(&gpu, &scene("cornell"), &wide, size, &AtomicBool::new(false)).unwrap();
-    let first_round = lit.timings.spans().iter().find(|span| span.name.ends_with("/resolve")).unwrap().start;
+    let result = run(&gpu, &scene("cornell"), &wide, size, &AtomicBool::new(false)).unwrap();
+    let first_round = result.timings.spans().iter().find(|span| span.name.ends_with("/resolve")).unwrap().start;
     let is_gather = |span: &&Span| span.start > first_round && span.name.contains("/gather/gather_visible_points");
-    let gathers = lit.timings.spans().iter().filter(is_gather).count();
+    let gathers = result.timings.spans().iter().filter(is_gather).count();
     // Two for each piece, and one piece of a gather that takes no time.
     println!("{gathers} gathers in the second round");
     assert!(gathers > 6, "{gathers}");

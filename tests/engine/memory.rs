@@ -1,8 +1,8 @@
 //! Memory stays within what the plan says beforehand, and is that to the byte.
 
-use crate::common::lit;
 use crate::common::prelude::*;
-use photonmill::engine::scene::View;
+use crate::common::rendered;
+use photonmill::engine::scene::Viewpoint;
 use photonmill::plan::buffers::{PlannedBuffer, bytes_of};
 
 /// Device memory against what a plan lists.
@@ -39,14 +39,14 @@ fn the_papers_line_takes_what_its_plan_says() {
     ];
     cases.extend(Builder::ON_GPU.map(|builder| RoomSettings { builder, ..small() }));
     for settings in cases {
-        let (bytes, outcome) = taken(&gpu, || run(&gpu, &settings));
-        let buffers = outcome.plan.buffers();
-        assert_holds(format!("{settings:?}"), check("the paper's line", bytes, outcome.plan.bytes(), &buffers));
+        let (bytes, result) = taken(&gpu, || run(&gpu, &settings));
+        let buffers = result.plan.buffers();
+        assert_holds(format!("{settings:?}"), check("the paper's room", bytes, result.plan.bytes(), &buffers));
         // A plan that forgot any one of its buffers would be found out by what the engine takes.
         for forgotten in 0..buffers.len() {
             let mut others = buffers.clone();
             let PlannedBuffer { name, .. } = others.remove(forgotten);
-            assert_complains(name, check("the paper's line", bytes, bytes_of(&others), &others));
+            assert_complains(name, check("the paper's room", bytes, bytes_of(&others), &others));
         }
     }
 }
@@ -69,7 +69,7 @@ fn scenes_take_what_their_plan_says() {
         let stated = plan.bytes_of(phases.max(1));
         let receivers = vec![vec![Default::default(); 9]; phases];
         let camera = scene.cameras.first().filter(|_| phases == 0);
-        let (bytes, _) = taken(&gpu, || lit::run(&gpu, &View { geometry: &geometry, camera, phases: &receivers }, plan));
+        let (bytes, _) = taken(&gpu, || rendered::run(&gpu, &Viewpoint { geometry: &geometry, camera, phases: &receivers }, plan));
         assert_holds(name, check("a scene", bytes, stated, &[]));
     }
 }

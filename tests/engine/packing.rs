@@ -5,7 +5,7 @@ use obvhs::cwbvh::node::CwBvhNode;
 use photonmill::constants::{FACE_COUNT, HIT_KINDS, NO_WALL};
 use photonmill::gpu::Buffer;
 use photonmill::gpu::kernels::{CheckPackingRoom, CheckPackingScene};
-use photonmill::path::{self, Path, StoredPath};
+use photonmill::photon_state::{self, PackedPhotonState, PhotonState};
 use photonmill::records::{BvhNode, PackingCase, Room, UnpackedRoom, UnpackedScene};
 use photonmill::scene::bvh;
 use photonmill::scene::geometry::{pack_normal, unpack_normal};
@@ -84,12 +84,12 @@ fn photon(case: &PackingCase) -> Photon {
     Photon { position, wall, flux, weight, ..Photon::default() }
 }
 
-fn path(case: &PackingCase) -> Path {
+fn path(case: &PackingCase) -> PhotonState {
     let PackingCase { position, wall, direction, photon, stream, flux, .. } = *case;
-    Path { position, wall, direction, photon, stream, flux }
+    PhotonState { position, wall, direction, photon, stream, flux }
 }
 
-fn paths(cases: &[PackingCase]) -> Vec<StoredPath> {
+fn paths(cases: &[PackingCase]) -> Vec<PackedPhotonState> {
     let words = |first: &dyn Fn(&PackingCase) -> [u32; 4]| cases.iter().map(first).collect::<Vec<_>>();
     let beside = |vector: Vec3, word: u32| [vector.x.to_bits(), vector.y.to_bits(), vector.z.to_bits(), word];
     let all = [
@@ -139,11 +139,11 @@ fn octahedral(n: Vec3, half_range: f32, bits: u32) -> u32 {
 #[derive(Clone)]
 struct Found {
     photons: Vec<StoredPhoton>,
-    paths: Vec<StoredPath>,
+    paths: Vec<PackedPhotonState>,
     map: Vec<MapPhoton>,
     room: Vec<UnpackedRoom>,
     scene: Vec<UnpackedScene>,
-    one_hits: Vec<u32>,
+    single_hits: Vec<u32>,
 }
 
 fn ask(gpu: &Gpu, packed: &[PackingCase], nodes: &[BvhNode]) -> Found {
@@ -158,14 +158,14 @@ fn ask(gpu: &Gpu, packed: &[PackingCase], nodes: &[BvhNode]) -> Found {
     let (sorted_photons, next_paths, sorted_map) =
         (&empty(gpu, commands, count), &empty(gpu, commands, count), &empty(gpu, commands, count));
     let (room, scene) = (&empty(gpu, commands, count), &empty(gpu, commands, count));
-    let one_hits = &empty(gpu, commands, HIT_KINDS as usize * count);
+    let single_hits = &empty(gpu, commands, HIT_KINDS as usize * count);
     let photons = &commands.uploaded("packed", &packed.iter().map(|case| photon(case).stored()).collect::<Vec<_>>()).unwrap();
     let paths = &commands.uploaded("packed", &paths(packed)).unwrap();
     let kernel = CheckPackingRoom { cases, photons, paths, sorted_photons, next_paths, results: room };
     commands.dispatch(kernel, &(), Extent::Items(count as u64)).unwrap();
     let map = &commands.uploaded("packed", &packed.iter().map(map_photon).collect::<Vec<_>>()).unwrap();
     let node_cases = &commands.uploaded("packed", nodes).unwrap();
-    let kernel = CheckPackingScene { cases, map, node_cases, one_hits, sorted_map, results: scene };
+    let kernel = CheckPackingScene { cases, map, node_cases, single_hits, sorted_map, results: scene };
     commands.dispatch(kernel, &(), Extent::Items(count as u64)).unwrap();
     Found {
         photons: commands.read(sorted_photons, count).unwrap(),
@@ -173,7 +173,7 @@ fn ask(gpu: &Gpu, packed: &[PackingCase], nodes: &[BvhNode]) -> Found {
         map: commands.read(sorted_map, count).unwrap(),
         room: commands.read(room, count).unwrap(),
         scene: commands.read(scene, count).unwrap(),
-        one_hits: commands.read(one_hits, HIT_KINDS as usize * count).unwrap(),
+        single_hits: commands.read(single_hits, HIT_KINDS as usize * count).unwrap(),
     }
 }
 
@@ -197,9 +197,9 @@ fn twins(found: &Found, index: usize, case: &PackingCase, node: &CwBvhNode) -> C
     }
     same("unpacked flux", [unpacked.flux, unpacked.weight], [case.flux, case.weight])?;
     // Neither -0 nor infinity is lost, so paths are compared by their words.
-    let of_device = path::unpack(&found.paths, index);
+    let of_device = photon_state::unpack(&found.paths, index);
     let UnpackedRoom { position, path_wall: wall, direction, photon, stream, path_flux: flux, .. } = unpacked;
-    let by_device = Path { position, wall, direction, photon, stream, flux };
+    let by_device = PhotonState { position, wall, direction, photon, stream, flux };
     for (what, found) in [("a path that Rust unpacks", of_device), ("a path that the device unpacks", by_device)] {
         let expected = path(case);
         same(what, found.position, expected.position)?;
@@ -237,7 +237,7 @@ fn twins(found: &Found, index: usize, case: &PackingCase, node: &CwBvhNode) -> C
 
     let light = case.colour.max_element();
     let miss = if light > 0.0 { light.min(f32::MAX).to_bits() } else { 0 };
-    same("what one hit would add", found.one_hits[HIT_KINDS as usize * index..][..3].try_into().unwrap(), [miss, u32::MAX, 0])
+    same("what one hit would add", found.single_hits[HIT_KINDS as usize * index..][..3].try_into().unwrap(), [miss, u32::MAX, 0])
 }
 
 #[test]
@@ -270,7 +270,7 @@ fn what_rust_packs_the_device_unpacks_and_the_other_way_round() {
         ("a code cut instead of rounded", |found, index| found.scene[index].normal_code += 1),
         ("a number over a direction's code", |found, index| found.scene[index].direction_code ^= 1 << 30),
         ("a neighbour's box", |found, index| found.scene[index].low = found.scene[index + 1].low),
-        ("a hit that was missed", |found, index| found.one_hits[HIT_KINDS as usize * index + 1] = 0),
+        ("a hit that was missed", |found, index| found.single_hits[HIT_KINDS as usize * index + 1] = 0),
     ];
     for (what, spoil) in spoils {
         let mut spoiled = found.clone();

@@ -42,11 +42,11 @@ fn the_judge_counts_what_the_numpy_model_counts() {
 
 /// Runs of the builders on the device, if there is one, and of the CPU's.
 fn every_builder(gpu: Option<&Gpu>, settings: &RoomSettings) -> Vec<(Builder, RunResult)> {
-    let mut outcomes = vec![(Builder::Cpu, run_on_cpu(settings))];
+    let mut results = vec![(Builder::Cpu, run_on_cpu(settings))];
     if let Some(gpu) = gpu {
-        outcomes.extend(Builder::ON_GPU.map(|builder| (builder, run(gpu, &RoomSettings { builder, ..settings.clone() }))));
+        results.extend(Builder::ON_GPU.map(|builder| (builder, run(gpu, &RoomSettings { builder, ..settings.clone() }))));
     }
-    outcomes
+    results
 }
 
 /// Share of (photon, texel) pairs whose distance may fall on the other side of the radius in another
@@ -117,18 +117,18 @@ fn every_builder_stores_and_gathers_what_the_model_does() {
         }
         assert_printed(&expected, powers);
         let tolerance = if shininess.is_some() { WEIGHT_TOLERANCE } else { 0.0 };
-        for (builder, outcome) in every_builder(gpu.as_deref(), &settings) {
+        for (builder, result) in every_builder(gpu.as_deref(), &settings) {
             let what = format!("{builder:?}, {} bounces, {} rounds, shininess {shininess:?}", settings.bounces, settings.rounds);
-            let stored: Vec<u64> = outcome.fates[0].bounces.iter().map(|bounce| bounce.stored).collect();
+            let stored: Vec<u64> = result.fates[0].bounces.iter().map(|bounce| bounce.stored).collect();
             assert_eq!(stored, per_bounce, "{what}");
-            assert_eq!(outcome.ledger().stored, per_bounce.iter().sum::<u64>(), "{what}");
-            assert_holds(&what, same_power(&outcome.film, &expected, &counts, tolerance));
+            assert_eq!(result.ledger().stored, per_bounce.iter().sum::<u64>(), "{what}");
+            assert_holds(&what, same_power(&result.film, &expected, &counts, tolerance));
             // The paper's illumination is that power over full light of all rounds, and may exceed 1.
             let full_light = settings.full_light * f64::from(settings.rounds);
-            let walls = estimate_walls(&outcome.film, &open_box(&settings), &outcome.plan);
+            let walls = estimate_walls(&result.film, &open_box(&settings), &result.plan);
             let illumination: Vec<f64> = walls.iter().flat_map(|wall| wall.illumination.clone()).collect();
             for (texel, illumination) in illumination.iter().enumerate() {
-                assert!((illumination - outcome.film.power(texel) / full_light).abs() <= 1e-12, "{what}");
+                assert!((illumination - result.film.power(texel) / full_light).abs() <= 1e-12, "{what}");
             }
             for (wall, printed) in illumination.chunks(64 * 64).zip(printed.into_iter().flatten()) {
                 let mean = wall.iter().map(|illumination| illumination.min(1.0)).sum::<f64>() / wall.len() as f64;
@@ -141,8 +141,8 @@ fn every_builder_stores_and_gathers_what_the_model_does() {
 
 #[test]
 fn the_check_of_power_complains() {
-    let outcome = run_on_cpu(&RoomSettings::default());
-    let film = &outcome.film;
+    let result = run_on_cpu(&RoomSettings::default());
+    let film = &result.film;
     let arrivals = Model::default().trace(0);
     let expected = power_table(&arrivals, 0.05);
     assert_holds("the run itself", same_power(film, &expected, &expected, 0.0));

@@ -1,9 +1,9 @@
 //! `--paranoid` and `--replay`: no run has a value that is infinite or no number; one that is planted is counted and
 //! its photon named; and that photon takes the same path alone as among all others.
 
-use crate::common::lit::Viewed;
 use crate::common::nothing_odd;
 use crate::common::prelude::*;
+use crate::common::rendered::Viewed;
 use photonmill::engine::nonfinite_values::{NonfiniteValues, What};
 use photonmill::engine::replay::PhotonName;
 use photonmill::engine::room;
@@ -14,8 +14,8 @@ fn paranoid() -> SceneSettings {
     SceneSettings { photons: 3000, caustic_photons: 3000, rounds: 2, paranoid: true, ..by_rounds() }
 }
 
-fn lit(gpu: &Gpu, viewed: &Viewed, settings: &SceneSettings) -> RunResult {
-    viewed.lit(gpu, viewed.planned(gpu, settings, square_picture(24)))
+fn result_of(gpu: &Gpu, viewed: &Viewed, settings: &SceneSettings) -> RunResult {
+    viewed.run(gpu, viewed.planned(gpu, settings, square_picture(24)))
 }
 
 /// No value of a scene with mirrors and glass is infinite or no number, by either way of lighting it.
@@ -23,13 +23,13 @@ pub fn scene_is_finite(gpu: &Gpu, settings: &SceneSettings) -> Check<Complaint> 
     let spheres = Viewed::new(scene("cornell-spheres"));
     BOTH.into_iter().try_for_each(|illumination| {
         let settings = SceneSettings { illumination, paranoid: true, ..settings.clone() };
-        nothing_odd(lit(gpu, &spheres, &settings).nonfinite_values.as_ref().unwrap())
+        nothing_odd(result_of(gpu, &spheres, &settings).nonfinite_values.as_ref().unwrap())
     })
 }
 
 /// Nor is one of the paper's box.
 pub fn box_is_finite(gpu: &Gpu, settings: &RoomSettings) -> Check<Complaint> {
-    outcome_of(gpu, &open_box(settings), &RoomSettings { paranoid: true, ..settings.clone() }).map(|_| ())
+    room_result_of(gpu, &open_box(settings), &RoomSettings { paranoid: true, ..settings.clone() }).map(|_| ())
 }
 
 /// By either way of lighting; in the short run mirrors and glass, and a sky. (Of the paper's box every run of `tests/common` is looked at.)
@@ -45,11 +45,11 @@ fn no_built_in_scene_has_a_value_that_is_no_number() {
         let (name, illumination) = case;
         let viewed = Viewed::new(scene(name));
         let settings = SceneSettings { illumination, final_gather: illumination == Illumination::Split, photons: 1000, ..paranoid() };
-        let watched = lit(&gpu, &viewed, &settings);
+        let watched = result_of(&gpu, &viewed, &settings);
         assert_holds(format!("{case:?}"), nothing_odd(watched.nonfinite_values.as_ref().unwrap()));
         assert_eq!(watched.nonfinite_values, Some(NonfiniteValues::default()));
         if split.contains(&case) || from_photons.contains(&case) {
-            let unwatched = lit(&gpu, &viewed, &SceneSettings { paranoid: false, ..settings });
+            let unwatched = result_of(&gpu, &viewed, &SceneSettings { paranoid: false, ..settings });
             assert_eq!(unwatched.nonfinite_values, None);
             assert_eq!(unwatched.film, watched.film, "{case:?}");
         }
@@ -66,7 +66,7 @@ fn a_planted_value_is_counted_and_its_photon_named() {
         spheres.geometry.materials[mirror].base_colour = Vec3::new(1.0, poison, 1.0);
         let settings = SceneSettings { rounds: 1, photons: 400, caustic_photons: 50, ..paranoid() };
         let plan = spheres.planned(&gpu, &settings, square_picture(24));
-        let nonfinite_values = spheres.lit(&gpu, plan.clone()).nonfinite_values.unwrap();
+        let nonfinite_values = spheres.run(&gpu, plan.clone()).nonfinite_values.unwrap();
         assert!(nonfinite_values.count > 10, "{nonfinite_values:?}");
         assert!(nonfinite_values.text().contains("`replay` 0:"), "{}", nonfinite_values.text());
         let of_photons = nonfinite_values.first.iter().filter(|value| value.what == What::Photon);

@@ -2,12 +2,12 @@
 
 use std::sync::atomic::AtomicBool;
 
-use crate::common::lit::Viewed;
 use crate::common::prelude::*;
+use crate::common::rendered::Viewed;
 use photonmill::engine::End;
 use photonmill::engine::scene::pilot::{self, Pilot};
 use photonmill::engine::scene::{RunResult, SceneFilm};
-use photonmill::plan::work_division::{Division, Free};
+use photonmill::plan::work_division::{Division, TunableSettings};
 use photonmill::settings::stop::Stop;
 use photonmill::settings::tile_samples::TileSamples;
 
@@ -19,13 +19,13 @@ fn spheres() -> Viewed {
     Viewed::new(scene("cornell-spheres"))
 }
 
-fn chosen(gpu: &Gpu, spheres: &Viewed, settings: &SceneSettings, free: Free) -> Option<Pilot> {
+fn chosen(gpu: &Gpu, spheres: &Viewed, settings: &SceneSettings, tunable: TunableSettings) -> Option<Pilot> {
     let plan = spheres.tried(gpu, settings, square_picture(SIZE));
-    pilot::choose(gpu, &spheres.scene, &spheres.view(), &plan, free, &NEVER).unwrap()
+    pilot::choose(gpu, &spheres.scene, &spheres.viewpoint(), &plan, tunable, &NEVER).unwrap()
 }
 
-fn lit(gpu: &Gpu, spheres: &Viewed, settings: &SceneSettings) -> RunResult {
-    spheres.lit(gpu, spheres.tried(gpu, settings, square_picture(SIZE)))
+fn result_of(gpu: &Gpu, spheres: &Viewed, settings: &SceneSettings) -> RunResult {
+    spheres.run(gpu, spheres.tried(gpu, settings, square_picture(SIZE)))
 }
 
 /// Few photons, which a software device traces in time.
@@ -37,12 +37,12 @@ fn few() -> SceneSettings {
 /// Within a factor: rare light is met by chance, and even samples vary less the more there are. In the long run before the pilot has chosen,
 /// too, and of more rounds.
 fn rounds_vary_as_the_pilot_expects(gpu: &Gpu, spheres: &Viewed) {
-    let found = chosen(gpu, spheres, &few(), Free { photons: false, caustic_photons: false, ..Free::ALL }).unwrap();
+    let found = chosen(gpu, spheres, &few(), TunableSettings { photons: false, caustic_photons: false, ..TunableSettings::ALL }).unwrap();
     let rounds = of_run(16, 32);
     for division in [found.chosen].into_iter().chain(is_long_run().then_some(found.before)) {
         // The squared noise of a round, relative to the mean.
-        let lit = lit(gpu, spheres, &SceneSettings { rounds, alpha: 1.0, seed: 5, stop: Stop::default(), ..division.set(&few()) });
-        let measured = lit.film.relative_error().powi(2) * f64::from(lit.film.rounds);
+        let result = result_of(gpu, spheres, &SceneSettings { rounds, alpha: 1.0, seed: 5, stop: Stop::default(), ..division.set(&few()) });
+        let measured = result.film.relative_error().powi(2) * f64::from(result.film.rounds);
         let variance = &found.rounds.variance;
         let of_paths = variance.of_paths_in_round(division);
         let of_maps = variance.global.of_first_round(division.global(), division.samples)
@@ -55,19 +55,19 @@ fn rounds_vary_as_the_pilot_expects(gpu: &Gpu, spheres: &Viewed) {
 fn what_is_set_stays_and_the_rest_is_chosen_alike_each_time(gpu: &Gpu, spheres: &Viewed) {
     let goal = |error| SceneSettings { stop: Stop { error: Some(error), ..Stop::default() }, ..SceneSettings::default() };
     let (usual, coarse) = (goal(0.1), goal(0.4));
-    let found = chosen(gpu, spheres, &usual, Free::ALL).unwrap();
+    let found = chosen(gpu, spheres, &usual, TunableSettings::ALL).unwrap();
     assert!(found.gain(&usual.stop) > 2.0, "{}: {found:?}", found.gain(&usual.stop));
-    let again = chosen(gpu, spheres, &SceneSettings { seed: 77, ..usual.clone() }, Free::ALL).unwrap();
+    let again = chosen(gpu, spheres, &SceneSettings { seed: 77, ..usual.clone() }, TunableSettings::ALL).unwrap();
     assert_eq!((found.chosen, found.rounds), (again.chosen, again.rounds));
-    let of_rays = chosen(gpu, spheres, &usual, Free { shadow_rays: true, ..Free::default() }).unwrap();
+    let of_rays = chosen(gpu, spheres, &usual, TunableSettings { shadow_rays: true, ..TunableSettings::default() }).unwrap();
     assert_eq!(of_rays.chosen, Division { shadow_rays: of_rays.chosen.shadow_rays, ..of_rays.before });
     let three = SceneSettings { shadow_rays: 3, ..usual.clone() };
-    let of_others = chosen(gpu, spheres, &three, Free { shadow_rays: false, ..Free::ALL }).unwrap();
+    let of_others = chosen(gpu, spheres, &three, TunableSettings { shadow_rays: false, ..TunableSettings::ALL }).unwrap();
     assert!(of_others.chosen.shadow_rays == 3 && of_others.chosen != of_others.before, "{of_others:?}");
-    assert_eq!(chosen(gpu, spheres, &usual, Free::default()), None);
+    assert_eq!(chosen(gpu, spheres, &usual, TunableSettings::default()), None);
     // A small error takes more of it; a GPU, on which a round costs more than its paths, saves little by a large one.
     let most = if gpu.facts().kind == "cpu" { 0.5 } else { 1.0 };
-    let rough = chosen(gpu, spheres, &coarse, Free::ALL).unwrap();
+    let rough = chosen(gpu, spheres, &coarse, TunableSettings::ALL).unwrap();
     let [rough, good] = [(&rough, 0.4), (&found, 0.1)].map(|(pilot, error)| pilot.rounds.until(pilot.chosen, error));
     assert!(rough.0 >= 16.0 && rough.1 < most * good.1, "{rough:?} {good:?}");
 }
@@ -76,11 +76,11 @@ fn what_is_set_stays_and_the_rest_is_chosen_alike_each_time(gpu: &Gpu, spheres: 
 fn what_a_pilot_chooses_is_less_work_and_takes_about_the_rounds_that_it_expects(gpu: &Gpu, spheres: &Viewed) {
     let stop = Stop { error: Some(0.5), ..Stop::default() };
     let usual = SceneSettings { photons: 1 << 13, caustic_photons: 1 << 13, rounds: 1 << 12, stop, ..SceneSettings::default() };
-    let pilot = chosen(gpu, spheres, &usual, Free::ALL).unwrap();
+    let pilot = chosen(gpu, spheres, &usual, TunableSettings::ALL).unwrap();
     let [(work, rounds), (before, _)] = [(pilot.chosen, pilot.set(&usual)), (pilot.before, usual)].map(|(division, settings)| {
-        let lit = lit(gpu, spheres, &settings);
-        assert_eq!(lit.end, End::Error, "{division:?}");
-        let rounds = f64::from(lit.film.rounds);
+        let result = result_of(gpu, spheres, &settings);
+        assert_eq!(result.end, End::Error, "{division:?}");
+        let rounds = f64::from(result.film.rounds);
         (1e-6 * rounds * pilot.rounds.cost(division), rounds)
     });
     let (expected, _) = pilot.rounds.until(pilot.chosen, 0.5);
@@ -97,7 +97,7 @@ fn what_paths_meet_is_counted(gpu: &Gpu, spheres: &Viewed) {
         if is_split {
             plan.work_per_submission = 1;
         }
-        let [nodes, triangles] = spheres.lit(gpu, plan).film.visited();
+        let [nodes, triangles] = spheres.run(gpu, plan).film.visited();
         let paths = f64::from(samples * SIZE * SIZE);
         (nodes as f64 / paths, triangles)
     };
@@ -116,14 +116,14 @@ fn tiles_with_more_samples_change_no_mean(gpu: &Gpu, spheres: &Viewed, final_gat
     // The third column of tiles has eight times the samples.
     let rows: Vec<u32> = (0..16).map(|tile| [0, 1, 3, 2][tile % 4]).collect();
     let light_of = |tiles: Option<TileSamples>| {
-        lit(gpu, spheres, &SceneSettings { tiles, rounds: 16, final_gather, stop: Stop::default(), ..few() }).film
+        result_of(gpu, spheres, &SceneSettings { tiles, rounds: 16, final_gather, stop: Stop::default(), ..few() }).film
     };
     let (even, tiled) = (light_of(None), light_of(Some(TileSamples::new(&rows, (SIZE, SIZE)))));
     let mut squares = 0.0;
     for pixel in 0..even.pixels() {
         let [one, other] = [&even, &tiled].map(|film| (film.mean(pixel), film.standard_error(pixel)));
         let variance = one.1.length_squared() + other.1.length_squared();
-        // What shines by itself does not vary.
+        // What emits light does not vary.
         squares += if variance > 0.0 { (one.0 - other.0).length_squared() / variance } else { 0.0 };
     }
     // Of independent errors it is 1; those of the same photons go together.

@@ -17,7 +17,7 @@ use crate::tests::engine::unseen_light;
 use crate::tests::light::closed_form::closed_form_check;
 use crate::tests::light::hard_cases::readme_and_guide;
 use crate::tests::light::overlap::floor_beside;
-use crate::tests::light::transport::{appends_agree, crowd_check};
+use crate::tests::light::transport::{appends_agree, dense_points_check};
 use crate::tests::light::{openings, skies};
 use crate::tests::materials::{dispersion, media, translucent};
 use photonmill::engine::room::film;
@@ -37,12 +37,12 @@ enum Question {
     /// Aimed photons bring as much light as others: a scene of `common::aimed`.
     AimedLight(&'static str),
     /// Any other, by what it is about.
-    Of(Subject, Run, &'static str, fn(&Gpu) -> Check<Complaint>),
+    Of(FaultArea, Run, &'static str, fn(&Gpu) -> Check<Complaint>),
 }
 
 /// What a fault spoils; tests of its own each, as they run side by side.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Subject {
+enum FaultArea {
     Room,
     Scenes,
     Lamps,
@@ -60,16 +60,16 @@ enum Run {
     Neither,
 }
 
+use FaultArea::*;
 use Question::*;
 use Run::*;
-use Subject::*;
 
 impl Question {
-    fn subject(self) -> Subject {
+    fn area(self) -> FaultArea {
         match self {
             Photons(_) | RoomFilm(_) | Ledger(_) | ClosedForm(_) => Room,
             AimedLight(_) => Aiming,
-            Of(subject, ..) => subject,
+            Of(area, ..) => area,
         }
     }
 
@@ -112,7 +112,7 @@ const STRICT_MATH: Question = Of(Room, Short, "strict quotients and roots", roun
 const APPENDS: Question = Of(Scenes, Long, "survivors in any order", |gpu| appends_agree(gpu, &scene("cornell"), &small()));
 const FINITE: Question =
     Of(Scenes, Long, "finite numbers", |gpu| scene_is_finite(gpu, &SceneSettings { rounds: 1, builder: Some(Builder::Ballot), ..small() }));
-const CROWDS: Question = Of(Scenes, Short, "points with many photons near", crowd_check);
+const DENSE_POINTS: Question = Of(Scenes, Short, "points with many photons near", dense_points_check);
 const BITS: Question = Of(Scenes, Neither, "the bits written down", |gpu| bits::check(gpu, "cornell"));
 const LEANING_PLANE: Question = Of(Scenes, Short, "a leaning plane", |gpu| known::leaning_plane(gpu, Illumination::Photons));
 const COARSE_GLASS: Question = Of(Scenes, Long, "coarse glass", |gpu| known::coarse_sphere_in_a_furnace(gpu, glass(1.5), 8));
@@ -153,16 +153,16 @@ const NEAREST_GATHERS: &[&str] = &["nearest_u64", "nearest_two_words"];
 
 #[rustfmt::skip]
 const FAULTS: [Fault; 143] = [
-    // The first of their subjects, which the short run plants, are kept here: their questions share most of their kernels with others.
+    // The first of their areas, which the short run plants, are kept here: their questions share most of their kernels with others.
     Fault { what: "8-bit codes of textures are taken for linear values",
         file: "material/textures.glsl", from: "return uintBitsToFloat(texels[code & 255]);", to: "return float(code & 255) * (1.0 / 255.0);",
-        kernels: &["view"], noticed_by: &[(Of(Scenes, Short, "a repeated texture", |gpu| known::wrapped_texture(gpu, [Wrap::Repeat; 2], false)), WrongTexel)] },
+        kernels: &["camera_paths"], noticed_by: &[(Of(Scenes, Short, "a repeated texture", |gpu| known::wrapped_texture(gpu, [Wrap::Repeat; 2], false)), WrongTexel)] },
     Fault { what: "the sky beside the openings that are known counts as seen",
         file: "world/scene/lights.glsl", from: "arriving.is_beside = !sampled.is_aimed;", to: "",
         kernels: &["receive"], noticed_by: &[(Of(Lamps, Short, "a second opening", openings::second_opening), TooDark)] },
     Fault { what: "media absorb nothing on the way from the eye",
         file: "world/scene/camera_path.glsl", from: "chain.weight *= transmittance(chain.media, hit.t);", to: "",
-        kernels: &["view"], noticed_by: &[(Of(Layers, Short, "an absorbing slab", |gpu| media::absorbing_slab(gpu, 1.0, 0.5, 1.0)), TooBright)] },
+        kernels: &["camera_paths"], noticed_by: &[(Of(Layers, Short, "an absorbing slab", |gpu| media::absorbing_slab(gpu, 1.0, 0.5, 1.0)), TooBright)] },
     Fault { what: "what rounding takes from a pair of floats is forgotten",
         file: "film/float_u64.glsl", from: "precise float rest = sum.y + (", to: "precise float rest = 0.0 * (",
         kernels: &["gather_brute_u64", "gather_grid_u64"],
@@ -172,14 +172,14 @@ const FAULTS: [Fault; 143] = [
         kernels: &["flux_to_radiance"], noticed_by: &[(GLASS_IN_FURNACE, TooDark)] },
     Fault { what: "what one sample gathers for all counts for itself alone",
         file: "world/scene/camera_path.glsl", from: "chain.weight *= for_all ? float(own.count) : 1.0;", to: "",
-        kernels: &["view"],
+        kernels: &["camera_paths"],
         noticed_by: &[(Of(Scenes, Long, "glass in a furnace, by gather rays", |gpu| known::glass_in_a_furnace(gpu, 4, true)), TooDark)] },
-    Fault { what: "what shines counts for the way that was taken and for the others",
+    Fault { what: "what emits light counts for the path that was taken and for the others",
         file: "world/scene/camera_path.glsl", from: "light = chain.chance * chain.weight", to: "light = chain.weight",
-        kernels: &["view"], noticed_by: &[(GLASS_IN_FURNACE, TooBright)] },
+        kernels: &["camera_paths"], noticed_by: &[(GLASS_IN_FURNACE, TooBright)] },
     Fault { what: "ways that a path did not take at layered glass are forgotten",
-        file: "world/scene/other_ways.glsl", from: "add_way(surface, other, coverage * other.weight, media, depth);", to: "",
-        kernels: &["view"], noticed_by: &[(EYE_IN_GLASS, TooDark)] },
+        file: "world/scene/splitting.glsl", from: "add_way(surface, other, coverage * other.weight, media, depth);", to: "",
+        kernels: &["camera_paths"], noticed_by: &[(EYE_IN_GLASS, TooDark)] },
     Fault { what: "every other lane of a subgroup writes over its neighbour",
         file: "builder/place.glsl", from: "subgroupBallotExclusiveBitCount(survivors);",
         to: "(subgroupBallotExclusiveBitCount(survivors) & 0xfffffffeu);",
@@ -244,12 +244,12 @@ const FAULTS: [Fault; 143] = [
     Fault { what: "a scene's photons in order overwrite those of the bounce before",
         file: "builder/scan.glsl", from: "survivors[group_count()] = counters[0];", to: "survivors[group_count()] = 0;",
         kernels: &["trace_scene_scan"], noticed_by: &[(APPENDS, SumsTooSmall)] },
-    Fault { what: "a point that others help keeps its first slice twice",
+    Fault { what: "a point that others help simulates its first slice twice",
         file: "gather/visible_points.glsl", from: "slice_begin = slice * GATHER_SLICE", to: "slice_begin = gl_WorkGroupID.y * GATHER_SLICE",
-        kernels: LOOKUPS, noticed_by: &[(CROWDS, OtherSums)] },
-    Fault { what: "the last slice of crowded points is left out",
-        file: "kernels/crowd_size.comp", from: "min(slice_count - 1, push.max_groups)", to: "min(slice_count - 2, push.max_groups)",
-        kernels: &["crowd_size"], noticed_by: &[(CROWDS, SumsTooSmall)] },
+        kernels: LOOKUPS, noticed_by: &[(DENSE_POINTS, OtherSums)] },
+    Fault { what: "the last slice of dense points is left out",
+        file: "kernels/dense_points_size.comp", from: "min(slice_count - 1, push.max_groups)", to: "min(slice_count - 2, push.max_groups)",
+        kernels: &["dense_points_size"], noticed_by: &[(DENSE_POINTS, SumsTooSmall)] },
     Fault { what: "survivors in order overwrite those of the bounce before",
         file: "builder/scan_move.glsl", from: "photon_place = counters[0] + path_place;", to: "photon_place = path_place;",
         kernels: &["scan_move_room"], noticed_by: &[(Photons(Builder::Scan), OtherPhotons)] },
@@ -274,7 +274,7 @@ const FAULTS: [Fault; 143] = [
         kernels: LOOKUPS, noticed_by: &[(ClosedForm("furnace, Photons, Ballot: irradiance"), TooDark)] },
     Fault { what: "shadow rays count the cosine twice",
         file: "world/scene/direct.glsl", from: "(cosine * lobe_weight", to: "(cosine * cosine * lobe_weight",
-        kernels: &["receive", "view"], noticed_by: &[(ClosedForm("point light, 0.5 m off axis: irradiance"), TooDark),
+        kernels: &["receive", "camera_paths"], noticed_by: &[(ClosedForm("point light, 0.5 m off axis: irradiance"), TooDark),
                       (ClosedForm("point light: radiance of the plane"), TooDark)] },
     Fault { what: "reflected directions have the cosine thrice",
         file: "rng/sampling.glsl", from: "(sqrt(u), 1.0 - u, azimuth)", to: "(sqrt(sqrt(u)), 1.0 - sqrt(u), azimuth)",
@@ -318,18 +318,18 @@ const FAULTS: [Fault; 143] = [
                       (ClosedForm("sun-over-plane, Photons: irradiance"), TooDark)] },
     Fault { what: "rays start a fixed length off their surface",
         file: "world/scene/bvh.glsl", from: "position + way", to: "position + 1e-3 * normal * (dot(direction, normal) < 0.0 ? -1.0 : 1.0)",
-        kernels: &["trace_persistent_scene", "emit_scene", "trace_scene_ballot", "trace_scene_atomic", "receive", "view"],
+        kernels: &["trace_persistent_scene", "emit_scene", "trace_scene_ballot", "trace_scene_atomic", "receive", "camera_paths"],
         noticed_by: &[(Of(Scenes, Short, "a lamp in a box, by photons", |gpu| known::lamp_in_a_box(gpu, Illumination::Photons)), Leak)] },
     Fault { what: "glass reflects one and a half times as much",
         file: "material/lobes/glass.glsl", from: "? fresnel(cos_i, cos_t, eta)", to: "? min(1.5 * fresnel(cos_i, cos_t, eta), 1.0)",
-        kernels: &["view"], noticed_by: &[(ClosedForm("glass slab, at 60 degrees: radiance"), TooDark)] },
+        kernels: &["camera_paths"], noticed_by: &[(ClosedForm("glass slab, at 60 degrees: radiance"), TooDark)] },
     Fault { what: "strict quotients are cut instead of rounded",
         file: "math/math.glsl", from: "quotient += uint(off) + uint(2 * remainder > d);", to: "quotient += uint(off);",
         kernels: &["check_math"], noticed_by: &[(STRICT_MATH, Misrounded)] },
-    Fault { what: "a light in 50 shines with no number",
+    Fault { what: "a light in 50 emits no number",
         file: "world/scene/lights.glsl", from: "    return arriving;",
         to: "    if (u.y < 0.02) arriving.radiance.x = uintBitsToFloat(0x7fc00000u);\n    return arriving;",
-        kernels: &["view"], noticed_by: &[(FINITE, NoNumber)] },
+        kernels: &["camera_paths"], noticed_by: &[(FINITE, NoNumber)] },
     Fault { what: "a photon in 500 starts nowhere",
         file: "world/scene/step.glsl", from: "surface.ng, scatter.direction);",
         to: "surface.ng, scatter.direction);\n            if (u.z < 0.002) start.y = uintBitsToFloat(0x7fc00000u);",
@@ -342,11 +342,11 @@ const FAULTS: [Fault; 143] = [
     Fault { what: "a path from the eye goes on nowhere",
         file: "world/scene/camera_path.glsl", from: "chain.direction = scatter.direction;",
         to: "chain.direction = scatter.direction;\n        if (own.pixel % 5u == 0u) chain.direction.z = uintBitsToFloat(0x7fc00000u);",
-        kernels: &["view"], noticed_by: &[(FINITE, NoNumber)] },
+        kernels: &["camera_paths"], noticed_by: &[(FINITE, NoNumber)] },
     Fault { what: "a path from the eye goes on from nowhere",
         file: "world/scene/camera_path.glsl", from: "chain.direction = scatter.direction;",
         to: "chain.direction = scatter.direction;\n        if (own.pixel % 5u == 0u) chain.position.z = uintBitsToFloat(0x7fc00000u);",
-        kernels: &["view"], noticed_by: &[(FINITE, NoNumber)] },
+        kernels: &["camera_paths"], noticed_by: &[(FINITE, NoNumber)] },
     Fault { what: "a reflected direction of the paper's box is no number",
         file: "world/room/step.glsl", from: "path.wall = hit.wall;",
         to: "path.wall = hit.wall;\n        if (u.x < 0.002) path.direction.y = uintBitsToFloat(0x7fc00000u);",
@@ -355,16 +355,16 @@ const FAULTS: [Fault; 143] = [
     Fault { what: "rays do not start one float further than their surface's error",
         file: "world/scene/bvh.glsl", from: "return mix(intBitsToFloat(bits + away), start, equal(start, vec3(0.0)));", to: "return start;",
         // The error alone is 16 times what the rounding of the start may take from it: no answer is wrong for it.
-        kernels: &["trace_persistent_scene", "emit_scene", "trace_scene_ballot", "view"], noticed_by: &[(BITS, OtherBits)] },
+        kernels: &["trace_persistent_scene", "emit_scene", "trace_scene_ballot", "camera_paths"], noticed_by: &[(BITS, OtherBits)] },
     Fault { what: "rays meet what they leave, where its height is lost in rounding",
         file: "world/scene/bvh.glsl", from: "height * height > 0.0625 * error * error * dot(normal, normal) && ", to: "",
         kernels: SCENE_TRACERS, noticed_by: &[(Of(Scenes, Short, "a patch in a plane", known::patch_in_a_plane), PhotonsAdded)] },
     Fault { what: "of triangles equally near, the first that is tested is met",
         file: "world/scene/bvh.glsl", from: "t < hit.t || (t == hit.t && index < hit.triangle)", to: "t < hit.t",
-        kernels: &["view"], noticed_by: &[(Of(Scenes, Long, "triangles of one corner", known::triangles_of_one_corner), OtherSums)] },
+        kernels: &["camera_paths"], noticed_by: &[(Of(Scenes, Long, "triangles of one corner", known::triangles_of_one_corner), OtherSums)] },
     Fault { what: "rays of a far eye start at the eye",
-        file: "kernels/view.comp", from: "if (distance_to_middle > FAR_EYE) {", to: "if (false) {",
-        kernels: &["view"], noticed_by: &[(Of(Scenes, Short, "a stack from afar", known::stack_from_afar), TooDark)] },
+        file: "kernels/camera_paths.comp", from: "if (distance_to_middle > FAR_EYE) {", to: "if (false) {",
+        kernels: &["camera_paths"], noticed_by: &[(Of(Scenes, Short, "a stack from afar", known::stack_from_afar), TooDark)] },
     Fault { what: "shadow rays end 0.5 % before their lamp",
         file: "world/scene/direct.glsl", from: "arriving.wi : arriving.target - start;", to: "arriving.wi : 0.995 * (arriving.target - start);",
         kernels: &["receive"], noticed_by: &[(Of(Scenes, Long, "a lamp in a box", |gpu| known::lamp_in_a_box(gpu, Illumination::Split)), Leak)] },
@@ -383,7 +383,7 @@ const FAULTS: [Fault; 143] = [
         kernels: SCENE_TRACERS, noticed_by: &[(Of(Scenes, Short, "a leaning scatterer", known::leaning_scatterer), TooBright)] },
     Fault { what: "rays that smooth normals send to the wrong side of a triangle are lost",
         file: "material/scatter.glsl", from: "return direction - 2.0 * min(dot(direction, side), 0.0) * side;", to: "return direction;",
-        kernels: &["view"],
+        kernels: &["camera_paths"],
         noticed_by: &[(Of(Scenes, Long, "a coarse mirror", |gpu| known::coarse_sphere_in_a_furnace(gpu, mirror(1.0), 8)), TooDark), (COARSE_GLASS, TooDark)] },
     Fault { what: "all points have the widest radius",
         file: "gather/radius_class.glsl", from: "uintBitsToFloat((127u - own_class) << 23)", to: "1.0",
@@ -397,13 +397,13 @@ const FAULTS: [Fault; 143] = [
         file: "gather/cover.glsl", from: "if (line.w < cuts.reach) {", to: "if (false) {",
         kernels: &["flux_to_radiance"],
         noticed_by: &[(Of(Scenes, Short, "a floor beside a box", known::beside_a_box), TooDark)] },
-    Fault { what: "what keeps no photons counts as area that they lie on",
+    Fault { what: "what simulates no photons counts as area that they lie on",
         file: "gather/cover.glsl", from: "|| !keeps_photons(triangle.material)", to: "",
         kernels: &["flux_to_radiance"],
         noticed_by: &[(Of(Scenes, Neither, "a floor beside a mirror", |gpu| floor_beside(gpu, "mirror", mirror(1.0))), TooDark)] },
     Fault { what: "smooth normals alone reflect totally in glass for ever",
         file: "material/lobes/glass.glsl", from: "&& depth >= SMOOTH_TOTAL_REFLECTIONS", to: "&& false",
-        kernels: &["view", "go_on"], noticed_by: &[(COARSE_GLASS, TooDark)] },
+        kernels: &["camera_paths", "go_on"], noticed_by: &[(COARSE_GLASS, TooDark)] },
     Fault { what: "a ray to the sky weighs as if half as many were aimed at openings",
         file: "world/scene/openings.glsl", from: "density += divide(share * cones,", to: "density += divide(0.5 * share * cones,",
         kernels: &["receive"], noticed_by: &[(WINDOW, TooBright)] },
@@ -421,12 +421,12 @@ const FAULTS: [Fault; 143] = [
         kernels: &["receive"], noticed_by: &[(Of(Scenes, Short, "a spot", known::spot), TooBright)] },
     Fault { what: "a mirrored texture is a texel off",
         file: "material/textures.glsl", from: "period - 1 - folded", to: "period - folded",
-        kernels: &["view"],
+        kernels: &["camera_paths"],
         noticed_by: &[(Of(Scenes, Short, "a texture mirrored along u", |gpu| known::wrapped_texture(gpu, [Wrap::MirroredRepeat, Wrap::Repeat], false)), WrongTexel),
                       (Of(Scenes, Short, "a texture mirrored along v", |gpu| known::wrapped_texture(gpu, [Wrap::Clamp, Wrap::MirroredRepeat], false)), WrongTexel)] },
     Fault { what: "a shading normal is kept where it is seen from below",
         file: "material/surface.glsl", from: "dot(smooth_normal, wo) > 0.0 ? smooth_normal : surface.ng", to: "smooth_normal",
-        kernels: &["view"], noticed_by: &[(LEANING_PLANE, TooDark)] },
+        kernels: &["camera_paths"], noticed_by: &[(LEANING_PLANE, TooDark)] },
     Fault { what: "large integers are cut instead of rounded",
         file: "check/check_math.comp", from: "float(floatBitsToUint(a))", to: "float(floatBitsToUint(a) & ~0xffu)",
         kernels: &["check_math"], noticed_by: &[(STRICT_MATH, Misrounded)] },
@@ -457,7 +457,7 @@ const FAULTS: [Fault; 143] = [
         kernels: &["flux_to_radiance"], noticed_by: &[(Of(Scenes, Short, "tiny plates", known::tiny_plates), TooDark)] },
     Fault { what: "a triangle has the vertex colour of its first corner",
         file: "material/surface.glsl", from: "at.a + hit.u * (at.b - at.a) + hit.v * (at.c - at.a);", to: "at.a;",
-        kernels: &["view"], noticed_by: &[(Of(Scenes, Short, "colours of vertices", known::vertex_colours), WrongTexel)] },
+        kernels: &["camera_paths"], noticed_by: &[(Of(Scenes, Short, "colours of vertices", known::vertex_colours), WrongTexel)] },
     Fault { what: "where no known opening shows the sun, the sky's table is not asked",
         file: "world/scene/openings.glsl", from: "const float LEAST_BY_TABLE = 0.25;", to: "const float LEAST_BY_TABLE = 0.0;",
         kernels: &["receive"], noticed_by: &[(Of(Lamps, Short, "a skylight", openings::sun_through_a_small_window), TooDark)] },
@@ -478,123 +478,123 @@ const FAULTS: [Fault; 143] = [
         kernels: SCENE_EMITTERS, noticed_by: &[(AimedLight("cosine disc"), TooBright), (AimedLight("two-sided triangles"), TooBright)] },
     Fault { what: "facets are as dense as if alpha were its square root",
         file: "material/ggx.glsl", from: "float squared = alpha * alpha;", to: "float squared = alpha;",
-        kernels: &["view"], noticed_by: &[(BARE_PLATES, TooBright)] },
+        kernels: &["camera_paths"], noticed_by: &[(BARE_PLATES, TooBright)] },
     Fault { what: "facets that hide from the eye and from the light are taken for others",
         file: "material/ggx.glsl",
         from: "divide(0.5, cos_l * ggx_root(alpha, cos_v) + cos_v * ggx_root(alpha, cos_l))",
         to: "divide(1.0, (cos_l + ggx_root(alpha, cos_l)) * (cos_v + ggx_root(alpha, cos_v)))",
-        kernels: &["view"], noticed_by: &[(BARE_PLATES, TooDark)] },
+        kernels: &["camera_paths"], noticed_by: &[(BARE_PLATES, TooDark)] },
     Fault { what: "the diffuse lobe forgets what reflection takes from it on the way out",
         file: "material/bsdf.glsl",
         from: "(0.31830988618379067 * divide(below_diffuse, max(left, 1e-6)))",
         to: "0.31830988618379067",
-        kernels: &["view"], noticed_by: &[(BARE_PLATES, TooDark)] },
-    Fault { what: "metals keep the diffuse lobe",
+        kernels: &["camera_paths"], noticed_by: &[(BARE_PLATES, TooDark)] },
+    Fault { what: "metals checkpointing the diffuse lobe",
         file: "material/lobes/reflection.glsl", from: "= dielectric * (1.0 - layers.transmission)", to: "= 1.0 - layers.transmission",
-        kernels: &["view"], noticed_by: &[(BARE_PLATES, TooBright)] },
+        kernels: &["camera_paths"], noticed_by: &[(BARE_PLATES, TooBright)] },
     Fault { what: "all dielectrics reflect as one of index 1.5",
         file: "material/lobes/reflection.glsl", from: "along * along * layers.specular_colour", to: "0.04 * layers.specular_colour",
-        kernels: &["view"], noticed_by: &[(BARE_PLATES, TooBright)] },
+        kernels: &["camera_paths"], noticed_by: &[(BARE_PLATES, TooBright)] },
     Fault { what: "a coat takes nothing from what lies below it",
-        file: "material/layering.glsl", from: "below = 1.0 - max(cover.coat_albedo, lit.coat);", to: "below = 1.0;",
-        kernels: &["view"], noticed_by: &[(COVERED_PLATES, TooBright)] },
+        file: "material/layering.glsl", from: "below = 1.0 - max(cover.coat_albedo, towards_light.coat);", to: "below = 1.0;",
+        kernels: &["camera_paths"], noticed_by: &[(COVERED_PLATES, TooBright)] },
     Fault { what: "the fibres of sheen are spread by the square of their sine",
         file: "material/lobes/sheen.glsl", from: "divide(0.5, alpha)", to: "divide(1.0, alpha)",
-        kernels: &["view"], noticed_by: &[(COVERED_PLATES, TooDark)] },
+        kernels: &["camera_paths"], noticed_by: &[(COVERED_PLATES, TooDark)] },
     Fault { what: "thin walls turn what they transmit by half a circle instead of mirroring it",
         file: "material/lobes/transmission.glsl", from: "wi - 2.0 * dot(wi, surface.ns) * surface.ns);", to: "-wi);",
-        kernels: &["view"], noticed_by: &[(TRANSMISSIVE_PLATES, TooBright)] },
+        kernels: &["camera_paths"], noticed_by: &[(TRANSMISSIVE_PLATES, TooBright)] },
     Fault { what: "thin walls and solids transmit what they reflect",
         file: "material/lobes/transmission.glsl",
         from: "return lobes.transmitted * (1.0 - exact);", to: "return lobes.transmitted;",
-        kernels: &["view"], noticed_by: &[(TRANSMISSIVE_PLATES, TooBright)] },
+        kernels: &["camera_paths"], noticed_by: &[(TRANSMISSIVE_PLATES, TooBright)] },
     Fault { what: "refraction does not compress radiance",
         file: "material/lobes/transmission.glsl", from: "float value = eta * eta * both", to: "float value = both",
-        kernels: &["view"], noticed_by: &[(TRANSMISSIVE_PLATES, TooBright)] },
+        kernels: &["camera_paths"], noticed_by: &[(TRANSMISSIVE_PLATES, TooBright)] },
     Fault { what: "the jacobian of refraction has the wrong sign",
         file: "material/lobes/transmission.glsl", from: "float spread = eta * v_h - l_h;", to: "float spread = eta * v_h + l_h;",
-        kernels: &["view"], noticed_by: &[(TRANSMISSIVE_PLATES, TooDark)] },
+        kernels: &["camera_paths"], noticed_by: &[(TRANSMISSIVE_PLATES, TooDark)] },
     Fault { what: "solids reflect by the approximation instead of Fresnel's equations",
         file: "material/lobes/reflection.glsl",
         from: "        share = clamp(divide(reflectance_at(cosine, base.eta) - along, 1.0 - along), 0.0, 1.0);\n",
         to: "",
-        kernels: &["view"],
+        kernels: &["camera_paths"],
         noticed_by: &[(Of(Layers, Short, "solids from inside", |gpu| layered::lobes_in_the_sun(gpu, &layered::rough_solids(), true)), TooDark)] },
-    Fault { what: "normals of facets are sampled from a view that is not stretched",
+    Fault { what: "normals of facets are sampled from a viewpoint that is not stretched",
         file: "material/ggx.glsl", from: "vec3 stretched = normalize(vec3(alpha * v.xy, v.z));", to: "vec3 stretched = v;",
-        kernels: &["view"], noticed_by: &[(METALS, TooDark)] },
+        kernels: &["camera_paths"], noticed_by: &[(METALS, TooDark)] },
     Fault { what: "light samples count in full beside paths that meet the same light",
         file: "material/scatter.glsl",
         from: "return light_density > 0.0 ? divide(light_density, light_density + lobe_density) : 1.0;",
         to: "return 1.0;",
-        kernels: &["view"], noticed_by: &[(METALS, TooBright)] },
-    Fault { what: "light samples of matt lobes count in full beside rays of these lobes",
-        file: "material/bsdf.glsl", from: "        if (asks_matt) {", to: "        if (false) {",
-        kernels: &["view"], noticed_by: &[(METALS, TooBright)] },
+        kernels: &["camera_paths"], noticed_by: &[(METALS, TooBright)] },
+    Fault { what: "light samples of rough lobes count in full beside rays of these lobes",
+        file: "material/bsdf.glsl", from: "        if (asks_rough) {", to: "        if (false) {",
+        kernels: &["camera_paths"], noticed_by: &[(METALS, TooBright)] },
     Fault { what: "paths that meet a light take several shadow rays for one",
         file: "world/scene/camera_path.glsl", from: "+ float(work.shadow_rays) * light_density", to: "+ light_density",
-        kernels: &["view"], noticed_by: &[(METALS, TooBright)] },
+        kernels: &["camera_paths"], noticed_by: &[(METALS, TooBright)] },
     Fault { what: "paths that meet a lamp are weighed as if it were the only one",
         file: "world/scene/lights.glsl", from: "return light.probability * lamp_density(", to: "return lamp_density(",
-        kernels: &["view"], noticed_by: &[(HALF_A_DOME, TooDark)] },
+        kernels: &["camera_paths"], noticed_by: &[(HALF_A_DOME, TooDark)] },
     Fault { what: "who leaves a solid leaves those around it",
         file: "material/media.glsl", from: "return (media & below) | above;", to: "return media & below;",
-        kernels: &["view"], noticed_by: &[(Of(Layers, Short, "nested slabs", media::nested_slabs), TooBright)] },
+        kernels: &["camera_paths"], noticed_by: &[(Of(Layers, Short, "nested slabs", media::nested_slabs), TooBright)] },
     Fault { what: "who leaves a solid leaves the one entered last",
         file: "material/media.glsl", from: "if (((media >> place) & MEDIUM_MASK) == medium) {", to: "if (((media >> place) & MEDIUM_MASK) != 0) {",
-        kernels: &["view"], noticed_by: &[(OVERLAPPING_SLABS, TooBright)] },
+        kernels: &["camera_paths"], noticed_by: &[(OVERLAPPING_SLABS, TooBright)] },
     Fault { what: "of solids partly in one another the one entered last counts",
         file: "material/media.glsl", from: "if (HAS_MEDIA_BY_SIZE) {", to: "if (false) {",
-        kernels: &["view"], noticed_by: &[(OVERLAPPING_SLABS, TooDark)] },
+        kernels: &["camera_paths"], noticed_by: &[(OVERLAPPING_SLABS, TooDark)] },
     Fault { what: "mirrored normal maps are not mirrored",
         file: "material/surface.glsl", from: "at.is_turned ? cross(tangent, normal) : cross(normal, tangent)", to: "cross(normal, tangent)",
-        kernels: &["view"], noticed_by: &[(Of(Layers, Short, "normal maps", layered::normal_maps_in_the_sun), TooBright)] },
+        kernels: &["camera_paths"], noticed_by: &[(Of(Layers, Short, "normal maps", layered::normal_maps_in_the_sun), TooBright)] },
     Fault { what: "textures are looked up by the first set of coordinates alone",
         file: "material/surface.glsl", from: "vec2 uv = lookup.uv_set == 0 ? first : second;", to: "vec2 uv = first;",
-        kernels: &["view"], noticed_by: &[(LAYER_TEXTURES, TooDark)] },
+        kernels: &["camera_paths"], noticed_by: &[(LAYER_TEXTURES, TooDark)] },
     Fault { what: "rows of a texture's transform are swapped",
         file: "material/surface.glsl", from: "(lookup.row_u, uv), dot(lookup.row_v, uv)", to: "(lookup.row_v, uv), dot(lookup.row_u, uv)",
-        kernels: &["view"], noticed_by: &[(LAYER_TEXTURES, TooBright)] },
-    Fault { what: "unlit surfaces are lit",
+        kernels: &["camera_paths"], noticed_by: &[(LAYER_TEXTURES, TooBright)] },
+    Fault { what: "unlit surfaces are towards_light",
         file: "material/bsdf.glsl",
-        from: " && !layers.is_unlit;\n    lobes.base.film.is_matt = uint(is_in_map);\n    \
-            lobes.matt.f0 = is_in_map ? lobes.base.f0 : vec3(0.0);\n    lobes.matt.f90 = is_in_map ? lobes.base.f90 : 0.0;\n    \
+        from: " && !layers.is_unlit;\n    lobes.base.film.is_rough = uint(is_in_map);\n    \
+            lobes.rough.f0 = is_in_map ? lobes.base.f0 : vec3(0.0);\n    lobes.rough.f90 = is_in_map ? lobes.base.f90 : 0.0;\n    \
             if (layers.is_unlit) {\n",
-        to: ";\n    lobes.base.film.is_matt = uint(is_in_map);\n    \
-            lobes.matt.f0 = is_in_map ? lobes.base.f0 : vec3(0.0);\n    lobes.matt.f90 = is_in_map ? lobes.base.f90 : 0.0;\n    \
+        to: ";\n    lobes.base.film.is_rough = uint(is_in_map);\n    \
+            lobes.rough.f0 = is_in_map ? lobes.base.f0 : vec3(0.0);\n    lobes.rough.f90 = is_in_map ? lobes.base.f90 : 0.0;\n    \
             if (false) {\n",
-        kernels: &["view"], noticed_by: &[(LAYER_TEXTURES, TooBright)] },
+        kernels: &["camera_paths"], noticed_by: &[(LAYER_TEXTURES, TooBright)] },
     Fault { what: "panes pass light in the gaps of alpha, too",
         file: "material/bsdf.glsl", from: "passing += layers.coverage * below", to: "passing += below",
-        kernels: &["view"], noticed_by: &[(FLOOR_THROUGH_SHEETS, TooBright)] },
+        kernels: &["camera_paths"], noticed_by: &[(FLOOR_THROUGH_SHEETS, TooBright)] },
     Fault { what: "paths that do not pass weigh as if none did",
         file: "world/scene/camera_path.glsl",
         from: "        chain.weight *= divide(vertex.surface.layers.coverage, 1.0 - vertex.lobes.pass_chance);\n",
         to: "",
-        kernels: &["view"], noticed_by: &[(Of(Layers, Neither, "clear balls", |gpu| layered::clear_furnace(gpu, true)), TooDark)] },
+        kernels: &["camera_paths"], noticed_by: &[(Of(Layers, Neither, "clear balls", |gpu| layered::clear_furnace(gpu, true)), TooDark)] },
     Fault { what: "of several sheets shadow rays count the last one",
         file: "world/scene/direct.glsl", from: "share *= passing_at(hit, wo, media);", to: "share = passing_at(hit, wo, media);",
         kernels: &["receive"], noticed_by: &[(LAMP_BETWEEN_SHEETS, TooBright)] },
     Fault { what: "alpha at the cutoff is a hole",
         file: "material/surface.glsl", from: "(alpha >= layered.cutoff ? 1.0 : 0.0)", to: "(alpha > layered.cutoff ? 1.0 : 0.0)",
-        kernels: &["view"], noticed_by: &[(FLOOR_THROUGH_SHEETS, TooBright)] },
+        kernels: &["camera_paths"], noticed_by: &[(FLOOR_THROUGH_SHEETS, TooBright)] },
     Fault { what: "rough refraction has the density of its facets",
         file: "material/lobes/transmission.glsl", from: "facet.density *= facet.along * divide(l_h, max(spread * spread, 1e-12));", to: "",
-        kernels: &["view"], noticed_by: &[(HALF_A_DOME, TooDark)] },
+        kernels: &["camera_paths"], noticed_by: &[(HALF_A_DOME, TooDark)] },
     Fault { what: "photons on a coated plate are weighed as if it were bare",
         file: "gather/visible_points.glsl", from: "(lobes.alpha, cover, cosine", to: "(lobes.alpha, no_cover(), cosine",
         kernels: LOOKUPS, noticed_by: &[(Of(Layers, Long, "photons on a plate", layered::photons_on_a_plate), TooBright)] },
     Fault { what: "refraction does not compress the radiance of paths",
         file: "material/bsdf.glsl",
         from: "scatter.weight *= carries_radiance && is_beyond && layers.is_solid ? lobes.base.eta * lobes.base.eta : 1.0;", to: "",
-        kernels: &["view"], noticed_by: &[(EYE_IN_GLASS, TooDark)] },
+        kernels: &["camera_paths"], noticed_by: &[(EYE_IN_GLASS, TooDark)] },
     Fault { what: "media absorb no photons",
         file: "world/scene/step.glsl", from: "arriving *= transmittance(path.media, hit.t);", to: "",
         kernels: SCENE_TRACERS, noticed_by: &[(Of(Layers, Long, "photons through a slab", media::photons_through_a_slab), TooBright)] },
     Fault { what: "red has the index of blue",
         file: "material/media.glsl", from: "(float(channel) - 1.0) * spread", to: "(1.0 - float(channel)) * spread",
-        kernels: &["view"], noticed_by: &[(Of(Layers, Short, "a prism", |gpu| dispersion::prism_check(gpu, 1.0)), TooDark)] },
-    Fault { what: "the channel that a path keeps stands for itself alone",
+        kernels: &["camera_paths"], noticed_by: &[(Of(Layers, Short, "a prism", |gpu| dispersion::prism_check(gpu, 1.0)), TooDark)] },
+    Fault { what: "the channel that a path simulates stands for itself alone",
         file: "material/media.glsl", from: "kept[channel] = count * light[channel];", to: "kept[channel] = light[channel];",
         kernels: SCENE_TRACERS, noticed_by: &[(Of(Layers, Long, "photons through a prism", dispersion::prism_photons), TooDark)] },
     Fault { what: "diffuse transmission weighs as if no other lobe had a chance",
@@ -603,13 +603,13 @@ const FAULTS: [Fault; 143] = [
         kernels: SCENE_TRACERS, noticed_by: &[(Of(Layers, Long, "a sheet over a floor", translucent::sheet_over_a_floor), TooDark)] },
     Fault { what: "films add to what lies under them",
         file: "material/film.glsl", from: "return (1.0 - film.share) * colour + film.share * interference;", to: "return colour + film.share * interference;",
-        kernels: &["view"], noticed_by: &[(BARE_PLATES, TooBright)] },
+        kernels: &["camera_paths"], noticed_by: &[(BARE_PLATES, TooBright)] },
     Fault { what: "the diffuse lobe has what its film reflects",
         file: "material/lobes/diffuse.glsl", from: "e0 += layers.iridescence * (layers.film_bound - e0);", to: "",
-        kernels: &["view"], noticed_by: &[(BARE_PLATES, TooBright)] },
+        kernels: &["camera_paths"], noticed_by: &[(BARE_PLATES, TooBright)] },
     Fault { what: "light samples behind paper lose a tenth",
         file: "material/lobes/diffuse_transmission.glsl", from: "(-cosine * light_share(light_density, density))", to: "(-0.9 * cosine * light_share(light_density, density))",
-        kernels: &["view"], noticed_by: &[(TRANSMISSIVE_PLATES, TooDark)] },
+        kernels: &["camera_paths"], noticed_by: &[(TRANSMISSIVE_PLATES, TooDark)] },
     Fault { what: "shadow rays run through media as through air",
         file: "world/scene/direct.glsl", from: "left = t_max == 1.0 ? transmittance(media, norm(way)) : left;", to: "",
         kernels: &["receive"], noticed_by: &[(LAMP_IN_A_MEDIUM, TooBright)] },
@@ -622,24 +622,24 @@ const FAULTS: [Fault; 143] = [
     Fault { what: "normal maps are not turned over on the back",
         file: "material/surface.glsl", from: "mat3 frame = tangent_frame(tangents, n, front, u, v);",
         to: "front = true;\n    mat3 frame = tangent_frame(tangents, n, front, u, v);",
-        kernels: &["view"], noticed_by: &[(COATS_AND_BACKS, TooBright)] },
+        kernels: &["camera_paths"], noticed_by: &[(COATS_AND_BACKS, TooBright)] },
     Fault { what: "a coat has the normal of what lies below it",
         file: "material/surface.glsl", from: "if ((found & (1u << LAYER_COAT_NORMAL)) != 0) {", to: "layers.coat_normal = surface.ns;\n        if (false) {",
-        kernels: &["view"], noticed_by: &[(COATS_AND_BACKS, TooBright)] },
+        kernels: &["camera_paths"], noticed_by: &[(COATS_AND_BACKS, TooBright)] },
     Fault { what: "a coat counts the cosine to what lies below it",
         file: "material/lobes/coat.glsl", from: "* divide(max(dot(wi, coat_normal), 0.0), max(dot(wi, n), 1e-6))", to: "",
-        kernels: &["view"], noticed_by: &[(COATS_AND_BACKS, TooDark)] },
+        kernels: &["camera_paths"], noticed_by: &[(COATS_AND_BACKS, TooDark)] },
     Fault { what: "transmission is looked up in the wrong channel",
         file: "material/surface.glsl", from: "values[LAYER_TRANSMISSION].r", to: "values[LAYER_TRANSMISSION].g",
-        kernels: &["view"], noticed_by: &[(LAYER_TEXTURES, TooBright)] },
+        kernels: &["camera_paths"], noticed_by: &[(LAYER_TEXTURES, TooBright)] },
     Fault { what: "paths through thin rough walls turn by half a circle",
         file: "material/lobes/transmission.glsl", from: "return wi - 2.0 * dot(wi, surface.ns) * surface.ns;", to: "return -wi;",
-        kernels: &["view"], noticed_by: &[(HALF_A_DOME, TooDark)] },
+        kernels: &["camera_paths"], noticed_by: &[(HALF_A_DOME, TooDark)] },
     Fault { what: "photons that do not pass weigh as if none did",
         file: "world/scene/step.glsl",
         from: "scatter.weight *= scatter.passes ? 1.0 : divide(surface.layers.coverage, 1.0 - lobes.pass_chance);", to: "",
         kernels: SCENE_TRACERS, noticed_by: &[(Of(Layers, Long, "photons off a pane", sheets::photons_off_a_pane), TooDark)] },
-    Fault { what: "gaps of alpha shine",
+    Fault { what: "gaps of alpha emit light",
         file: "material/surface.glsl", from: "share *= coverage_of(material, index, u, v);", to: "",
         kernels: &["receive"], noticed_by: &[(Of(Layers, Long, "a blended lamp", |gpu| sheets::blended_lamp(gpu, Illumination::Split)), TooBright)] },
 ];
@@ -680,7 +680,12 @@ fn striped_counters(gpu: &Gpu) -> Check<Complaint> {
 
 fn builders_under_the_clock(gpu: &Gpu) -> Check<Complaint> {
     let forever = Duration::from_secs(3600);
-    let request = compaction::Request { survivals: vec![0.75], bounces: 4, turns: 1, ..compaction::Request::up_to(1 << 12, forever) };
+    let request = compaction::CompactionRequest {
+        survivals: vec![0.75],
+        bounces: 4,
+        turns: 1,
+        ..compaction::CompactionRequest::up_to(1 << 12, forever)
+    };
     compaction::measure(gpu, &request, None, &AtomicBool::new(false), &mut |_| {}).map(|_| ()).map_err(|error| match error {
         Error::Miscalculated { what, .. } => Complaint::new(BuildersDisagree, what),
         error => error.into(),
@@ -696,15 +701,15 @@ fn spoiled(fault: &Fault) -> Vec<(String, Vec<u32>)> {
     planted::kernels(fault.kernels, fault.file, &[(fault.from, fault.to)])
 }
 
-/// Faults of a subject.
-fn faults_of(subject: Subject) -> impl Iterator<Item = &'static Fault> {
-    FAULTS.iter().filter(move |fault| fault.noticed_by[0].0.subject() == subject)
+/// Faults of an area.
+fn faults_of(area: FaultArea) -> impl Iterator<Item = &'static Fault> {
+    FAULTS.iter().filter(move |fault| fault.noticed_by[0].0.area() == area)
 }
 
 /// The questions that faults are noticed by are answered right by a device without one.
-fn questions_hold(subject: Subject) {
+fn questions_hold(area: FaultArea) {
     let Some(gpu) = device() else { return };
-    let questions = faults_of(subject).flat_map(|fault| fault.noticed_by).map(|(question, _)| (format!("{question:?}"), question));
+    let questions = faults_of(area).flat_map(|fault| fault.noticed_by).map(|(question, _)| (format!("{question:?}"), question));
     for question in questions
         .filter(|(_, question)| question.run() == Short || is_long_run() && question.run() == Long)
         .collect::<BTreeMap<_, _>>()
@@ -715,15 +720,15 @@ fn questions_hold(subject: Subject) {
 }
 
 /// How many faults are planted depends on the run: each is a kernel that the device compiles anew. In the short run every kernel of the
-/// room gets one, and each other subject its first; only questions that are not kept for the long run are asked.
-fn faults_are_noticed(subject: Subject) {
+/// room gets one, and each other area its first; only questions that are not kept for the long run are asked.
+fn faults_are_noticed(area: FaultArea) {
     let Some(mut gpu) = device() else { return };
     let mut spoiled_before: BTreeSet<&str> = BTreeSet::new();
-    for fault in faults_of(subject) {
+    for fault in faults_of(area) {
         // All of them count, whichever is seen first.
         let new = fault.kernels.iter().filter(|kernel| spoiled_before.insert(kernel)).count();
         let is_first = spoiled_before.len() == new;
-        if !is_long_run() && (new == 0 || subject != Room && !is_first) {
+        if !is_long_run() && (new == 0 || area != Room && !is_first) {
             continue;
         }
         gpu.replace(spoiled(fault));

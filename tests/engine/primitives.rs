@@ -194,8 +194,8 @@ fn overflow_check(appended: &Appended, settings: &RoomSettings, capacity: u32, a
     require(touched.is_none(), || format!("a guard word became {touched:x?}"))?;
     let entries = appended.entries(settings);
     let stored: Vec<Photon> = appended.stored(settings).copied().collect();
-    let told: u32 = appended.tallies.iter().map(|tally| tally.stored).sum();
-    require(stored.len() as u32 == told, || format!("{} photons are in the map, {told} were counted", stored.len()))?;
+    let counted: u32 = appended.tallies.iter().map(|tally| tally.stored).sum();
+    require(stored.len() as u32 == counted, || format!("{} photons are in the map, {counted} were counted", stored.len()))?;
     let exist: HashSet<Vec<u8>> = all.iter().map(|photon| bytemuck::bytes_of(photon).to_vec()).collect();
     let stranger = stored.iter().find(|photon| !exist.contains(bytemuck::bytes_of(*photon)));
     require(stranger.is_none(), || format!("{stranger:?} is no photon of this run"))?;
@@ -224,9 +224,9 @@ fn overflow_check(appended: &Appended, settings: &RoomSettings, capacity: u32, a
     }
     // Gaps take places, too.
     let has_gaps = appended.has_gaps;
-    require(told == capacity.min(survivors) || has_gaps, || format!("{told} of {capacity} places taken by {survivors} survivors"))?;
-    require(told >= survivors || appended.counters[0] > capacity, || {
-        format!("{survivors} survivors, {told} of them stored, and room was left")
+    require(counted == capacity.min(survivors) || has_gaps, || format!("{counted} of {capacity} places taken by {survivors} survivors"))?;
+    require(counted >= survivors || appended.counters[0] > capacity, || {
+        format!("{survivors} survivors, {counted} of them stored, and room was left")
     })?;
     require(appended.counters[0] >= survivors && (appended.counters[0] <= survivors || has_gaps), || {
         format!("the counter says {} instead of the need, {survivors}", appended.counters[0])

@@ -10,7 +10,7 @@ use photonmill::cpu::sampling::{sample_cosine_hemisphere, sample_uniform_hemisph
 use photonmill::cpu::trace::Tracer;
 use photonmill::engine::room::resources::RoomResources;
 use photonmill::engine::room::{constants, trace};
-use photonmill::path::{self, Path};
+use photonmill::photon_state::{self, PhotonState};
 use photonmill::plan::EmissionRange;
 use photonmill::rng::{Affine48, Streams, owen_scramble, sobol, srand48};
 
@@ -147,18 +147,18 @@ fn neighbouring_photons_do_not_resemble_each_other() {
 }
 
 /// The paths of some photons as they leave their light, by the device.
-fn emitted(gpu: &Device, plan: &RoomPlan, round: u32, range: EmissionRange) -> Vec<Path> {
+fn emitted(gpu: &Device, plan: &RoomPlan, round: u32, range: EmissionRange) -> Vec<PhotonState> {
     let scene = open_box(&plan.settings);
     let mut commands = Commands::new(gpu, constants(plan), Instant::now()).unwrap();
     let resources = RoomResources::new(&mut commands, &scene, plan).unwrap();
     trace::emit(&mut commands, &resources, plan, round, &[range]).unwrap();
     let array = commands.read(&resources.paths[0], plan.path_array_length() as usize).unwrap();
-    (0..range.count as usize).map(|index| path::unpack(&array, index)).collect()
+    (0..range.count as usize).map(|index| photon_state::unpack(&array, index)).collect()
 }
 
 /// The same photons by another builder: the same streams, bit for bit, and places and directions within a few
 /// roundings (radius, square root, polynomial, two products).
-fn same_start(found: &[Path], expected: &[Path]) -> Check {
+fn same_start(found: &[PhotonState], expected: &[PhotonState]) -> Check {
     for (a, b) in pairs(found, expected) {
         require((a.photon, a.stream, a.wall) == (b.photon, b.stream, b.wall), || format!("{a:?} instead of {b:?}"))?;
         // Sums carry what is no number, and a maximum would not.
@@ -168,7 +168,7 @@ fn same_start(found: &[Path], expected: &[Path]) -> Check {
     require(found.len() == expected.len(), || format!("{} photons instead of {}", found.len(), expected.len()))
 }
 
-/// Numbers that f32 does not tell apart (2^24), the last of the largest round, and rounds so late that 2^47
+/// Numbers that f32 does not distinguish (2^24), the last of the largest round, and rounds so late that 2^47
 /// photons lie before them: every photon is one of its own, and both builders start the same ones.
 #[test]
 fn photons_of_the_largest_numbers_are_their_own() {

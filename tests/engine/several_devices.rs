@@ -5,13 +5,13 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::Duration;
 
-use crate::common::lit::Viewed;
 use crate::common::prelude::*;
+use crate::common::rendered::Viewed;
 use crate::fuzz::seeds::Saved;
 use photonmill::engine::End;
 use photonmill::engine::run::retry::{Remedy, run_on};
 use photonmill::engine::run::saved::SavedRun;
-use photonmill::engine::run::watch::{Keep, SaveRun};
+use photonmill::engine::run::watch::{Checkpointing, SaveRun};
 use photonmill::engine::scene::{self, RunResult};
 use photonmill::settings::stop::Stop;
 
@@ -41,7 +41,7 @@ struct Trouble {
 
 /// What came of it.
 struct Came {
-    lit: RunResult,
+    result: RunResult,
     given_up: u32,
     saved: Vec<SavedRun>,
 }
@@ -54,7 +54,7 @@ const PICTURE: Sensor = Sensor::Picture { width: 8, height: 8 };
 
 fn alone(room: &Viewed, settings: &SceneSettings) -> RunResult {
     let gpu = device().unwrap();
-    room.lit(&gpu, room.tried(&gpu, settings, PICTURE))
+    room.run(&gpu, room.tried(&gpu, settings, PICTURE))
 }
 
 fn shared(room: &Viewed, count: usize, settings: &SceneSettings, trouble: Trouble) -> Result<Came, Error> {
@@ -71,9 +71,10 @@ fn shared(room: &Viewed, count: usize, settings: &SceneSettings, trouble: Troubl
         }
         let fails = trouble.fails.filter(|(device, _)| *device == number && attempts.load(Ordering::Relaxed) == 0);
         let failed = AtomicBool::new(false);
-        let of = &mut control.keep;
+        let of = &mut control.checkpointing;
         let save = of.save.as_mut().map(|save| &mut **save as &mut dyn SaveRun);
-        let keep = Keep { scene: of.scene, share: of.share, resume: of.resume.take(), every: of.every, save, dealt: of.dealt.take() };
+        let checkpointing =
+            Checkpointing { scene: of.scene, share: of.share, resume: of.resume.take(), every: of.every, save, dealt: of.dealt.take() };
         let (outer, cancelled) = (&mut control.progress, control.cancelled);
         let mut progress = |progress: &engine::Progress| {
             if let Some(wait) = trouble.waits.get(number) {
@@ -89,13 +90,13 @@ fn shared(room: &Viewed, count: usize, settings: &SceneSettings, trouble: Troubl
             outer(progress);
         };
         // A pause whenever a block is done.
-        let control = &mut Control { cancelled: if fails.is_some() { &failed } else { cancelled }, progress: &mut progress, keep };
-        let lit = scene::light(gpu, &room.view(), plan, control);
+        let control = &mut Control { cancelled: if fails.is_some() { &failed } else { cancelled }, progress: &mut progress, checkpointing };
+        let result = scene::light(gpu, &room.viewpoint(), plan, control);
         if failed.load(Ordering::Relaxed) {
             attempts.fetch_add(1, Ordering::Relaxed);
             return Err(Error::Device { call: "vkQueueSubmit2", reason: "the device is lost".into() });
         }
-        lit
+        result
     };
     let given_up = AtomicU32::new(0);
     let failed = &|_: &Gpu, _: &Error, remedy: Remedy| {
@@ -109,12 +110,13 @@ fn shared(room: &Viewed, count: usize, settings: &SceneSettings, trouble: Troubl
         }
     };
     let resume = trouble.resume.clone().map(|run| (PathBuf::from("a file"), run));
-    let keep = Keep { scene: &room.scene.name, resume, every: Duration::ZERO, save: Some(&mut all), ..Keep::default() };
-    let mut control = Control { cancelled: &cancelled, progress: &mut progress, keep };
-    let lit = run_on(&mut gpus, &scene::task(&room.geometry, &plan), &run, failed, &mut control);
+    let checkpointing =
+        Checkpointing { scene: &room.scene.name, resume, every: Duration::ZERO, save: Some(&mut all), ..Checkpointing::default() };
+    let mut control = Control { cancelled: &cancelled, progress: &mut progress, checkpointing };
+    let result = run_on(&mut gpus, &scene::task(&room.geometry, &plan), &run, failed, &mut control);
     gpus.iter().for_each(|gpu| gpu.check_validation().unwrap());
     IDLE.lock().unwrap().append(&mut gpus);
-    Ok(Came { lit: lit?, given_up: given_up.into_inner(), saved: all.0 })
+    Ok(Came { result: result?, given_up: given_up.into_inner(), saved: all.0 })
 }
 
 fn assert_same(what: &str, found: &RunResult, expected: &RunResult) {
@@ -143,12 +145,12 @@ fn several_devices_come_to_the_bits_of_one() {
         assert!(expected.end == end && (end != End::Error || expected.film.blocks < 100), "{:?} instead of {end:?}", expected.end);
         for (count, waits) in runs {
             let came = shared(&room, count, &settings, Trouble { waits, ..Trouble::default() }).unwrap();
-            assert_same(&format!("{end:?}, {count} devices"), &came.lit, &expected);
+            assert_same(&format!("{end:?}, {count} devices"), &came.result, &expected);
             let others = if expected.film.rounds > 2 { count - 1 } else { 0 };
-            assert_eq!((came.given_up, came.lit.more_devices.len()), (0, others), "{end:?}");
+            assert_eq!((came.given_up, came.result.more_devices.len()), (0, others), "{end:?}");
             if others > 0 {
                 let last = came.saved.last().unwrap();
-                assert_eq!(last.missing(), last.wanted - came.lit.film.blocks, "{end:?}");
+                assert_eq!(last.missing(), last.wanted - came.result.film.blocks, "{end:?}");
             }
         }
     }
@@ -163,8 +165,8 @@ fn a_device_that_fails_is_given_up() {
     let expected = alone(&room, &settings());
     for &(fails, count) in cases {
         let came = shared(&room, count, &settings(), Trouble { fails: Some(fails), ..Trouble::default() }).unwrap();
-        assert_same("without one", &came.lit, &expected);
-        assert_eq!((came.given_up, came.lit.more_devices.len()), (1, count - 2));
+        assert_same("without one", &came.result, &expected);
+        assert_eq!((came.given_up, came.result.more_devices.len()), (1, count - 2));
     }
     let Err(error) = shared(&room, 1, &settings(), Trouble { fails: Some((0, 2)), ..Trouble::default() }) else { panic!("none is left") };
     assert!(matches!(error, Error::Device { .. }), "{error}");
@@ -178,13 +180,13 @@ fn what_was_ended_early_goes_on() {
     let expected = alone(&room, &settings());
     let waits = vec![Duration::from_millis(20); 2];
     let early = shared(&room, 2, &settings(), Trouble { waits, cancelled_at: Some(10), ..Trouble::default() }).unwrap();
-    assert_eq!(early.lit.end, End::Cancelled);
+    assert_eq!(early.result.end, End::Cancelled);
     let saved = early.saved.last().unwrap();
-    assert!(early.lit.film.blocks == saved.done.count() && early.lit.film.blocks < 12 && early.lit.film.blocks > 0);
+    assert!(early.result.film.blocks == saved.done.count() && early.result.film.blocks < 12 && early.result.film.blocks > 0);
     // From its end, and from what was saved on the way, which on a busy machine may be the same.
     for (count, from) in [(3, saved), (2, &early.saved[early.saved.len() / 2])] {
         let on = shared(&room, count, &settings(), Trouble { resume: Some(from.clone()), ..Trouble::default() }).unwrap();
-        assert_same("gone on", &on.lit, &expected);
+        assert_same("gone on", &on.result, &expected);
     }
 }
 
@@ -195,11 +197,11 @@ fn a_time_ends_it_behind_whole_blocks() {
     let room = room();
     let timed = SceneSettings { rounds: 4000, stop: Stop { seconds: Some(0.3), ..Stop::default() }, ..settings() };
     let came = shared(&room, 2, &timed, Trouble::default()).unwrap();
-    let blocks = came.lit.film.blocks;
-    assert!(came.lit.end == End::Time && (1..2000).contains(&blocks), "{:?} after {blocks} blocks", came.lit.end);
-    assert_eq!((came.saved.last().unwrap().done.end(), came.lit.left_out), (blocks, 0));
+    let blocks = came.result.film.blocks;
+    assert!(came.result.end == End::Time && (1..2000).contains(&blocks), "{:?} after {blocks} blocks", came.result.end);
+    assert_eq!((came.saved.last().unwrap().done.end(), came.result.left_out), (blocks, 0));
     let expected = alone(&room, &SceneSettings { rounds: 2 * blocks, ..settings() });
-    assert!(came.lit.film.sums == expected.film.sums && came.lit.fates == expected.fates);
+    assert!(came.result.film.sums == expected.film.sums && came.result.fates == expected.fates);
 }
 
 #[test]

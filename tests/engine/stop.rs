@@ -4,8 +4,8 @@
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use crate::common::lit::Viewed;
 use crate::common::prelude::*;
+use crate::common::rendered::Viewed;
 use photonmill::engine::error::bound::error_bound;
 use photonmill::engine::room::film::{estimate_walls, irradiance_weights};
 use photonmill::engine::room::{self, RunResult};
@@ -13,7 +13,7 @@ use photonmill::engine::scene::{self, SceneFilm, pilot};
 use photonmill::engine::{End, Progress};
 use photonmill::plan::film::BiasPlan;
 use photonmill::plan::scene::MapPlan;
-use photonmill::plan::work_division::Free;
+use photonmill::plan::work_division::TunableSettings;
 use photonmill::settings::stop::Stop;
 use statrs::distribution::{Binomial, DiscreteCDF};
 
@@ -71,9 +71,9 @@ fn claim_of_noise(film: &SceneFilm) -> Claim {
 }
 
 /// A picture's claim of its noise, of what surfaces scatter, and of what is too rare to have been seen.
-fn claim(lit: &scene::RunResult) -> Claim {
-    let (means, bound, unit) = claim_of_noise(&lit.film);
-    (means, bound.hypot(lit.film.error(CONFIDENCE).unseen), unit)
+fn claim(result: &scene::RunResult) -> Claim {
+    let (means, bound, unit) = claim_of_noise(&result.film);
+    (means, bound.hypot(result.film.error(CONFIDENCE).unseen), unit)
 }
 
 /// How often the true error is within `claim` times what a run claims.
@@ -99,20 +99,20 @@ fn scene_check(name: &str, runs: &[Claim], true_errors: &[f64], claim: f64) -> C
 }
 
 /// What ends a run: the bound of its noise and bias, and what is too rare to have been seen.
-fn watched_error(lit: &scene::RunResult) -> f64 {
-    let error = lit.error();
-    error.bound_of_all(CONFIDENCE, lit.losses.relative).hypot(error.unseen)
+fn watched_error(result: &scene::RunResult) -> f64 {
+    let error = result.error();
+    error.bound_of_all(CONFIDENCE, result.losses.relative).hypot(error.unseen)
 }
 
-/// What a run comes to, and what it tells on the way, which takes so long each time.
+/// What a run comes to, and what it reports on the way, which takes so long each time.
 fn with_progress<T>(pause: Duration, run: impl FnOnce(&mut Control) -> T) -> (T, Vec<Progress>) {
-    let mut told = Vec::new();
-    let mut tell = |progress: &Progress| {
-        told.push(progress.clone());
+    let mut reported = Vec::new();
+    let mut report = |progress: &Progress| {
+        reported.push(progress.clone());
         std::thread::sleep(pause);
     };
-    let outcome = run(&mut Control { progress: &mut tell, ..Control::default() });
-    (outcome, told)
+    let result = run(&mut Control { progress: &mut report, ..Control::default() });
+    (result, reported)
 }
 
 /// Runs of one plan, of which neither seeds nor ends change anything else: its trial is made once.
@@ -144,7 +144,7 @@ impl Planned {
     fn watched(&self, gpu: &Gpu, seed: u64, stop: Stop) -> (scene::RunResult, Vec<Progress>) {
         let settings = SceneSettings { seed, stop, ..self.plan.settings.clone() };
         let plan = ScenePlan { settings, ..self.plan.clone() };
-        with_progress(Duration::ZERO, |control| scene::light(gpu, &self.viewed.view(), plan, control).unwrap())
+        with_progress(Duration::ZERO, |control| scene::light(gpu, &self.viewed.viewpoint(), plan, control).unwrap())
     }
 }
 
@@ -181,11 +181,11 @@ fn claims_of(name: &str, seeds: u64) -> Vec<Claim> {
     let wanted = watched_error(&first).min(1.0);
     let all = planned(&settings(wanted, 0));
     let one = |seed| {
-        let lit = all.run(&gpu, seed, settings(wanted, seed).stop);
-        let bound = watched_error(&lit);
-        assert_eq!(lit.end, End::Error, "{name}, {bound}");
-        assert!(bound <= wanted && lit.film.blocks >= 16, "{name}: {bound} of {wanted} after {} blocks", lit.film.blocks);
-        claim(&lit)
+        let result = all.run(&gpu, seed, settings(wanted, seed).stop);
+        let bound = watched_error(&result);
+        assert_eq!(result.end, End::Error, "{name}, {bound}");
+        assert!(bound <= wanted && result.film.blocks >= 16, "{name}: {bound} of {wanted} after {} blocks", result.film.blocks);
+        claim(&result)
     };
     (1..=seeds).map(one).collect()
 }
@@ -227,19 +227,20 @@ fn without_bias(gpu: &Gpu, scene: &Scene, like: &scene::RunResult, rounds: u32) 
 fn judge_all(name: &str, runs: &[scene::RunResult], truth: &scene::RunResult) -> [f64; 2] {
     let unit = truth.film.measure().relative_to_mean(1.0);
     let own_error = truth.film.relative_error();
-    let off = |lit: &scene::RunResult| {
-        let differences = pairs(lit.film.surface_means(), truth.film.surface_means()).map(|(found, truth)| found - truth);
+    let off = |result: &scene::RunResult| {
+        let differences = pairs(result.film.surface_means(), truth.film.surface_means()).map(|(found, truth)| found - truth);
         let off = root_mean_square(differences) * unit;
         (off * off - own_error * own_error).max(0.0).sqrt()
     };
     let true_errors: Vec<f64> = runs.iter().map(off).collect();
-    let claims: Vec<Claim> = runs.iter().map(|lit| (Vec::new(), lit.error().bound_of_all(CONFIDENCE, lit.losses.relative), unit)).collect();
+    let claims: Vec<Claim> =
+        runs.iter().map(|result| (Vec::new(), result.error().bound_of_all(CONFIDENCE, result.losses.relative), unit)).collect();
     let mean = |of: &dyn Fn(&scene::RunResult) -> f64| runs.iter().map(of).sum::<f64>() / runs.len() as f64;
     println!(
         "{name}: noise {:.4}, bias {:.4}, at most {:.4}; true error {:.4}, of which the truth's own is {own_error:.4}",
-        mean(&|lit| lit.error().noise),
-        mean(&|lit| lit.error().bias.unwrap().relative),
-        mean(&|lit| lit.error().bias.unwrap().upper),
+        mean(&|result| result.error().noise),
+        mean(&|result| result.error().bias.unwrap().relative),
+        mean(&|result| result.error().bias.unwrap().upper),
         true_errors.iter().sum::<f64>() / true_errors.len() as f64
     );
     judge_scene(name, &claims, &true_errors)
@@ -254,7 +255,7 @@ fn claims_of_all(scenes: &[&str], size: u32, rounds: u32, settings: impl Fn(&Gpu
         let run = |seed| seen(&gpu, &scene, &SceneSettings { seed, ..settings.clone() }, &scene.first_camera(), [size; 2]);
         let runs: Vec<scene::RunResult> = (1..=100).map(run).collect();
         let end = if settings.stop.error.is_some() { End::Error } else { End::Rounds };
-        assert!(runs.iter().all(|lit| lit.end == end), "{name}: runs end by {end:?}");
+        assert!(runs.iter().all(|result| result.end == end), "{name}: runs end by {end:?}");
         judge_all(name, &runs, &without_bias(&gpu, &scene, &runs[0], rounds))
     };
     side_by_side(scenes, judge)
@@ -282,7 +283,8 @@ fn errors_of_what_a_pilot_chooses_lie_within_the_claim_as_often_as_claimed() {
     let usual = SceneSettings { rounds: 20_000, stop, ..SceneSettings::default() };
     let chosen = |gpu: &Gpu, scene: &Scene| {
         let viewed = Viewed::new(scene.clone());
-        let pilot = pilot::choose_for(gpu, scene, &viewed.view(), &usual, square_picture(size), Free::ALL, &AtomicBool::new(false));
+        let pilot =
+            pilot::choose_for(gpu, scene, &viewed.viewpoint(), &usual, square_picture(size), TunableSettings::ALL, &AtomicBool::new(false));
         pilot.unwrap().unwrap().set(&usual)
     };
     let scenes = ["open-box", "cornell", "cornell-spheres", "caustic-sphere"];
@@ -348,11 +350,11 @@ fn a_run_goes_on_while_what_is_unseen_may_be_more_than_is_wanted() {
     let Some(gpu) = device() else { return };
     let wanted = 1.0;
     let settings = SceneSettings { samples: 4, ..settings(wanted, 1) };
-    let lit = Planned::new(&gpu, mirror_ball(), &settings, 2 * SIZE).run(&gpu, 1, settings.stop);
-    let error = lit.film.error(CONFIDENCE);
-    println!("{} rounds: at most {:.3}, unseen {:.3}", lit.film.rounds, error.bound(CONFIDENCE), error.unseen);
-    assert_eq!(lit.end, End::Error);
-    assert!(lit.film.blocks > 16 && error.unseen > 0.0 && watched_error(&lit) <= wanted);
+    let result = Planned::new(&gpu, mirror_ball(), &settings, 2 * SIZE).run(&gpu, 1, settings.stop);
+    let error = result.film.error(CONFIDENCE);
+    println!("{} rounds: at most {:.3}, unseen {:.3}", result.film.rounds, error.bound(CONFIDENCE), error.unseen);
+    assert_eq!(result.end, End::Error);
+    assert!(result.film.blocks > 16 && error.unseen > 0.0 && watched_error(&result) <= wanted);
 }
 
 /// The paper's box by a builder, with an error that is wanted.
@@ -366,19 +368,19 @@ fn run_box(gpu: Option<&Gpu>, settings: &RoomSettings) -> (RunResult, Vec<Progre
     with_progress(Duration::ZERO, |control| room::run(gpu, &open_box(settings), settings, control).unwrap())
 }
 
-fn irradiances(outcome: &RunResult) -> Vec<DVec3> {
-    let walls = estimate_walls(&outcome.film, &open_box(&outcome.plan.settings), &outcome.plan);
+fn irradiances(result: &RunResult) -> Vec<DVec3> {
+    let walls = estimate_walls(&result.film, &open_box(&result.plan.settings), &result.plan);
     walls.into_iter().flat_map(|wall| wall.irradiance).map(|irradiance| DVec3::X * irradiance).collect()
 }
 
 /// The relative error that a film of the box has not more of.
-fn bound_in_box(outcome: &RunResult) -> f64 {
-    let weights = irradiance_weights(&open_box(&outcome.plan.settings), &outcome.plan);
-    let error = outcome.film.error(&weights, 1.0, &outcome.plan.settings.stop);
+fn bound_in_box(result: &RunResult) -> f64 {
+    let weights = irradiance_weights(&open_box(&result.plan.settings), &result.plan);
+    let error = result.film.error(&weights, 1.0, &result.plan.settings.stop);
     error_bound(error.noise, error.freedom, CONFIDENCE)
 }
 
-/// The same of the paper's line, whichever way it is built.
+/// The same of the paper's room, whichever way it is built.
 #[test]
 fn errors_of_the_box_lie_within_the_claim_as_often_as_claimed() {
     let gpu = device();
@@ -386,11 +388,11 @@ fn errors_of_the_box_lie_within_the_claim_as_often_as_claimed() {
         let wanted = bound_in_box(&in_box(gpu, None, 60, 1000).0);
         let runs: Vec<Claim> = (1..=20)
             .map(|seed| {
-                let outcome = in_box(gpu, Some(wanted), 20_000, seed).0;
-                let bound = bound_in_box(&outcome);
-                assert_eq!(outcome.end, End::Error, "{bound}");
-                assert!(bound <= wanted && outcome.film.rounds >= 16, "{bound} of {wanted} after {} rounds", outcome.film.rounds);
-                let found = irradiances(&outcome);
+                let result = in_box(gpu, Some(wanted), 20_000, seed).0;
+                let bound = bound_in_box(&result);
+                assert_eq!(result.end, End::Error, "{bound}");
+                assert!(bound <= wanted && result.film.rounds >= 16, "{bound} of {wanted} after {} rounds", result.film.rounds);
+                let found = irradiances(&result);
                 let unit = (found.len() as f64).sqrt() / found.iter().map(|irradiance| irradiance.x).sum::<f64>();
                 (found, bound, unit)
             })
@@ -399,36 +401,36 @@ fn errors_of_the_box_lie_within_the_claim_as_often_as_claimed() {
     }
 }
 
-/// Ends of the paper's line, and what an unfinished round leaves: it counts in the light, and in no error.
+/// Ends of runs on the paper's room, and what an unfinished round leaves: it counts in the light, and in no error.
 #[test]
 fn a_run_of_the_box_ends_at_what_is_reached_first() {
     let gpu = device();
     for gpu in [None, gpu.as_deref()] {
         let small = RoomSettings { photons: 1001, mesh: 8, rng: Rng::Philox, chunk: Some(100), ..RoomSettings::default() };
         let settings = |stop| RoomSettings { rounds: 1000, stop, ..small.clone() };
-        let (outcome, told) = run_box(gpu, &settings(Stop { photons: Some(5100), error: Some(1e-6), ..Stop::default() }));
+        let (result, reported) = run_box(gpu, &settings(Stop { photons: Some(5100), error: Some(1e-6), ..Stop::default() }));
         // A run of so many photons goes on to the end of its round.
-        assert_eq!((outcome.end, outcome.film.rounds, outcome.is_cancelled()), (End::Photons, 6, false));
-        assert_eq!((outcome.fates[0].emitted, outcome.film.emitted, outcome.left_out), (6006, 6006, 0));
-        let ledger = told.last().unwrap().ledger;
-        assert!(ledger.closes() && ledger == outcome.ledger(), "{ledger:?}");
+        assert_eq!((result.end, result.film.rounds, result.is_cancelled()), (End::Photons, 6, false));
+        assert_eq!((result.fates[0].emitted, result.film.emitted, result.left_out), (6006, 6006, 0));
+        let ledger = reported.last().unwrap().ledger;
+        assert!(ledger.closes() && ledger == result.ledger(), "{ledger:?}");
 
         // What time has cut short is all there is, where it was the first round, and otherwise nothing.
         let long = RoomSettings { photons: 1_000_000, rounds: 2, ..settings(Stop { seconds: Some(0.001), ..Stop::default() }) };
-        let (outcome, _) = run_box(gpu, &long);
-        assert_eq!((outcome.end, outcome.film.rounds, outcome.left_out), (End::Time, 0, 0));
-        let emitted = outcome.film.emitted;
-        assert!((1..1_000_000).contains(&emitted) && outcome.fates[0].emitted == emitted, "{emitted}");
-        assert!(outcome.film.sums.iter().sum::<u64>() > 0 && outcome.film.flux_error(0).is_infinite());
+        let (result, _) = run_box(gpu, &long);
+        assert_eq!((result.end, result.film.rounds, result.left_out), (End::Time, 0, 0));
+        let emitted = result.film.emitted;
+        assert!((1..1_000_000).contains(&emitted) && result.fates[0].emitted == emitted, "{emitted}");
+        assert!(result.film.sums.iter().sum::<u64>() > 0 && result.film.flux_error(0).is_infinite());
         let timed = RoomSettings { chunk: None, ..settings(Stop { seconds: Some(0.5), ..Stop::default() }) };
         let slowly = |control: &mut Control| room::run(gpu, &open_box(&timed), &timed, control).unwrap();
-        let outcome = with_progress(Duration::from_millis(50), slowly).0;
-        let rounds = outcome.film.rounds;
-        assert_eq!((outcome.end, outcome.film.emitted), (End::Time, u64::from(rounds) * 1001));
+        let result = with_progress(Duration::from_millis(50), slowly).0;
+        let rounds = result.film.rounds;
+        assert_eq!((result.end, result.film.emitted), (End::Time, u64::from(rounds) * 1001));
         let whole = run_box(gpu, &RoomSettings { rounds, ..settings(Stop::default()) }).0;
-        assert!(rounds > 1 && whole.film == outcome.film && whole.fates == outcome.fates, "{rounds}");
-        let (outcome, _) = run_box(gpu, &settings(Stop { error: Some(0.9), seconds: Some(1000.0), ..Stop::default() }));
-        assert_eq!((outcome.end, outcome.film.rounds), (End::Error, 16));
+        assert!(rounds > 1 && whole.film == result.film && whole.fates == result.fates, "{rounds}");
+        let (result, _) = run_box(gpu, &settings(Stop { error: Some(0.9), seconds: Some(1000.0), ..Stop::default() }));
+        assert_eq!((result.end, result.film.rounds), (End::Error, 16));
     }
 }
 
@@ -444,7 +446,7 @@ fn squares_of_rounds_are_the_same_on_device_and_cpu() {
     }
 }
 
-/// A run that counts its radius's bias in the error goes on until both together are small enough, and is told beforehand.
+/// A run that counts its radius's bias in the error goes on until both together are small enough, and is given it beforehand.
 #[test]
 fn bias_counts_in_the_error_that_is_wanted() {
     let gpu = device();
@@ -454,12 +456,12 @@ fn bias_counts_in_the_error_that_is_wanted() {
     let (alone, with) = (run_box(gpu.as_deref(), &settings(None)).0, run_box(gpu.as_deref(), &settings(Some(0.19))).0);
     assert_eq!((alone.end, with.end), (End::Error, End::Error));
     assert!(bound_in_box(&with).hypot(0.19) <= 0.2 && with.film.rounds > alone.film.rounds);
-    let (without_end, told) = run_box(gpu.as_deref(), &RoomSettings { rounds: 100, ..settings(Some(0.25)) });
+    let (without_end, reported) = run_box(gpu.as_deref(), &RoomSettings { rounds: 100, ..settings(Some(0.25)) });
     assert_eq!(without_end.end, End::Rounds);
-    assert!(told.last().unwrap().error.unwrap() > 0.25);
+    assert!(reported.last().unwrap().error.unwrap() > 0.25);
 }
 
-/// A run, and what it told on the way. One that knows of no bias can reach any error with a radius that stays.
+/// A run, and what it reported on the way. One that knows of no bias can reach any error with a radius that stays.
 fn watched(gpu: &Gpu, name: &str, settings: &SceneSettings) -> (scene::RunResult, Vec<Progress>) {
     let planned = Planned::new(gpu, scene(name), settings, 16);
     let planned = if settings.alpha < 1.0 { planned } else { planned.of_noise(false) };
@@ -477,25 +479,25 @@ fn a_run_ends_at_its_time_or_its_error_whichever_comes_first() {
     // Rounds of a moment, and rounds that take so long that the time is up within one.
     for photons in [300, 1 << 17] {
         let settings = SceneSettings { photons, ..stop(Some(1e-6), Some(0.5)) };
-        let (lit, told) = watched(&gpu, "cornell", &settings);
-        assert_eq!(lit.end, End::Time);
+        let (result, reported) = watched(&gpu, "cornell", &settings);
+        assert_eq!(result.end, End::Time);
         // Not before its time, and no round is begun after it, however busy the machine is: behind it there is the end of the round
         // that it meets, and the run's.
-        let last = told.last().unwrap();
-        let behind = told.iter().filter(|progress| progress.seconds >= 0.5).count();
-        assert!(last.seconds >= 0.5 && behind <= 2, "{told:?}");
-        assert_eq!(u64::from(lit.film.rounds), last.done, "{told:?}");
+        let last = reported.last().unwrap();
+        let behind = reported.iter().filter(|progress| progress.seconds >= 0.5).count();
+        assert!(last.seconds >= 0.5 && behind <= 2, "{reported:?}");
+        assert_eq!(u64::from(result.film.rounds), last.done, "{reported:?}");
     }
-    let (lit, _) = watched(&gpu, "cornell", &stop(Some(0.9), Some(1000.0)));
-    assert_eq!((lit.end, lit.film.rounds), (End::Error, 16));
-    let (lit, _) = watched(&gpu, "cornell", &SceneSettings { rounds: 7, ..stop(Some(1e-6), Some(1000.0)) });
-    assert_eq!((lit.end, lit.film.rounds), (End::Rounds, 7));
+    let (result, _) = watched(&gpu, "cornell", &stop(Some(0.9), Some(1000.0)));
+    assert_eq!((result.end, result.film.rounds), (End::Error, 16));
+    let (result, _) = watched(&gpu, "cornell", &SceneSettings { rounds: 7, ..stop(Some(1e-6), Some(1000.0)) });
+    assert_eq!((result.end, result.film.rounds), (End::Rounds, 7));
 }
 
 /// How far what is predicted at a tenth of the run is off at its end: rounds or photons, and not seconds, which on a busy machine are
 /// anybody's guess.
-fn off_at_the_end(what: &str, told: &[Progress], end: f64) -> f64 {
-    let tenth = told.iter().find(|progress| progress.done as f64 >= 0.1 * end && progress.seconds_left.is_some()).unwrap();
+fn off_at_the_end(what: &str, reported: &[Progress], end: f64) -> f64 {
+    let tenth = reported.iter().find(|progress| progress.done as f64 >= 0.1 * end && progress.seconds_left.is_some()).unwrap();
     let predicted = tenth.done as f64 * (1.0 + tenth.seconds_left.unwrap() / tenth.seconds);
     println!("{what}: {predicted:.0} predicted after {}, {end} done", tenth.done);
     (predicted / end - 1.0).abs()
@@ -511,9 +513,9 @@ fn predictions(gpu: &Gpu, scenes: &[&str], photons: u32, alpha: f64, times: f64)
         if wanted < 1e-5 {
             continue;
         }
-        let (lit, told) = watched(gpu, name, &settings(wanted, 5));
-        assert_eq!(lit.end, End::Error, "{name}: {} rounds", lit.film.rounds);
-        off.push(off_at_the_end(name, &told, f64::from(lit.film.rounds)));
+        let (result, reported) = watched(gpu, name, &settings(wanted, 5));
+        assert_eq!(result.end, End::Error, "{name}: {} rounds", result.film.rounds);
+        off.push(off_at_the_end(name, &reported, f64::from(result.film.rounds)));
     }
     off.sort_by(f64::total_cmp);
     assert!(off.len() + 1 >= scenes.len(), "{off:?}");
@@ -527,11 +529,11 @@ fn the_end_is_predicted_at_a_tenth_of_the_run() {
     // About 170 rounds.
     let off = predictions(&gpu, &FEW[..1], 300, 1.0, 1.7);
     assert!(off.iter().all(|off| *off <= 0.2), "{off:?}");
-    // The paper's line, of which progress is told in photons.
+    // The paper's room, whose progress is reported in photons.
     let wanted = bound_in_box(&in_box(Some(&gpu), None, 60, 1000).0) / 3.4;
-    let (outcome, told) = in_box(Some(&gpu), Some(wanted), 20_000, 5);
-    assert_eq!(outcome.end, End::Error);
-    let off = off_at_the_end("the box", &told, outcome.fates[0].emitted as f64);
+    let (result, reported) = in_box(Some(&gpu), Some(wanted), 20_000, 5);
+    assert_eq!(result.end, End::Error);
+    let off = off_at_the_end("the box", &reported, result.fates[0].emitted as f64);
     assert!(off <= 0.2, "the box: {off}");
     if is_long_run() {
         for (photons, alpha, times, most) in [(300, 1.0, 2.4, 0.2), (5000, SceneSettings::default().alpha, 2.0, 0.5)] {

@@ -227,7 +227,7 @@ pub fn photons_agree(gpu: &Gpu, settings: &RoomSettings, expected: &[Photon]) ->
 
 /// A run on the device leaves the film that is expected, bit for bit.
 pub fn film_agrees(gpu: &Gpu, settings: &RoomSettings, expected: &RoomFilm) -> Check<Complaint> {
-    same_sums("the film", &outcome_of(gpu, &open_box(settings), settings)?.film.sums, &expected.sums)
+    same_sums("the film", &room_result_of(gpu, &open_box(settings), settings)?.film.sums, &expected.sums)
 }
 
 /// The paper's box: the device's photons and films are the CPU builder's, bit for bit; in the long run those of every builder under each of
@@ -267,10 +267,10 @@ fn fast_and_strict_differ_by_far_less_than_the_noise() {
     let Some(gpu) = device() else { return };
     let scene = built_in::by_name("cornell-spheres").unwrap();
     let settings = SceneSettings { rounds: 4, ..small() };
-    let lit = [Math::Fast, Math::Strict].map(|math| picture(&gpu, &scene, &SceneSettings { math, ..settings.clone() }));
-    let rms = |f: &dyn Fn(usize) -> f64| (0..lit[0].film.pixels()).map(|pixel| f(pixel).powi(2)).sum::<f64>().sqrt();
-    let difference = rms(&|pixel| (lit[0].film.mean(pixel) - lit[1].film.mean(pixel)).length());
-    let noise = rms(&|pixel| lit[1].film.standard_error(pixel).length());
+    let result = [Math::Fast, Math::Strict].map(|math| picture(&gpu, &scene, &SceneSettings { math, ..settings.clone() }));
+    let rms = |f: &dyn Fn(usize) -> f64| (0..result[0].film.pixels()).map(|pixel| f(pixel).powi(2)).sum::<f64>().sqrt();
+    let difference = rms(&|pixel| (result[0].film.mean(pixel) - result[1].film.mean(pixel)).length());
+    let noise = rms(&|pixel| result[1].film.standard_error(pixel).length());
     println!("difference over noise: {:.2e}", difference / noise);
     assert!(difference < 1e-3 * noise, "{difference} against {noise}");
 }

@@ -4,11 +4,11 @@
 use std::sync::atomic::AtomicBool;
 
 use crate::common::layered::dull;
-use crate::common::lit::{Viewed, light};
 use crate::common::prelude::*;
+use crate::common::rendered::{Viewed, light};
 use crate::tests::engine::unseen_light::room_without_floor;
 use glam::dvec3;
-use photonmill::engine::scene::{self, Target, View, trial};
+use photonmill::engine::scene::{self, Receivers, Viewpoint, trial};
 use photonmill::output::scene_report;
 use photonmill::plan::radius::{RadiusFrom, area_radius};
 use photonmill::scene::material::Coverage;
@@ -18,7 +18,7 @@ fn room_on_a_plain() -> Scene {
     let mut meshes = room_without_floor(0.0);
     meshes.push(level(0.0, [800.0, 800.0], true, 0));
     meshes.push(level(2.9, [1.0, 1.0], false, 1));
-    scene_of(meshes, vec![matt(0.6), shining(0.0)], vec![])
+    scene_of(meshes, vec![matt(0.6), emissive(0.0)], vec![])
 }
 
 #[test]
@@ -29,14 +29,14 @@ fn a_room_on_a_plain_is_lit_as_it_is_without_the_plain() {
     let places = [-1.7, -0.6, 0.5, 1.6];
     let points: Vec<_> = places.iter().flat_map(|x| places.map(|z| (dvec3(*x, 0.0, z), DVec3::Y))).collect();
     let geometry = Geometry::new(&scene).unwrap();
-    let target = Target::Points(&points);
-    let (phases, sensor) = (target.phases(&geometry), target.sensor());
-    let view = View { geometry: &geometry, camera: None, phases: &phases };
+    let receivers = Receivers::Points(&points);
+    let (phases, sensor) = (receivers.phases(&geometry), receivers.sensor());
+    let viewpoint = Viewpoint { geometry: &geometry, camera: None, phases: &phases };
     let settings = SceneSettings { photons: 1 << 14, rounds: 12, part: Part::Indirect, ..by_rounds() };
-    let mean = |plan: ScenePlan| mean_red(&light(&gpu, &view, plan));
+    let mean = |plan: ScenePlan| mean_red(&light(&gpu, &viewpoint, plan));
     let judged = Judge::new(&scene, 32).irradiance_at(&points, 3000, 1);
     let expected = judged.iter().map(|point| point.mean.indirect.x).sum::<f64>() / points.len() as f64;
-    let plan = trial::plan(&gpu, &scene, &view, &settings, sensor).unwrap();
+    let plan = trial::plan(&gpu, &scene, &viewpoint, &settings, sensor).unwrap();
     let radius = plan.global.as_ref().unwrap().radius * geometry.unit;
     let found = mean(plan);
     println!("radius {radius:.3} m, {found:.4} where {expected:.4} is right");
@@ -52,7 +52,7 @@ fn a_room_on_a_plain_is_lit_as_it_is_without_the_plain() {
 
 const PICTURE: Sensor = Sensor::Picture { width: 32, height: 24 };
 
-/// Where photons lie everywhere alike, so that the area tells the same.
+/// Where photons lie everywhere alike, so that the area shows the same.
 fn keep_about_the_radius_of_their_area(gpu: &Gpu, names: &[&str]) {
     let settings = by_rounds();
     let mut off = Vec::new();
@@ -131,17 +131,17 @@ fn a_radius_wider_than_what_it_lies_in_is_warned_of() {
     let corners = vec![corner(1.0, 1.0), corner(-1.0, 1.0), corner(1.0, -1.0), corner(-1.0, -1.0)];
     let middle = vec![(DVec3::ZERO, DVec3::Y); 6];
     let warning = |points: Vec<(DVec3, DVec3)>| {
-        let target = Target::Points(&points);
-        let view = View { geometry: &geometry, camera: None, phases: &target.phases(&geometry) };
-        let plan = trial::plan(&gpu, &scene, &view, &SceneSettings { photons: 1 << 10, ..by_rounds() }, target.sensor()).unwrap();
+        let receivers = Receivers::Points(&points);
+        let viewpoint = Viewpoint { geometry: &geometry, camera: None, phases: &receivers.phases(&geometry) };
+        let plan = trial::plan(&gpu, &scene, &viewpoint, &SceneSettings { photons: 1 << 10, ..by_rounds() }, receivers.sensor()).unwrap();
         scene_report::radius_warning(&plan, &geometry, "point")
     };
-    let told = warning([middle.clone(), corners].concat()).expect("a warning");
-    assert!(told.contains("at 40 % of the points the next wall or edge is nearer than the search radius"), "{told}");
+    let text = warning([middle.clone(), corners].concat()).expect("a warning");
+    assert!(text.contains("at 40 % of the points the next wall or edge is nearer than the search radius"), "{text}");
     assert_eq!(warning(middle), None);
 }
 
-/// The least radius that a scene of 200 km allows is wider than a room: two such radii differ by nothing, and tell no bias.
+/// The least radius that a scene of 200 km allows is wider than a room: two such radii differ by nothing, and give no bias.
 #[test]
 fn a_room_too_small_for_its_scene_has_an_unknown_bias() {
     let Some(gpu) = device() else { return };
@@ -150,10 +150,10 @@ fn a_room_too_small_for_its_scene_has_an_unknown_bias() {
         scene.meshes.push(level(-1.0, [width; 2], true, 0));
         let geometry = Geometry::new(&scene).unwrap();
         let points: Vec<_> = (0..8).map(|k| (dvec3(0.4 * f64::from(k) - 1.4, 0.0, 0.1), DVec3::Y)).collect();
-        let target = Target::Points(&points);
-        let view = View { geometry: &geometry, camera: None, phases: &target.phases(&geometry) };
-        let plan = trial::plan(&gpu, &scene, &view, &SceneSettings { photons: 1 << 12, ..by_rounds() }, target.sensor()).unwrap();
-        let bias = scene::bias::measure(&gpu, &scene, &view, &plan, (1.0, 2), &AtomicBool::new(false)).unwrap().unwrap();
+        let receivers = Receivers::Points(&points);
+        let viewpoint = Viewpoint { geometry: &geometry, camera: None, phases: &receivers.phases(&geometry) };
+        let plan = trial::plan(&gpu, &scene, &viewpoint, &SceneSettings { photons: 1 << 12, ..by_rounds() }, receivers.sensor()).unwrap();
+        let bias = scene::bias::measure(&gpu, &scene, &viewpoint, &plan, (1.0, 2), &AtomicBool::new(false)).unwrap().unwrap();
         assert_eq!(bias.is_known(), is_known, "{width} m: {bias:?}");
         let warning = scene_report::radius_warning(&plan, &geometry, "point").unwrap_or_default();
         assert_eq!(warning.contains("use `final_gather`"), !is_known, "{width} m: {warning}");
@@ -163,7 +163,7 @@ fn a_room_too_small_for_its_scene_has_an_unknown_bias() {
 /// The spheres, with radii by a trial round.
 fn rendered(gpu: &Gpu, settings: &SceneSettings, size: [u32; 2]) -> scene::RunResult {
     let scene = scene("cornell-spheres");
-    render(gpu, &scene, settings, Target::Picture(&scene.first_camera(), size)).unwrap()
+    render(gpu, &scene, settings, Receivers::Image(&scene.first_camera(), size)).unwrap()
 }
 
 /// Radii by density know no builder or chunk: films are the same to the bit.

@@ -7,12 +7,12 @@ use photonmill::engine::room::RunResult;
 use photonmill::engine::room::film::{WallEstimate, estimate_walls};
 use photonmill::verify::judge::radiosity::{Law, Radiosity, on_wall};
 
-fn walls(outcome: &RunResult) -> Vec<WallEstimate> {
-    estimate_walls(&outcome.film, &open_box(&outcome.plan.settings), &outcome.plan)
+fn walls(result: &RunResult) -> Vec<WallEstimate> {
+    estimate_walls(&result.film, &open_box(&result.plan.settings), &result.plan)
 }
 
-fn irradiance_of(outcome: &RunResult) -> Vec<f64> {
-    walls(outcome).into_iter().flat_map(|wall| wall.irradiance).collect()
+fn irradiance_of(result: &RunResult) -> Vec<f64> {
+    walls(result).into_iter().flat_map(|wall| wall.irradiance).collect()
 }
 
 /// The direct light of a law of emission, by quadrature over the lamps.
@@ -122,8 +122,8 @@ fn power_and_rounds_scale_as_watts_do() {
     let settings = RoomSettings { photons: 400_000, ..direct_settings(EmissionLaw::Uniform) };
     let expected = expected_direct(&settings);
     let of_one_watt = |light_power: [f64; 2], rounds: u32| -> Vec<f64> {
-        let outcome = run(&gpu, &RoomSettings { light_power, rounds, photons: 400_000 / rounds, ..settings.clone() });
-        irradiance_of(&outcome).iter().map(|irradiance| irradiance / (0.5 * light_power.iter().sum::<f64>())).collect()
+        let result = run(&gpu, &RoomSettings { light_power, rounds, photons: 400_000 / rounds, ..settings.clone() });
+        irradiance_of(&result).iter().map(|irradiance| irradiance / (0.5 * light_power.iter().sum::<f64>())).collect()
     };
     assert_holds("ten watts in two rounds", direct_check(&of_one_watt([10.0, 10.0], 2), &expected));
     // By symmetry of the two lights, whose walls are mirror images, the watts of one may move to the other.
@@ -137,15 +137,15 @@ fn power_and_rounds_scale_as_watts_do() {
 fn reflected_flux_is_that_of_the_stored_photons() {
     let settings = RoomSettings { photons: 50_001, rng: Rng::Philox, radius: 0.015, threads: 2, ..RoomSettings::default() };
     let reflected = |settings: &RoomSettings| {
-        let outcome = run_on_cpu(settings);
+        let result = run_on_cpu(settings);
         let texel_area = (2.0 * HALF_EDGE / f64::from(settings.mesh)).powi(2);
-        let walls = walls(&outcome);
+        let walls = walls(&result);
         for (radiosity, irradiance) in walls.iter().flat_map(|wall| pairs(&wall.radiosity, &wall.irradiance)) {
             let expected = f64::from(settings.reflectance) * irradiance;
             assert!((radiosity - expected).abs() <= 1e-12 * expected, "{radiosity} and {irradiance}");
         }
         let watts = walls.iter().flat_map(|wall| &wall.radiosity).sum::<f64>() * texel_area;
-        let stored = outcome.ledger().stored as f64;
+        let stored = result.ledger().stored as f64;
         (watts, stored * settings.light_power.iter().sum::<f64>() / settings.total_photons() as f64)
     };
     for settings in [

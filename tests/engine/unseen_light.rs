@@ -1,12 +1,12 @@
 //! What nothing has reached has an unknown error and an upper bound, and no run ends on it.
 
 use crate::common::known::of_any_room;
-use crate::common::lit::{around_hole, sides};
 use crate::common::prelude::*;
+use crate::common::rendered::{around_hole, sides};
 use glam::dvec3;
 use photonmill::engine::End;
 use photonmill::engine::room::film::{estimate_walls, irradiance_weights};
-use photonmill::engine::scene::{RunResult, Target};
+use photonmill::engine::scene::{Receivers, RunResult};
 use photonmill::settings::stop::Stop;
 
 /// Walls of a room over [-2, 2] x [-2, 2], as high as 3 m, that face inwards; and its ceiling but for a hole in the middle.
@@ -36,11 +36,11 @@ fn open_right_wall(meshes: &mut Vec<Mesh>, low: (f64, f64), high: (f64, f64)) {
 /// A room lit through a hole in its ceiling, so small that no photon of a run may find it.
 fn pinhole_room() -> Scene {
     let meshes = [room_without_floor(0.01), vec![level(0.0, [4.0, 4.0], true, 0), level(4.0, [4.0, 4.0], false, 1)]].concat();
-    scene_of(meshes, vec![matt(0.5), shining(0.0)], vec![])
+    scene_of(meshes, vec![matt(0.5), emissive(0.0)], vec![])
 }
 
-fn is_black(lit: &RunResult) -> bool {
-    lit.film.sums.iter().all(|sum| *sum == 0)
+fn is_black(result: &RunResult) -> bool {
+    result.film.sums.iter().all(|sum| *sum == 0)
 }
 
 #[test]
@@ -52,17 +52,17 @@ fn no_run_ends_on_a_picture_that_nothing_has_reached() {
     for seed in 1..=6 {
         let stop = Stop { error: Some(0.02), ..Stop::default() };
         let settings = SceneSettings { photons: 300, rounds: 40, shadow_rays: 1, seed, stop, ..by_rounds() };
-        let lit = seen(&gpu, &scene, &settings, &camera, [6, 6]);
-        assert_eq!((lit.end, lit.film.rounds), (End::Rounds, 40), "seed {seed}");
-        if is_black(&lit) {
+        let result = seen(&gpu, &scene, &settings, &camera, [6, 6]);
+        assert_eq!((result.end, result.film.rounds), (End::Rounds, 40), "seed {seed}");
+        if is_black(&result) {
             black += 1;
             // By its spread alone a run would have been known exactly.
-            assert_eq!(lit.film.relative_error(), 0.0);
-            let unknown = lit.film.unknown(0.95);
+            assert_eq!(result.film.relative_error(), 0.0);
+            let unknown = result.film.unknown(0.95);
             assert_eq!((unknown.asked, unknown.unreached), (36, 36), "seed {seed}");
             assert_eq!(unknown.absent, ["shadow ray", "photon of the global map"], "seed {seed}");
-            assert_eq!(lit.film.error(0.95).bound(0.95), f64::INFINITY);
-            assert_eq!(lit.film.stated_error(7), DVec3::INFINITY);
+            assert_eq!(result.film.error(0.95).bound(0.95), f64::INFINITY);
+            assert_eq!(result.film.stated_error(7), DVec3::INFINITY);
         }
     }
     assert!(black > 1, "{black} of 6 seeds: the hole is too large for this test");
@@ -80,11 +80,11 @@ fn probes_in_a_house_on_a_sunlit_plain_have_a_bound_and_no_error() {
     let scene = scene_of(meshes, vec![matt(0.5)], vec![sun]);
     let inside = [(dvec3(0.5, 0.0, 0.5), DVec3::Y), (dvec3(-1.0, 0.0, -0.5), DVec3::Y)];
     let settings = SceneSettings { photons: 3000, rounds: 16, radius: Some(1.0), alpha: 1.0, ..by_rounds() };
-    let lit = received(&gpu, &scene, &settings, &inside);
-    assert!(is_black(&lit), "light has found the house: the test needs fewer photons");
-    let unknown = lit.film.unknown(0.95);
+    let result = received(&gpu, &scene, &settings, &inside);
+    assert!(is_black(&result), "light has found the house: the test needs fewer photons");
+    let unknown = result.film.unknown(0.95);
     assert_eq!((unknown.asked, unknown.unreached, unknown.relative), (2, 2, f64::INFINITY), "{unknown:?}");
-    assert_eq!(lit.film.stated_error(0), DVec3::INFINITY);
+    assert_eq!(result.film.stated_error(0), DVec3::INFINITY);
     // The rule of three: 3.0 photons of all rounds at most, each with its share of what falls on the scene's sphere, in a disc
     // of 1 m.
     let geometry = Geometry::new(&scene).unwrap();
@@ -104,26 +104,26 @@ fn runs_end_where_the_dark_is_known_well_enough() {
     let settings = SceneSettings { photons: 3000, rounds: 2000, stop, ..by_rounds() };
     let closed = [room_without_floor(0.0), vec![level(0.0, [4.0, 4.0], true, 0)]].concat();
     let lamp_outside = vec![level(3.5, [4.0, 4.0], true, 1), level(8.0, [4.0, 4.0], false, 0)];
-    let scene = scene_of([closed, lamp_outside].concat(), vec![matt(0.5), shining(0.0)], vec![]);
-    let lit = received(&gpu, &scene, &settings, &[(dvec3(0.0, 8.0, 0.0), -DVec3::Y), (DVec3::ZERO, DVec3::Y)]);
-    assert_eq!(lit.end, End::Error);
-    let unknown = lit.film.unknown(0.95);
+    let scene = scene_of([closed, lamp_outside].concat(), vec![matt(0.5), emissive(0.0)], vec![]);
+    let result = received(&gpu, &scene, &settings, &[(dvec3(0.0, 8.0, 0.0), -DVec3::Y), (DVec3::ZERO, DVec3::Y)]);
+    assert_eq!(result.end, End::Error);
+    let unknown = result.film.unknown(0.95);
     assert_eq!((unknown.asked, unknown.unreached), (2, 1), "{unknown:?}");
     assert!(unknown.relative > 0.0 && unknown.relative < 0.2, "{unknown:?}");
-    assert!(lit.film.stated_error(0).is_finite() && lit.film.stated_error(1) == DVec3::INFINITY);
+    assert!(result.film.stated_error(0).is_finite() && result.film.stated_error(1) == DVec3::INFINITY);
 
     // A lit square before nothing: the background is black for certain.
     let lamp = LightKind::Point { position: dvec3(0.0, 1.0, 0.0), intensity: Vec3::ONE };
     let scene = scene_of(vec![level(0.0, [1.0, 1.0], true, 0)], vec![matt(0.5)], vec![lamp]);
     let camera = Camera::looking_at("camera", dvec3(0.0, 3.0, 0.01), DVec3::ZERO, DVec3::Z, 1.2);
-    let lit = seen(&gpu, &scene, &settings, &camera, [8, 8]);
-    let unknown = lit.film.unknown(0.95);
-    assert_eq!((lit.end, unknown.unreached), (End::Error, 0), "{unknown:?}");
+    let result = seen(&gpu, &scene, &settings, &camera, [8, 8]);
+    let unknown = result.film.unknown(0.95);
+    assert_eq!((result.end, unknown.unreached), (End::Error, 0), "{unknown:?}");
     assert!(unknown.asked > 0 && unknown.asked < 60, "{unknown:?}");
     // And nothing but background has no error at all.
     let away = Camera::looking_at("camera", dvec3(0.0, 3.0, 0.0), dvec3(0.0, 9.0, 0.0), DVec3::Z, 0.5);
-    let lit = seen(&gpu, &scene, &settings, &away, [4, 4]);
-    assert_eq!((lit.end, lit.film.error(0.95).bound(0.95)), (End::Error, 0.0));
+    let result = seen(&gpu, &scene, &settings, &away, [4, 4]);
+    assert_eq!((result.end, result.film.error(0.95).bound(0.95)), (End::Error, 0.0));
 }
 
 /// A mirror below the floor is a target of the caustic map's photons, and none of them gets there.
@@ -131,12 +131,12 @@ fn runs_end_where_the_dark_is_known_well_enough() {
 fn a_map_of_which_no_photon_arrives_is_named() {
     let Some(gpu) = device() else { return };
     let below = level(-1.0, [1.0, 1.0], true, 2);
-    let scene = |meshes: Vec<Mesh>| scene_of(meshes, vec![matt(0.5), shining(0.0), mirror(0.9)], vec![]);
+    let scene = |meshes: Vec<Mesh>| scene_of(meshes, vec![matt(0.5), emissive(0.0), mirror(0.9)], vec![]);
     let hidden = scene(vec![level(0.0, [4.0, 4.0], true, 0), level(2.0, [1.0, 1.0], false, 1), below.clone()]);
     let settings = SceneSettings { photons: 3000, caustic_photons: 1000, rounds: 4, ..by_rounds() };
     let point = [(dvec3(0.3, 0.0, 0.0), DVec3::Y)];
-    let lit = received(&gpu, &hidden, &settings, &point);
-    let unknown = lit.film.unknown(0.95);
+    let result = received(&gpu, &hidden, &settings, &point);
+    let unknown = result.film.unknown(0.95);
     assert!(unknown.absent.contains(&"photon of the caustic map") && unknown.unreached == 0, "{unknown:?}");
     assert!(unknown.relative > 0.0 && unknown.relative.is_finite(), "{unknown:?}");
     assert!(unknown.text("point", "W/m2", 0.95, 2).contains("no photon of the caustic map has reached any point"));
@@ -147,20 +147,20 @@ fn a_map_of_which_no_photon_arrives_is_named() {
 fn texels_of_the_box_that_no_photon_has_found_have_no_error() {
     let Some(gpu) = device() else { return };
     let settings = RoomSettings { photons: 15, rounds: 8, mesh: 16, radius: 0.01, rng: Rng::Philox, ..RoomSettings::default() };
-    let outcome = run(&gpu, &settings);
-    let scene = open_box(&outcome.plan.settings);
-    let unknown = outcome.film.unknown(&irradiance_weights(&scene, &outcome.plan), 1.0, &Stop::default());
-    let walls = estimate_walls(&outcome.film, &scene, &outcome.plan);
+    let result = run(&gpu, &settings);
+    let scene = open_box(&result.plan.settings);
+    let unknown = result.film.unknown(&irradiance_weights(&scene, &result.plan), 1.0, &Stop::default());
+    let walls = estimate_walls(&result.film, &scene, &result.plan);
     let texels = || walls.iter().flat_map(|wall| wall.irradiance.iter().zip(&wall.irradiance_error));
     let dark = texels().filter(|(irradiance, _)| **irradiance == 0.0).count() as u64;
     assert_eq!((unknown.unreached, unknown.asked), (dark, texels().count() as u64));
     assert!(dark > 0 && dark < unknown.asked, "{unknown:?}");
     assert!(texels().all(|(irradiance, error)| (*irradiance == 0.0) == error.is_infinite()));
     // Each bound is 3.0 photons' worth, and the texels that are lit have one or a few each.
-    let weights = irradiance_weights(&scene, &outcome.plan);
+    let weights = irradiance_weights(&scene, &result.plan);
     let square = |of: &dyn Fn(usize) -> f64| (0..weights.len()).map(|texel| (weights[texel] * of(texel)).powi(2)).sum::<f64>();
-    let bounds = square(&|texel| if outcome.film.flux(texel) == 0.0 { 20f64.ln() } else { 0.0 });
-    let sum: f64 = (0..weights.len()).map(|texel| weights[texel] * outcome.film.flux(texel)).sum();
+    let bounds = square(&|texel| if result.film.flux(texel) == 0.0 { 20f64.ln() } else { 0.0 });
+    let sum: f64 = (0..weights.len()).map(|texel| weights[texel] * result.film.flux(texel)).sum();
     let expected = (bounds * weights.iter().filter(|weight| **weight > 0.0).count() as f64).sqrt() / sum;
     assert!((unknown.relative / expected - 1.0).abs() < 1e-9, "{unknown:?}: {expected}");
 }
@@ -173,14 +173,14 @@ fn points_that_no_photon_has_reached_say_how_much_may_be_unseen() {
     let places = || (0..36).map(|k| (f64::from(k % 6) / 6.0 + 0.08, f64::from(k / 6) / 6.0 + 0.08));
     let points: Vec<_> = places().map(|(x, z)| (dvec3(x, 1.0, z), DVec3::NEG_Y)).collect();
     let settings = SceneSettings { photons: 10, rounds: 16, radius: Some(0.05), shadow_rays: 64, ..by_rounds() };
-    let lit = received(&gpu, &scene("furnace"), &settings, &points);
+    let result = received(&gpu, &scene("furnace"), &settings, &points);
     // What is missing beyond what was not seen, in stated errors.
     let most = |unseen: &dyn Fn(usize) -> f64, errors: &dyn Fn(usize) -> DVec3| {
-        (0..points.len()).map(|point| ((lit.film.mean(point).x - TAU).abs() - unseen(point)) / errors(point).x).fold(0.0, f64::max)
+        (0..points.len()).map(|point| ((result.film.mean(point).x - TAU).abs() - unseen(point)) / errors(point).x).fold(0.0, f64::max)
     };
-    let errors = lit.film.stated_errors();
-    let (with, without) = (most(&lit.film.unseen_bounds(), &errors), most(&|_| 0.0, &errors));
-    let unseen = lit.film.unknown(0.95).unseen;
+    let errors = result.film.stated_errors();
+    let (with, without) = (most(&result.film.unseen_bounds(), &errors), most(&|_| 0.0, &errors));
+    let unseen = result.film.unknown(0.95).unseen;
     println!("at most {with:.1} stated errors off beyond what was not seen, {without:.1} in all: {unseen:?}");
     assert!(with < 5.0 && without > 10.0, "{with} and {without}");
     assert!(unseen.points > 10 && unseen.of_mean > 0.1, "{unseen:?}");
@@ -194,24 +194,24 @@ pub fn hidden_lamp(gpu: &Gpu) -> Check<Complaint> {
     let sheet = around_hole(dvec3(-2.0, 1.0, -2.0), 4.0 * DVec3::Z, 4.0 * DVec3::X, about(half), 3);
     let dim = Mesh::parallelogram("dim", DVec3::new(0.6, 0.5, 0.6), DVec3::X * 0.2, DVec3::Z * 0.2, 1);
     let meshes = [vec![level(0.0, [4.0; 2], true, 0), level(2.0, [2.0; 2], false, 2), dim], sheet].concat();
-    let shining = |radiance: f32| Material { emission: Vec3::splat(radiance), ..matt(0.0) };
+    let emissive = |radiance: f32| Material { emission: Vec3::splat(radiance), ..matt(0.0) };
     // A black floor needs no photons in the trial.
-    let scene = scene_of(meshes, vec![matt(0.0), shining(1.0), shining(1000.0), Material { two_sided: true, ..matt(0.0) }], vec![]);
+    let scene = scene_of(meshes, vec![matt(0.0), emissive(1.0), emissive(1000.0), Material { two_sided: true, ..matt(0.0) }], vec![]);
     let points: Vec<_> = (0..16).map(|k| (DVec3::new(f64::from(k % 4), 0.0, f64::from(k / 4)) * 0.1, DVec3::Y)).collect();
     let settings = of_any_room(by_rounds());
-    let lit = render(gpu, &scene, &settings, Target::Points(&points)).unwrap();
-    let unknown = lit.film.unknown(0.95);
+    let result = render(gpu, &scene, &settings, Receivers::Points(&points)).unwrap();
+    let unknown = result.film.unknown(0.95);
     // Of the hole below the lamp's middle: radiance times its area over the squared distance, both seen straight.
     let missing = 1000.0 * 4.0 * half * half;
     println!("{:?}, {missing} are missing", unknown.hidden);
-    let (found, error) = (lit.film.mean(0).x, lit.film.stated_error(0).x);
+    let (found, error) = (result.film.mean(0).x, result.film.stated_error(0).x);
     assert!(missing - found > 5.0 * error, "some ray has met it: look for a smaller hole");
     let is_said = unknown.text("point", "W/m2", 0.95, 16).contains("hidden: ");
     let is_known = unknown.hidden.upper_bound >= missing && is_said;
     Kind::TooDark.unless(is_known, || format!("{missing} W/m2 are missing, and {:?} is known", unknown.hidden))?;
     let open = Scene { meshes: scene.meshes[..3].to_vec(), ..scene };
-    let lit = render(gpu, &open, &settings, Target::Points(&points)).unwrap();
-    let points = lit.film.unknown(0.95).hidden.points;
+    let result = render(gpu, &open, &settings, Receivers::Points(&points)).unwrap();
+    let points = result.film.unknown(0.95).hidden.points;
     Kind::TooDark.unless(points == 0, || format!("lamps in full sight are hidden from {points} points"))
 }
 
@@ -228,25 +228,25 @@ fn box_in_a_furnace(gpu: &Gpu, width: f64) -> Result<RunResult, Error> {
             [DVec3::X, DVec3::NEG_X, DVec3::Z, DVec3::NEG_Z].map(|normal| (at + 0.5 * width * normal, normal))
         })
         .collect();
-    render(gpu, &scene, &by_rounds(), Target::Points(&points))
+    render(gpu, &scene, &by_rounds(), Receivers::Points(&points))
 }
 
 /// A box so small that next to no photon of the walls meets it, and many of its own do, each of which carries little: their spread is no
 /// error of the light that is missing. The report says that brighter photons may be missing, and how much they may add.
 pub fn dim_photons(gpu: &Gpu) -> Check<Complaint> {
-    let lit = box_in_a_furnace(gpu, 0.002)?;
-    let missing = |point: usize| PI - lit.film.mean(point).x;
-    let is_silent = |point: &usize| missing(*point) > 5.0 * lit.film.stated_error(*point).x;
-    let silent: Vec<usize> = (0..lit.film.pixels()).filter(is_silent).collect();
+    let result = box_in_a_furnace(gpu, 0.002)?;
+    let missing = |point: usize| PI - result.film.mean(point).x;
+    let is_silent = |point: &usize| missing(*point) > 5.0 * result.film.stated_error(*point).x;
+    let silent: Vec<usize> = (0..result.film.pixels()).filter(is_silent).collect();
     let most = silent.iter().map(|point| missing(*point)).fold(0.0, f64::max);
-    let unknown = lit.film.unknown(0.95);
+    let unknown = result.film.unknown(0.95);
     println!("{} of 12 points lack up to {most} W/m2 without an error of it: {:?}", silent.len(), unknown.dim);
     assert!(silent.len() > 4, "bright photons have met the box: look for a smaller one");
     let is_said = unknown.text("point", "W/m2", 0.95, 16).contains("dim: ");
     let is_known = unknown.dim.points >= silent.len() as u64 && unknown.dim.upper_bound >= most && is_said;
     Kind::TooDark.unless(is_known, || format!("{} points lack up to {most} W/m2, and {:?} is known", silent.len(), unknown.dim))?;
-    let lit = box_in_a_furnace(gpu, 0.4)?;
-    let points = lit.film.unknown(0.95).dim.points;
+    let result = box_in_a_furnace(gpu, 0.4)?;
+    let points = result.film.unknown(0.95).dim.points;
     Kind::TooDark.unless(points == 0, || format!("{points} points among bright photons have met none of them"))
 }
 
@@ -261,12 +261,12 @@ fn light_that_the_ground_scatters_into_a_room_is_said_to_be_missing() {
     let scene = scene_of(meshes, vec![matt(0.5)], vec![LightKind::Environment { radiance: Vec3::ONE }]);
     let both = |(x, z): (f64, f64)| [(dvec3(x, 3.0, z), DVec3::NEG_Y), (dvec3(x, 0.0, z), DVec3::Y)];
     let points: Vec<_> = (0..9).flat_map(|k| both((f64::from(k / 3) - 1.5, f64::from(k % 3) - 1.0))).collect();
-    let lit = render(&gpu, &scene, &SceneSettings { part: Part::Indirect, ..by_rounds() }, Target::Points(&points)).unwrap();
+    let result = render(&gpu, &scene, &SceneSettings { part: Part::Indirect, ..by_rounds() }, Receivers::Points(&points)).unwrap();
     let truth = Judge::new(&scene, 16).irradiance_at(&points, 6000, 1);
-    let found: f64 = (0..points.len()).map(|point| red(&lit, point).0).sum();
+    let found: f64 = (0..points.len()).map(|point| red(&result, point).0).sum();
     let missing = truth.iter().map(|point| point.mean.indirect.x).sum::<f64>() - found;
-    let errors: f64 = (0..points.len()).map(|point| lit.film.stated_error(point).x + truth[point].standard_error.indirect.x).sum();
-    let dim = lit.film.unknown(0.95).dim;
+    let errors: f64 = (0..points.len()).map(|point| result.film.stated_error(point).x + truth[point].standard_error.indirect.x).sum();
+    let dim = result.film.unknown(0.95).dim;
     println!("{missing:.4} is missing beside {found:.4} +- {errors:.4}: {dim:?}");
     // Even if all errors went the same way.
     assert!(missing > errors, "light of the ground has been found: the test needs a larger one");
@@ -304,13 +304,13 @@ fn points_in_the_air_get_what_comes_through_glass() {
     let mut points: Vec<(DVec3, DVec3)> = (0..6).map(|k| (dvec3(0.3 * f64::from(k % 3), 0.85, 0.2 * f64::from(k / 3)), DVec3::Y)).collect();
     points.extend([(dvec3(0.5, 3e-5, 0.0), DVec3::Y), (DVec3::ZERO, DVec3::Y), (dvec3(-0.4, 0.85, 0.0), DVec3::NEG_Y)]);
     points.extend([-0.2, 0.0, 0.3].map(|x| (on_the_lean(x), lean)));
-    let lit = render(&gpu, &scene, &below_a_pane_settings(), Target::Points(&points)).unwrap();
-    assert_eq!(lit.film.unknown(0.95).off_surfaces.points, 0);
+    let result = render(&gpu, &scene, &below_a_pane_settings(), Receivers::Points(&points)).unwrap();
+    assert_eq!(result.film.unknown(0.95).off_surfaces.points, 0);
     // The sun comes down along (-1, -1, 0).
     let sunward = dvec3(1.0, 1.0, 0.0).normalize();
     for (place, (point, normal)) in points.iter().enumerate() {
         let exact = irradiance / 0.5f64.sqrt() * normal.dot(sunward).max(0.0);
-        let (found, error) = red(&lit, place);
+        let (found, error) = red(&result, place);
         println!("{point} {normal}: {found} +- {error}, {exact} expected");
         if exact == 0.0 {
             assert_eq!(found, 0.0, "{point}");
@@ -334,12 +334,12 @@ fn bounds_of_points_below_glass_hold() {
     let axes = [DVec3::Y, DVec3::X, DVec3::Z, DVec3::NEG_Y, DVec3::NEG_X, DVec3::NEG_Z];
     let points: Vec<(DVec3, DVec3)> =
         (0..24).map(|k| (dvec3(0.3 * f64::from(k % 6) - 0.75, 0.85, 0.4 * f64::from(k / 6) - 0.6), axes[k as usize % 6])).collect();
-    let lit = render(&gpu, &scene, &below_a_pane_settings(), Target::Points(&points)).unwrap();
+    let result = render(&gpu, &scene, &below_a_pane_settings(), Receivers::Points(&points)).unwrap();
     let truth = Judge::new(&scene, 16).irradiance_at(&points, 20_000, 1);
-    let unseen = lit.film.unseen_bounds();
+    let unseen = result.film.unseen_bounds();
     let mut squares = 0.0;
     for (place, of) in truth.iter().enumerate() {
-        let (found, error) = red(&lit, place);
+        let (found, error) = red(&result, place);
         let (expected, of_truth) = (of.mean.total().x, of.total_standard_error.x);
         let error = error.hypot(of_truth);
         println!(
@@ -362,16 +362,16 @@ fn points_off_surfaces_have_no_error_where_photons_alone_bring_light() {
     let Some(gpu) = device() else { return };
     let scene = below_a_pane(vec![sun(dvec3(-1.0, -1.0, 0.0))]);
     let settings = SceneSettings { without: vec![Effect::Alpha], ..below_a_pane_settings() };
-    let lit_at = |points: &[(DVec3, DVec3)], settings: &SceneSettings| render(&gpu, &scene, settings, Target::Points(points));
-    let lit = lit_at(&[(dvec3(0.5, 0.85, 0.0), DVec3::Y), (DVec3::ZERO, DVec3::Y)], &settings).unwrap();
-    assert_eq!((lit.film.mean(0).x, lit.film.stated_error(0).x), (0.0, f64::INFINITY));
-    let off = lit.film.unknown(0.95).off_surfaces;
+    let result_at = |points: &[(DVec3, DVec3)], settings: &SceneSettings| render(&gpu, &scene, settings, Receivers::Points(points));
+    let result = result_at(&[(dvec3(0.5, 0.85, 0.0), DVec3::Y), (DVec3::ZERO, DVec3::Y)], &settings).unwrap();
+    assert_eq!((result.film.mean(0).x, result.film.stated_error(0).x), (0.0, f64::INFINITY));
+    let off = result.film.unknown(0.95).off_surfaces;
     assert_eq!((off.points, off.of, &off.first[..]), (1, 2, &[1][..]));
-    assert!(lit.film.unknown(0.95).text("point", "W/m2", 0.95, 32).contains("1 of 2 points (1) lie on no surface"));
+    assert!(result.film.unknown(0.95).text("point", "W/m2", 0.95, 32).contains("1 of 2 points (1) lie on no surface"));
     let exact = through_a_pane_at_45_degrees();
-    assert_holds("on the floor", z_check("on the floor", lit.film.mean(1).x, exact, lit.film.stated_error(1).x));
+    assert_holds("on the floor", z_check("on the floor", result.film.mean(1).x, exact, result.film.stated_error(1).x));
     // An error that no round can reach ends the run with a line.
     let stop = Stop { error: Some(0.05), ..Stop::default() };
-    let refused = lit_at(&[(dvec3(0.5, 0.85, 0.0), DVec3::Y)], &SceneSettings { stop, ..settings }).err().map(|error| error.to_string());
+    let refused = result_at(&[(dvec3(0.5, 0.85, 0.0), DVec3::Y)], &SceneSettings { stop, ..settings }).err().map(|error| error.to_string());
     assert!(refused.as_ref().is_some_and(|line| line.contains("`error` 5%") && line.contains("no point lies on a surface")), "{refused:?}");
 }

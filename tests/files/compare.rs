@@ -6,13 +6,13 @@ use photonmill::output::colour::exr;
 use photonmill::verify::compare::Comparison;
 use photonmill::verify::compare::false_colour::Show;
 use photonmill::verify::compare::flip::Flip;
+use photonmill::verify::compare::image::{Image, Values};
 use photonmill::verify::compare::pair::Pair;
-use photonmill::verify::compare::picture::{Picture, Values};
 use photonmill::verify::compare::z_scores::ZScores;
 
-fn linear(width: u32, height: u32, colour: impl Fn(u32, u32) -> Vec3) -> Picture {
+fn linear(width: u32, height: u32, colour: impl Fn(u32, u32) -> Vec3) -> Image {
     let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| colour(x, y)).collect();
-    Picture { path: "a.exr".into(), width, height, values: Values::Linear, pixels, warnings: Vec::new() }
+    Image { path: "a.exr".into(), width, height, values: Values::Linear, pixels, warnings: Vec::new() }
 }
 
 /// Independent of each other, by number and seed: standard normal (Box and Muller 1958).
@@ -24,12 +24,12 @@ fn normal(seed: u32, number: u32) -> f64 {
 const SIZE: u32 = 64;
 
 /// Errors that differ from pixel to pixel and from channel to channel.
-fn errors(scale: f32) -> Picture {
+fn errors(scale: f32) -> Image {
     linear(SIZE, SIZE, |x, y| scale * (0.01 + 0.002 * (x % 8) as f32 + 0.001 * (y % 5) as f32) * Vec3::new(1.0, 2.0, 0.5))
 }
 
 /// Light, and noise of these errors.
-fn noisy(seed: u32, errors: &Picture) -> Picture {
+fn noisy(seed: u32, errors: &Image) -> Image {
     let mut picture = linear(errors.width, errors.height, |x, y| Vec3::new(1.0 + 0.01 * x as f32, 1.0, 0.5 + 0.02 * y as f32));
     for (pixel, (colour, error)) in picture.pixels.iter_mut().zip(&errors.pixels).enumerate() {
         *colour += Vec3::from_array([0, 1, 2].map(|channel| error[channel] * normal(seed, 3 * pixel as u32 + channel as u32) as f32));
@@ -37,7 +37,7 @@ fn noisy(seed: u32, errors: &Picture) -> Picture {
     picture
 }
 
-fn scores(a: &Picture, b: &Picture, errors: [Option<&Picture>; 2]) -> ZScores {
+fn scores(a: &Image, b: &Image, errors: [Option<&Image>; 2]) -> ZScores {
     ZScores::of(&Pair::new(a, b).unwrap(), errors, None).unwrap()
 }
 
@@ -212,7 +212,7 @@ fn pixels_that_are_no_numbers_are_left_out() {
 }
 
 /// Codes from 0 to 1 of a picture, and of one that has noise and a greener block. They are higher than what is computed as one.
-fn display_pair() -> [Picture; 2] {
+fn display_pair() -> [Image; 2] {
     let codes = |x: u32, y: u32| [0, 1, 2].map(|channel| ((2 * x + 3 * y + 60 * channel) % 256) as i32);
     let test = |x: u32, y: u32| {
         let mut codes = codes(x, y).map(|code| code + ((31 * x + 17 * y) % 5) as i32 - 2);
@@ -221,17 +221,17 @@ fn display_pair() -> [Picture; 2] {
     };
     let colour = |codes: [i32; 3]| Vec3::from_array(codes.map(|code| code.clamp(0, 255) as f32 / 255.0));
     [linear(96, 150, |x, y| colour(test(x, y))), linear(96, 150, |x, y| colour(codes(x, y)))]
-        .map(|picture| Picture { values: Values::Display, ..picture })
+        .map(|picture| Image { values: Values::Display, ..picture })
 }
 
 /// Light over 15 stops, and the same with noise.
-fn linear_pair() -> [Picture; 2] {
+fn linear_pair() -> [Image; 2] {
     let light = |x: u32, y: u32| ((x + y) as f32 / 16.0 - 4.0).exp2() * Vec3::new(1.0, 0.7, 0.4);
     let noise = |x: u32, y: u32| 1.0 + 0.05 * (((31 * x + 17 * y) % 5) as f32 - 2.0);
     [linear(96, 150, |x, y| noise(x, y) * light(x, y)), linear(96, 150, light)]
 }
 
-fn flip_of([a, b]: &[Picture; 2]) -> Flip {
+fn flip_of([a, b]: &[Image; 2]) -> Flip {
     Flip::of(&Pair::new(a, b).unwrap()).unwrap()
 }
 
@@ -261,12 +261,12 @@ fn flip_sees_differences_only() {
         assert!(other.map.iter().all(|value| (0.0..=1.0).contains(value)) && other.mean > 0.0);
     }
     // A reference that is mostly black still has exposures, a black one has none.
-    let [lit, black] = [1.0, 0.0].map(|light| linear(9, 9, |x, y| Vec3::splat(if (x, y) == (4, 4) { light } else { 0.0 })));
-    assert!(flip_of(&[black.clone(), lit.clone()]).mean > 0.0);
-    assert_eq!(Flip::of(&Pair::new(&lit, &black).unwrap()), None);
+    let [dot, black] = [1.0, 0.0].map(|light| linear(9, 9, |x, y| Vec3::splat(if (x, y) == (4, 4) { light } else { 0.0 })));
+    assert!(flip_of(&[black.clone(), dot.clone()]).mean > 0.0);
+    assert_eq!(Flip::of(&Pair::new(&dot, &black).unwrap()), None);
     // Values that no tone curve expects.
     let odd = linear(9, 9, |x, _| Vec3::splat(if x < 4 { -1.0 } else { f32::MAX }));
-    assert!(flip_of(&[lit, odd]).mean.is_finite());
+    assert!(flip_of(&[dot, odd]).mean.is_finite());
 }
 
 #[test]
@@ -305,7 +305,7 @@ fn false_colours_are_the_map_s() {
 fn place_with_pictures() -> Place {
     let place = Place::new();
     let light = |x: u32, y: u32| Vec3::new(0.25 + 0.125 * (x % 4) as f32, 0.5, 0.125 * (1 + y % 8) as f32);
-    let write = |name: &str, picture: &Picture| place.write(name, exr(picture.width, picture.height, &picture.pixels));
+    let write = |name: &str, picture: &Image| place.write(name, exr(picture.width, picture.height, &picture.pixels));
     write("b.exr", &linear(16, 12, light));
     write("a.exr", &linear(16, 12, |x, y| light(x, y) + 0.125));
     write("e.exr", &linear(16, 12, |_, _| Vec3::splat(0.125)));
@@ -460,14 +460,14 @@ fn pictures_of_any_bytes_are_read_or_refused() {
     let place = place_with_pictures();
     for name in ["b.exr", "b.hdr", "rgba.png", "fine.png"] {
         let whole = std::fs::read(place.at(name)).unwrap();
-        assert!(Picture::read(&place.at(name)).is_ok(), "{name}");
+        assert!(Image::read(&place.at(name)).is_ok(), "{name}");
         let refused = (0..300u32).filter(|number| {
             let [place_of, value, is_head, _] = philox([*number, 0, 0, 0], [7, 0]);
             let mut content = whole.clone();
             let within = if is_head % 2 == 0 { content.len().min(100) } else { content.len() };
             content[place_of as usize % within] = value as u8;
             place.write("changed", &content);
-            let read = Picture::read(&place.at("changed"));
+            let read = Image::read(&place.at("changed"));
             match &read {
                 Ok(picture) => assert_eq!(picture.pixels.len(), (picture.width * picture.height) as usize, "{name} {number}"),
                 Err(reason) => assert_eq!(reason.lines().count(), 1, "{name} {number}: {reason}"),

@@ -107,8 +107,8 @@ fn direct_light_alone_is_denoised_and_the_file_says_so() {
             assert!(output.status.success(), "{line}: {}", text(&output.stderr));
             output
         };
-        let told = text(&run(&format!("{render} a.exr --denoise --error-image error.exr"), None).stdout);
-        assert!(told.contains(&format!("direct light is denoised by Open Image Denoise {version}; all errors are those")), "{told}");
+        let printed = text(&run(&format!("{render} a.exr --denoise --error-image error.exr"), None).stdout);
+        assert!(printed.contains(&format!("direct light is denoised by Open Image Denoise {version}; all errors are those")), "{printed}");
         let found = place.channels("a.exr");
         let mut moved = 0;
         for (channel, axis) in [("R", "X"), ("G", "Y"), ("B", "Z")] {

@@ -90,7 +90,7 @@ fn reads(what: &str, value: &Value, at: Option<f64>) -> bool {
     })
 }
 
-/// The square by hand with more of everything: two triangles that shine through a texture, and glass, under a lamp of each kind,
+/// The square by hand with more of everything: two triangles that emit through a texture, and glass, under a lamp of each kind,
 /// and all that a material may have.
 fn square() -> Value {
     square_with([0., 0., 1., 0., 1., 1., 0., 1.])

@@ -4,11 +4,11 @@
 use super::gltf::{assert_said, everything};
 use crate::common::known::of_any_room;
 use crate::common::layered::row_of_texels;
-use crate::common::lit::light;
 use crate::common::prelude::*;
 use crate::common::program::entries;
+use crate::common::rendered::light;
 use photonmill::bake::{self, Layout, MAX_SIDE, Map, MeshLightmap, PHASE_COUNT, TexelEstimate};
-use photonmill::engine::scene::View;
+use photonmill::engine::scene::Viewpoint;
 use photonmill::output::destination::Folder;
 use photonmill::scene::layers::{PARAMETERS, Parameter};
 use photonmill::scene::material::{Coverage, Layers, Medium, NormalMap};
@@ -551,9 +551,9 @@ fn written_scenes_open_again() {
         assert_same_materials(&with_lightmaps, &scene);
         assert!(with_lightmaps.lights.is_empty());
 
-        let shining = open(folder.path().join("scene.gltf"));
-        for ((mesh, before), lightmap) in pairs(pairs(&shining.meshes, &scene.meshes), &layout.meshes) {
-            let material = &shining.materials[mesh.material];
+        let emissive = open(folder.path().join("scene.gltf"));
+        for ((mesh, before), lightmap) in pairs(pairs(&emissive.meshes, &scene.meshes), &layout.meshes) {
+            let material = &emissive.materials[mesh.material];
             assert_eq!(material.coverage, scene.materials[before.material].coverage, "{}", mesh.name);
             let Some(TextureUse { texture, uv_set, .. }) = material.emission_texture.filter(|_| lightmap.is_some()) else {
                 assert!(lightmap.is_none(), "{}: no radiance", mesh.name);
@@ -561,9 +561,9 @@ fn written_scenes_open_again() {
             };
             let lightmap = lightmap.as_ref().unwrap();
             assert_eq!((material.base_colour, material.emission, uv_set), (Vec3::ZERO, Vec3::ONE, 1));
-            assert_eq!((shining.textures[texture].width, shining.textures[texture].height), (lightmap.width, lightmap.height));
+            assert_eq!((emissive.textures[texture].width, emissive.textures[texture].height), (lightmap.width, lightmap.height));
         }
-        assert_same_lights(&shining, &scene);
+        assert_same_lights(&emissive, &scene);
     }
 }
 
@@ -740,7 +740,7 @@ fn layered_materials_round_trip() {
         assert_eq!(new.tangents.len(), old.tangents.len(), "{}", old.name);
         assert!(new.tangents.as_flattened().iter().zip(old.tangents.as_flattened()).all(|(new, old)| near(new, old)), "{}", old.name);
     }
-    // Corners of one vertex that have several tangents are told from the texture coordinates when the file is read.
+    // Corners of one vertex that have several tangents are computed from the texture coordinates when the file is read.
     let mut torn = scene.clone();
     torn.meshes[0].tangents[1] = [DVec4::new(1.0, 0.0, 0.0, 1.0); 3];
     let layout = Layout::new(&torn, 8.0).unwrap();
@@ -982,8 +982,8 @@ fn lightmaps_are_not_dark_at_the_foot_of_things() {
         let sensor = Sensor::Receivers { count: layout.texel_count() as u32 };
         let (geometry, plan) = scene_plan(&gpu, &scene, &settings, sensor).unwrap();
         let phases = layout.receivers(settings.rounds, &geometry);
-        let lit = light(&gpu, &View { geometry: &geometry, camera: None, phases: &phases }, plan);
-        let maps = layout.maps(&bake::estimates(&lit), lit.film.error_source());
+        let result = light(&gpu, &Viewpoint { geometry: &geometry, camera: None, phases: &phases }, plan);
+        let maps = layout.maps(&bake::estimates(&result), result.film.error_source());
         let beside = [0.001, 0.005, 0.02, 0.05].into_iter().flat_map(|far| {
             [(0.2015 + far, 0.07), (-0.2015 - far, 0.011), (0.033, 0.2015 + far), (0.2015 + far, -0.2015 - far)]
                 .map(|(x, z)| looked_up(&layout, &maps, 0, DVec3::new(x, 0.0, z)))

@@ -3,9 +3,9 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::common::lit::Viewed;
 use crate::common::prelude::*;
-use photonmill::engine::run::watch::Keep;
+use crate::common::rendered::Viewed;
+use photonmill::engine::run::watch::Checkpointing;
 use photonmill::engine::scene::fill_map::{Filled, fill};
 use photonmill::engine::scene::map_file::{MapFile, MapWriter};
 use photonmill::engine::scene::{self, RunResult};
@@ -26,14 +26,14 @@ impl Viewed {
         let mut writer = MapWriter::new(file.as_file_mut(), &self.scene.name, &self.geometry, &plan, "a device").unwrap();
         let cancelled = AtomicBool::new(false);
         let mut progress = |progress: &engine::Progress| cancelled.store(progress.done >= most_rounds, Ordering::Relaxed);
-        let mut control = Control { cancelled: &cancelled, progress: &mut progress, keep: Keep::default() };
+        let mut control = Control { cancelled: &cancelled, progress: &mut progress, checkpointing: Checkpointing::default() };
         let filled = fill(gpu, &self.geometry, &plan, &mut writer, &|error| panic!("{error}"), &mut control).unwrap();
         writer.finish().unwrap();
         (file, filled)
     }
 
     /// A picture from a file.
-    fn lit_from(&self, gpu: &Gpu, settings: &SceneSettings, path: &Path) -> Result<RunResult, Error> {
+    fn result_from_map(&self, gpu: &Gpu, settings: &SceneSettings, path: &Path) -> Result<RunResult, Error> {
         let map = MapFile::open("--map", path)?;
         let settings = map.settings(settings);
         // A plan whose own photons would carry otherwise, as another camera's do: what counts is what those of the file carry.
@@ -42,11 +42,11 @@ impl Viewed {
             (of_run.flux_scale, of_run.flux_gain) = (7.0 * of_run.flux_scale, 2.0 * of_run.flux_gain);
         }
         let plan = map.plan(plan, &self.geometry)?;
-        scene::light_from(gpu, &self.view(), plan, Some(&map), &mut Control::default())
+        scene::light_from(gpu, &self.viewpoint(), plan, Some(&map), &mut Control::default())
     }
 
     fn traced(&self, gpu: &Gpu, settings: &SceneSettings) -> RunResult {
-        self.lit(gpu, self.tried(gpu, settings, square_picture(8)))
+        self.run(gpu, self.tried(gpu, settings, square_picture(8)))
     }
 }
 
@@ -97,12 +97,12 @@ fn compare_pictures(layouts: Vec<(Scene, SceneSettings, SceneSettings)>) {
         let (file, filled) = room.write(&gpu, &SceneSettings { illumination, bounces, ..of_file }, u64::MAX);
         assert_eq!((filled.rounds, filled.is_cancelled), (6, false));
         let whole = room.traced(&gpu, &settings);
-        let found = room.lit_from(&gpu, &settings, file.path()).unwrap();
+        let found = room.result_from_map(&gpu, &settings, file.path()).unwrap();
         assert!(whole.ledger().stored > 0 && found.fates == whole.fates, "{name}: {}, not {}", found.ledger(), whole.ledger());
         assert!(found.film == whole.film, "{name}: another film");
         assert_eq!(found.losses, whole.losses);
         // Other paths from the camera, and the same photons.
-        let other = room.lit_from(&gpu, &SceneSettings { seed: 77, ..settings.clone() }, file.path()).unwrap();
+        let other = room.result_from_map(&gpu, &SceneSettings { seed: 77, ..settings.clone() }, file.path()).unwrap();
         assert!(other.fates == whole.fates && other.film != whole.film);
     }
 }
@@ -113,7 +113,7 @@ fn a_file_that_ends_early_holds_whole_rounds() {
     let room = Viewed::new(scene("cornell"));
     let (file, filled) = room.write(&gpu, &small(), 4);
     assert!(filled.is_cancelled && filled.rounds == 4);
-    let found = room.lit_from(&gpu, &SceneSettings { rounds: 4, ..small() }, file.path()).unwrap();
+    let found = room.result_from_map(&gpu, &SceneSettings { rounds: 4, ..small() }, file.path()).unwrap();
     assert!(found.film == room.traced(&gpu, &SceneSettings { rounds: 4, ..small() }).film);
 }
 
@@ -147,7 +147,7 @@ fn damaged_files_are_refused() {
     let mut bytes = whole.clone();
     bytes[100] ^= 1;
     std::fs::write(damaged.path(), bytes).unwrap();
-    let line = line_of(&room.lit_from(&gpu, &settings, damaged.path()).unwrap_err());
+    let line = line_of(&room.result_from_map(&gpu, &settings, damaged.path()).unwrap_err());
     assert!(line.contains("is damaged: photons of round 0 in the global map"), "{line}");
 }
 
@@ -202,17 +202,17 @@ fn files_of_other_light_are_refused() {
     let few = SceneSettings { photons: 300, caustic_photons: 300, rounds: 2, ..small() };
     let (file, _) = room.write(&gpu, &few, u64::MAX);
     let other = Viewed::new(scene("cornell"));
-    let line = line_of(&other.lit_from(&gpu, &few, file.path()).unwrap_err());
+    let line = line_of(&other.result_from_map(&gpu, &few, file.path()).unwrap_err());
     assert!(line.contains("of another scene (cornell-spheres"), "{line}");
     // Less is wanted than there is.
     let less = SceneSettings { without: vec![Effect::ReflectiveCaustics, Effect::RefractiveCaustics], ..few.clone() };
     if is_long_run() {
-        let found = room.lit_from(&gpu, &less, file.path()).unwrap();
+        let found = room.result_from_map(&gpu, &less, file.path()).unwrap();
         assert!(found.film == room.traced(&gpu, &less).film && found.plan.caustic.is_none());
     }
     // More is wanted.
     let (file, _) = room.write(&gpu, &less, u64::MAX);
-    let line = line_of(&room.lit_from(&gpu, &few, file.path()).unwrap_err());
+    let line = line_of(&room.result_from_map(&gpu, &few, file.path()).unwrap_err());
     assert!(line.contains("holds no caustic map of the light that this run wants"), "{line}");
 }
 

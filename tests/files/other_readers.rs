@@ -179,7 +179,7 @@ fn cones_of_spot_lights_are_brought_into_their_range() {
 
 /// Of one name are the primitives of a mesh, and the nodes without one that have a mesh.
 #[test]
-fn messages_tell_primitives_and_nodes_apart() {
+fn messages_distinguish_primitives_and_nodes() {
     let mut value = square();
     value["meshes"][0].as_object_mut().unwrap().remove("name");
     let primitive = value["meshes"][0]["primitives"][0].clone();

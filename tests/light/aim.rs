@@ -1,8 +1,8 @@
 //! Photons of a caustic map that are aimed at what makes caustics bring the same light with less noise.
 
 use crate::common::aimed::{SCENES, compare, far_lamp, scene, settings};
-use crate::common::lit;
 use crate::common::prelude::*;
+use crate::common::rendered;
 use photonmill::engine::scene::replay::{Flights, light_paths};
 
 /// Under these kinds of light, by so many photons, and as many aimed ones as a tenth; errors of these shares are noticed
@@ -19,9 +19,9 @@ fn kinds_bring_the_same_light(gpu: &Gpu, kinds: &[&str], photons: u32, [precise_
         println!("{kind}: {gain:.2} times the error in all directions");
         assert!(gain > least, "{kind}: {gain}");
     }
-    family.assert_tells(share, |what| what.ends_with("whole"));
+    family.assert_detects(share, |what| what.ends_with("whole"));
     let precise = ["point", "spot", "cosine disc", "sun", "overlapping discs", "a ball before a mirror wall"];
-    family.assert_tells(precise_share, |what| precise.iter().any(|kind| what == format!("{kind}: whole")));
+    family.assert_detects(precise_share, |what| precise.iter().any(|kind| what == format!("{kind}: whole")));
 }
 
 /// Cones of a lamp's light and discs of a sun's. One device for all of it, which compiles the kernels of these scenes once.
@@ -50,7 +50,7 @@ fn a_millionth_of_a_lamps_light_lights_as_the_sun_does(gpu: &Gpu) {
     let expected = sun.0.iter().sum::<f64>() / sun.0.len() as f64;
     let mut family = Family::default();
     family.expect_mean("a lamp far off", &far.0, expected);
-    family.assert_tells_one_per_cent();
+    family.assert_detects_one_per_cent();
 }
 
 /// Nearly all that is aimed at a ball meets it, with about equal flux, and none carries more than it did.
@@ -58,8 +58,8 @@ fn a_millionth_of_a_lamps_light_lights_as_the_sun_does(gpu: &Gpu) {
 fn aimed_photons_meet_what_they_are_aimed_at() {
     let Some(gpu) = device() else { return };
     for kind in ["caustic-sphere", "point", "sun", "sky", "cosine disc", "overlapping cones"] {
-        let scene = if kind == "caustic-sphere" { lit::scene(kind) } else { scene(kind) };
-        // Photons of round 0 of the caustic map as they leave their lights, and after their first flight.
+        let scene = if kind == "caustic-sphere" { rendered::scene(kind) } else { scene(kind) };
+        // Photons of round 0 of the caustic map as lights emit them, and after their first flight.
         let [all, aimed] = [false, true].map(|aim| {
             let (geometry, plan) = scene_plan(&gpu, &scene, &settings(4000, aim), Sensor::Receivers { count: 1 }).unwrap();
             let map = plan.caustic.clone().unwrap();
@@ -83,9 +83,9 @@ fn aimed_photons_meet_what_they_are_aimed_at() {
 
 /// Where every lamp is within what it would be aimed at photons are the same to the bit.
 #[test]
-fn lamps_within_a_target_shine_in_all_directions() {
+fn lamps_within_a_target_emit_in_all_directions() {
     let Some(gpu) = device() else { return };
-    let mut room = lit::scene("furnace");
+    let mut room = rendered::scene("furnace");
     room.materials = vec![mirror(0.5), matt(0.5), glass(1.5)];
     room.meshes[0].material = 1;
     room.lights = vec![lamp(point(DVec3::new(0.4, 0.6, 0.5)))];
@@ -128,18 +128,18 @@ fn pictures_have_the_same_caustics_to_a_per_cent() {
     let Some(gpu) = device() else { return };
     let mut family = Family::default();
     for name in ["caustic-sphere", "cornell-spheres"] {
-        let scene = lit::scene(name);
+        let scene = rendered::scene(name);
         let total = |aim, photons, seed| {
             let settings = SceneSettings { seed, caustic_radius: Some(0.05), bounces: 32, with: Vec::new(), ..settings(photons, aim) };
-            let lit = seen(&gpu, &scene, &settings, &scene.cameras[0], [48; 2]);
-            lit.film.part_totals[2] as f64 / lit.plan.film.scale
+            let result = seen(&gpu, &scene, &settings, &scene.cameras[0], [48; 2]);
+            result.film.part_totals[2] as f64 / result.plan.film.scale
         };
         let pairs: Vec<[f64; 2]> = (1..=48).map(|seed| [total(false, 100_000, seed), total(true, 10_000, seed)]).collect();
         let (all, _) = mean_and_error(&pairs.iter().map(|[all, _]| *all).collect::<Vec<_>>());
         let (difference, error) = mean_and_error(&pairs.iter().map(|[all, aimed]| aimed - all).collect::<Vec<_>>());
         family.expect_estimate(format!("{name}: whole"), all + difference, error, pairs.len() as u32, all);
     }
-    family.assert_tells(0.0125, |_| true);
+    family.assert_detects(0.0125, |_| true);
 }
 
 /// One map of everything has photons in all directions.

@@ -7,10 +7,10 @@ use glam::dvec3;
 use photonmill::scene::{Lens, Projection};
 use serde_json::json;
 
-/// Squares of half a metre that shine, two metres and eight metres before the eye, left and right of the middle.
+/// Squares of half a metre that emit, two metres and eight metres before the eye, left and right of the middle.
 fn near_and_far() -> Scene {
     let square = |x: f64, z: f64| Mesh::parallelogram("square", dvec3(x - 0.25, -0.25, z), DVec3::X * 0.5, DVec3::Y * 0.5, 0);
-    scene_of(vec![square(-0.5, -2.0), square(0.5, -8.0)], vec![shining(0.0)], vec![])
+    scene_of(vec![square(-0.5, -2.0), square(0.5, -8.0)], vec![emissive(0.0)], vec![])
 }
 
 fn eye(projection: Projection, lens: Option<Lens>) -> Camera {
@@ -88,12 +88,12 @@ fn both_see_what_the_path_tracer_sees() {
     for camera in [lens, parallel] {
         let judged = Judge::new(&scene, 32).image(&camera, 8, 8, 600, 1);
         let settings = SceneSettings { photons: 5_000, caustic_photons: 5_000, rounds: 32, samples: 4, ..by_rounds() };
-        let lit = seen(&gpu, &scene, &settings, &camera, [8, 8]);
+        let result = seen(&gpu, &scene, &settings, &camera, [8, 8]);
         let (mut found, mut expected, mut squares) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
         for (pixel, judged) in judged.pixels.iter().enumerate() {
-            found += lit.film.mean(pixel);
+            found += result.film.mean(pixel);
             expected += judged.mean.total();
-            squares += lit.film.standard_error(pixel).powf(2.0) + judged.total_standard_error.powf(2.0);
+            squares += result.film.standard_error(pixel).powf(2.0) + judged.total_standard_error.powf(2.0);
         }
         for channel in 0..3 {
             let what = format!("{:?}, channel {channel}", camera.projection);

@@ -2,14 +2,14 @@
 
 use crate::common::chi_square::counts_check;
 use crate::common::lamps::{
-    ROOM, bright_spot, cut_lamp, dark_room, dim_room, hidden_lamp, lit, lit_as, many_lamps, planned, points, rooms, same_light_and_noise,
-    scattered_light, usual,
+    ROOM, bright_spot, cut_lamp, dark_room, dim_room, hidden_lamp, many_lamps, planned, points, result_of, result_of_plan, rooms,
+    same_light_and_noise, scattered_light, usual,
 };
 use crate::common::planted;
 use crate::common::prelude::*;
 use photonmill::constants::{LIGHT_LEAF, NONE};
 use photonmill::engine::scene::resources::SceneResources;
-use photonmill::engine::scene::{self, Target};
+use photonmill::engine::scene::{self, Receivers};
 use photonmill::gpu::kernels::TryLights;
 use photonmill::output::scene_report;
 use photonmill::plan::light_choice::LightChoice;
@@ -64,15 +64,15 @@ fn photons_by_sight_bring_as_much_light_as_by_power() {
     scene.materials.push(Material { emission: Vec3::splat(50.0), ..matt(0.0) });
     let of_photons = SceneSettings { illumination: Illumination::Photons, radius: Some(0.3), alpha: 1.0, ..usual() };
     let settings = SceneSettings { photons: 1 << 14, rounds: 48, ..of_photons };
-    let by_power = lit(&gpu, &scene, &settings, &points(), false);
+    let by_power = result_of(&gpu, &scene, &settings, &points(), false);
     let (geometry, plan) = planned(&gpu, &scene, &settings, &points(), true);
     let scale = |plan: &ScenePlan| plan.global.as_ref().unwrap().flux_scale;
     assert!(scale(&by_power.plan) == 1.0 && scale(&plan) > 1.5 && scale(&plan) < 2.1, "{}", scale(&plan));
-    let by_sight = lit_as(&gpu, (geometry.clone(), plan.clone()), &points());
+    let by_sight = result_of_plan(&gpu, (geometry.clone(), plan.clone()), &points());
     assert_holds("photons by sight", same_light_and_noise("photons by sight", &by_sight, &by_power, 2.0));
     let mut more = plan;
     more.global.as_mut().unwrap().flux_scale *= 1.25;
-    let more = lit_as(&gpu, (geometry, more), &points());
+    let more = result_of_plan(&gpu, (geometry, more), &points());
     assert_complains("photons that carry a quarter more", same_light_and_noise("a quarter more", &more, &by_power, 2.0));
 }
 
@@ -89,7 +89,7 @@ fn a_dark_room_beside_a_bright_one_is_not_known_to_be_dark(gpu: &Gpu) {
     scene.meshes.extend(dark_room(2.0 * ROOM));
     let dark = points().into_iter().map(|(at, normal)| (at + 2.0 * ROOM, normal));
     let all: Vec<_> = points().into_iter().chain(dark).collect();
-    let found = lit(gpu, &scene, &SceneSettings { rounds: 4, photons: 3000, ..usual() }, &all, true);
+    let found = result_of(gpu, &scene, &SceneSettings { rounds: 4, photons: 3000, ..usual() }, &all, true);
     let unknown = found.film.unknown(0.95);
     println!("{unknown:?}");
     assert_eq!((unknown.asked, unknown.unreached), (120, 60));
@@ -109,9 +109,9 @@ fn lights_are_chosen_alike_by_every_builder_chunk_and_part() {
         assert!(lights(&SceneSettings { part, ..settings.clone() }) == expected_lights, "{part:?}");
     }
     assert!(lights(&SceneSettings { seed: 7, ..settings.clone() }) == expected_lights);
-    let expected = lit(&gpu, &scene, &settings, &points(), true);
+    let expected = result_of(&gpu, &scene, &settings, &points(), true);
     for (builder, chunk) in [(Builder::Ballot, Some(700)), (Builder::Persistent, Some(1300))] {
-        let found = lit(&gpu, &scene, &SceneSettings { builder: Some(builder), chunk, ..settings.clone() }, &points(), true);
+        let found = result_of(&gpu, &scene, &SceneSettings { builder: Some(builder), chunk, ..settings.clone() }, &points(), true);
         assert!(found.film == expected.film, "{builder:?}, {chunk:?}");
         assert!(found.plan.trial.unwrap().lights.unwrap() == expected_lights, "{builder:?}, {chunk:?}");
     }
@@ -276,7 +276,7 @@ fn no_light_is_impossible_and_probabilities_add_up_to_one() {
     assert!((sum - 1.0).abs() < 1e-6 && lights.emitters.iter().all(|emitter| emitter.probability > 0.0), "{sum}");
 }
 
-/// A square of 0.8 m that shines and transmits, 1 m above a floor; its front looks up.
+/// An emissive square of 0.8 m that transmits, 1 m above a floor; its front looks up.
 fn glowing_pane() -> Scene {
     let layers = Layers { metallic: 0.0, transmission: 1.0, ..Layers::default() };
     let pane = Material { emission: Vec3::ONE, ..Material::layered("pane", Vec3::splat(0.5), layers) };
@@ -285,23 +285,23 @@ fn glowing_pane() -> Scene {
     scene_of(meshes, vec![floor, pane], vec![])
 }
 
-/// What transmits has two sides, also where it shines: photons carry as much from its back, to a floor, as from its front, to a ceiling.
+/// What transmits has two sides, also where it emits: photons carry as much from its back, to a floor, as from its front, to a ceiling.
 /// The number is by quadrature over the pane and the radius.
 #[test]
-fn glowing_panes_shine_both_ways() {
+fn glowing_panes_emit_both_ways() {
     let Some(gpu) = device() else { return };
     let mut scene = glowing_pane();
     scene.meshes.push(level(2.0, [2.0, 2.0], false, 0));
-    let lit = received(&gpu, &scene, &mapped(40_000, 32, 1, 0.1), &[(DVec3::ZERO, DVec3::Y), (2.0 * DVec3::Y, DVec3::NEG_Y)]);
+    let result = received(&gpu, &scene, &mapped(40_000, 32, 1, 0.1), &[(DVec3::ZERO, DVec3::Y), (2.0 * DVec3::Y, DVec3::NEG_Y)]);
     for (place, what) in ["floor", "ceiling"].into_iter().enumerate() {
-        assert_holds(what, red_check(what, &lit, place, 0.5247, [0.03, 0.0]));
+        assert_holds(what, red_check(what, &result, place, 0.5247, [0.03, 0.0]));
     }
 }
 
 /// A camera sees what photons carry, by both illuminations.
 #[test]
 #[ignore = "long: a picture, and kernels of shadow rays too"]
-fn glowing_panes_look_as_they_shine() {
+fn glowing_panes_look_as_they_emit() {
     let Some(gpu) = device() else { return };
     let mut scene = glowing_pane();
     scene.cameras.push(Camera::looking_at("camera", DVec3::new(0.0, 0.5, 3.0), DVec3::new(0.0, 0.0, 0.3), DVec3::Y, 0.6));
@@ -310,8 +310,8 @@ fn glowing_panes_look_as_they_shine() {
     for illumination in BOTH {
         let settings =
             SceneSettings { photons: 20_000, caustic_photons: 20_000, rounds: 32, radius: Some(0.1), illumination, ..by_rounds() };
-        let lit = render(&gpu, &scene, &settings, Target::Picture(&camera, [10; 2])).unwrap();
-        let verdict = Verdict::new(&means(&lit), &standard_errors(&lit), 32, &judged, None);
+        let result = render(&gpu, &scene, &settings, Receivers::Image(&camera, [10; 2])).unwrap();
+        let verdict = Verdict::new(&means(&result), &standard_errors(&result), 32, &judged, None);
         assert!(verdict.agrees(), "{illumination:?}: {verdict}");
     }
 }

@@ -7,8 +7,8 @@ use std::sync::atomic::AtomicBool;
 use crate::common::estimate_check;
 use crate::common::family::{FALSE_ALARM, normal_p_value};
 use crate::common::known::kept;
-use crate::common::lit::sides;
 use crate::common::prelude::*;
+use crate::common::rendered::sides;
 use photonmill::scene::closed_forms::SCENES;
 use photonmill::verify::selfcheck::{self, Estimate, Finding};
 
@@ -68,7 +68,7 @@ fn every_scene_of_a_closed_form_has_a_case() {
 
 /// The judges, judged: families that complain about what is off and what is no number.
 #[test]
-fn families_tell_chance_from_error() {
+fn families_distinguish_chance_from_error() {
     let family = |found: f64, error: f64, count: usize| {
         let mut family = Family::default();
         (0..count).for_each(|k| family.expect(format!("{k}"), if k == 0 { found } else { 1.0 }, 1.0, error));
@@ -90,7 +90,7 @@ fn settings() -> SceneSettings {
 }
 
 #[test]
-fn two_skies_shine_as_one_of_both_radiances() {
+fn two_skies_emit_as_one_of_both_radiances() {
     let Some(gpu) = device() else { return };
     let mut both = scene("sky-over-plane");
     both.lights.push(both.lights[0].clone());
@@ -137,5 +137,5 @@ fn a_disc_lights_points_and_a_wall_by_either_law() {
             family.expect_mean(format!("{law:?}, {what}"), &found, if law == EmissionLaw::Cosine { *cosine } else { *uniform });
         }
     }
-    family.assert_tells_one_per_cent();
+    family.assert_detects_one_per_cent();
 }

@@ -65,7 +65,7 @@ fn kept_by_horizon(mesh: &Mesh, points: &[(DVec3, DVec3)], radius: f64) -> f64 {
 /// A point light of 1 W in its middle: after b bounces (1 - rho^b) / (1 - rho) / A on average over the wall of area A. Albedos of 0.5,
 /// 0.9 and 0.99 as colours beside a channel that reflects all: so no photon ends, and all that is random is where photons land.
 ///
-/// Walls that shine with 1 W/m2/sr and scatter half of what arrives: pi of direct and pi of scattered light, and so in any polyhedron.
+/// Walls that emit 1 W/m2/sr and scatter half of what arrives: pi of direct and pi of scattered light, and so in any polyhedron.
 #[test]
 fn an_integrating_sphere_multiplies_light() {
     let Some(gpu) = device() else { return };
@@ -80,7 +80,7 @@ fn an_integrating_sphere_multiplies_light() {
     for (material, lights, bounces, photons) in [
         (walls(Vec3::new(1.0, 0.99, 0.9)), vec![lamp.clone()], 60, 800),
         (walls(Vec3::new(0.9, 0.5, 1.0)), vec![lamp], 16, 2000),
-        (shining(0.5), vec![], 16, 10_000),
+        (emissive(0.5), vec![], 16, 10_000),
     ] {
         let is_furnace = lights.is_empty();
         let scene = scene_of(vec![sphere.clone()], vec![material.clone()], lights);
@@ -94,10 +94,10 @@ fn an_integrating_sphere_multiplies_light() {
             family.expect_mean(what, &over_points(&runs, channel), expected);
         }
     }
-    family.assert_tells(0.015, |_| true);
+    family.assert_detects(0.015, |_| true);
 }
 
-/// Two infinite plates that face each other, the lower one shining with M = pi W/m2: M / (1 - rho rho') arrives above,
+/// Two infinite plates that face each other, the lower one emitting M = pi W/m2: M / (1 - rho rho') arrives above,
 /// rho' times that below. A shaft of perfect mirrors makes a square of each infinite.
 #[test]
 fn parallel_plates_send_light_to_and_fro() {
@@ -106,7 +106,7 @@ fn parallel_plates_send_light_to_and_fro() {
     let (below, above) = (0.75, 0.5);
     let mut meshes = shaft(-0.2, 0.2, 2);
     meshes.extend([level(-0.2, [1.0; 2], true, 0), level(0.2, [1.0; 2], false, 1)]);
-    let scene = scene_of(meshes, vec![shining(below as f32), matt(above as f32), mirror(1.0)], vec![]);
+    let scene = scene_of(meshes, vec![emissive(below as f32), matt(above as f32), mirror(1.0)], vec![]);
     let mut family = Family::default();
     for &illumination in illuminations {
         let shadow_rays = by_rounds().shadow_rays;
@@ -118,7 +118,7 @@ fn parallel_plates_send_light_to_and_fro() {
         family.expect_mean(format!("plates, {illumination:?}: above"), &over_points(&upper, 0), exact);
         family.expect_mean(format!("plates, {illumination:?}: below"), &over_points(&lower, 0), above * exact);
     }
-    family.assert_tells(0.04, |_| true);
+    family.assert_detects(0.04, |_| true);
 }
 
 /// In a closed sphere albedo^k of the photons are stored at bounce k, and none escapes. Where fewer than half of the 131 072 photons are left, more than
@@ -130,16 +130,16 @@ fn bounces_in_a_sphere_are_a_geometric_series() {
     let mut family = Family::default();
     for rho in [0.5f32, 0.9, 0.99] {
         let scene = scene_of(vec![hollow_sphere(12)], vec![matt(rho)], vec![lamp.clone()]);
-        let lit = received(&gpu, &scene, &kept(flights(1 << 17, 15)), &[(DVec3::ZERO, DVec3::Y)]);
-        for (bounce, counts) in lit.fates[0].bounces.iter().enumerate() {
+        let result = received(&gpu, &scene, &kept(flights(1 << 17, 15)), &[(DVec3::ZERO, DVec3::Y)]);
+        for (bounce, counts) in result.fates[0].bounces.iter().enumerate() {
             assert_eq!(counts.escaped, 0, "albedo {rho}");
             let chance = f64::from(rho).powi(bounce as i32 + 1);
-            let error = (chance * (1.0 - chance) / lit.fates[0].emitted as f64).sqrt();
-            // Where few survive, few tell: 2 % must be seven errors for a test to notice it beside its own.
+            let error = (chance * (1.0 - chance) / result.fates[0].emitted as f64).sqrt();
+            // Where few survive, few show: 2 % must be seven errors for a test to notice it beside its own.
             let bright = if 0.02 * chance > 7.0 * error { "bright: " } else { "" };
             let what = format!("{bright}sphere, albedo {rho:.2}, bounce {}", bounce + 1);
-            family.expect_count(what, counts.stored, lit.fates[0].emitted, chance);
+            family.expect_count(what, counts.stored, result.fates[0].emitted, chance);
         }
     }
-    family.assert_tells(0.02, |what| what.starts_with("bright"));
+    family.assert_detects(0.02, |what| what.starts_with("bright"));
 }

@@ -2,8 +2,8 @@
 //! least and the largest radius, one photon and none, and plans around every limit.
 
 use crate::common::known::kept;
-use crate::common::lit::received_within;
 use crate::common::prelude::*;
+use crate::common::rendered::received_within;
 use glam::EulerRot;
 use photonmill::cpu::bsdf::phong_lobe;
 use photonmill::engine::film::BlockSums;
@@ -41,19 +41,19 @@ fn a_texel_counts_beyond_2_to_the_24() {
 #[test]
 fn a_trillion_photons_merge_into_the_same_light() {
     let settings = RoomSettings { mesh: 16, ..RoomSettings::default() };
-    let outcome = run_on_cpu(&settings);
+    let result = run_on_cpu(&settings);
     let scene = open_box(&settings);
-    let one = estimate_walls(&outcome.film, &scene, &outcome.plan);
+    let one = estimate_walls(&result.film, &scene, &result.plan);
     for times in [200_000u64, 200_000_000] {
         let merged = RoomFilm {
             of_blocks: BlockSums {
-                sums: outcome.film.sums.iter().map(|sum| sum.checked_mul(times).unwrap()).collect(),
-                ..outcome.film.of_blocks.clone()
+                sums: result.film.sums.iter().map(|sum| sum.checked_mul(times).unwrap()).collect(),
+                ..result.film.of_blocks.clone()
             },
-            emitted: outcome.film.emitted * times,
-            ..outcome.film.clone()
+            emitted: result.film.emitted * times,
+            ..result.film.clone()
         };
-        for (found, expected) in pairs(estimate_walls(&merged, &scene, &outcome.plan), &one) {
+        for (found, expected) in pairs(estimate_walls(&merged, &scene, &result.plan), &one) {
             for (found, expected) in pairs(&found.irradiance, &expected.irradiance).filter(|(_, expected)| **expected > 0.0) {
                 assert_holds(times, relative_check("irradiance", *found, *expected, 8.0 * f64::EPSILON));
                 let less = found * (1.0 - U);
@@ -75,9 +75,9 @@ fn a_trillion_photons_merge_into_the_same_light() {
 fn light_is_linear_in_power_over_24_decades() {
     let of = |light_power: [f64; 2]| {
         let settings = RoomSettings { light_power, mesh: 8, ..RoomSettings::default() };
-        let outcome = run_on_cpu(&settings);
-        let walls = estimate_walls(&outcome.film, &open_box(&settings), &outcome.plan);
-        (outcome.film.of_blocks.sums, walls.into_iter().flat_map(|wall| wall.irradiance).collect::<Vec<f64>>())
+        let result = run_on_cpu(&settings);
+        let walls = estimate_walls(&result.film, &open_box(&settings), &result.plan);
+        (result.film.of_blocks.sums, walls.into_iter().flat_map(|wall| wall.irradiance).collect::<Vec<f64>>())
     };
     let (sums, one_watt) = of([1.0, 1.0]);
     assert!(one_watt.iter().all(|irradiance| *irradiance > 0.0));
@@ -136,9 +136,9 @@ fn faint_light_is_right_to_half_a_film_unit() {
         let albedo = 10f32.powi(exponent);
         plane.materials[0].base_colour = Vec3::splat(albedo);
         let camera = Camera::looking_at("above", DVec3::Y * 1.5, DVec3::ZERO, DVec3::Z, 0.1);
-        let lit = seen(&gpu, &plane, &settings, &camera, [8, 8]);
-        let (found, expected) = (mean_red(&lit), f64::from(albedo));
-        let half_unit = 0.5 / lit.plan.film.scale;
+        let result = seen(&gpu, &plane, &settings, &camera, [8, 8]);
+        let (found, expected) = (mean_red(&result), f64::from(albedo));
+        let half_unit = 0.5 / result.plan.film.scale;
         println!("albedo 1e{exponent}: {found:e}, {:.1e} off, half a unit is {half_unit:.1e}", (found - expected).abs());
         // A sky is sampled by the cosine: every ray sees the same, but for some roundings of f32.
         assert!((found - expected).abs() <= half_unit + 16.0 * U * expected, "{found:e} where {expected:e} is right");
@@ -321,12 +321,12 @@ fn a_map_of_one_photon_is_one_disc() {
     let close = disc(DVec3::Y * 1e-3, DVec3::NEG_Y, 1e-3, EmissionLaw::Cosine);
     for radius in [0.05, 0.2, 1.0] {
         let points = [(DVec3::ZERO, DVec3::Y), (DVec3::X * 1.9, DVec3::Y), (DVec3::ZERO, DVec3::NEG_Y)];
-        let lit = received(&gpu, &over_plane(close.clone()), &kept(mapped(1, 1, 1, radius)), &points);
+        let result = received(&gpu, &over_plane(close.clone()), &kept(mapped(1, 1, 1, radius)), &points);
         let expected = 1.0 / (PI * radius * radius);
         // The area is known to 2^-24 of the squared radius, and some roundings of f32 follow.
-        let check = |expected: f64| relative_check("one photon", red(&lit, 0).0, expected, 16.0 * U);
+        let check = |expected: f64| relative_check("one photon", red(&result, 0).0, expected, 16.0 * U);
         assert_holds(radius, check(expected));
-        assert_eq!([lit.film.mean(1), lit.film.mean(2)], [DVec3::ZERO; 2], "radius {radius}");
+        assert_eq!([result.film.mean(1), result.film.mean(2)], [DVec3::ZERO; 2], "radius {radius}");
         assert_complains("a radius 1 % too large", check(expected / 1.0201));
     }
 }
@@ -349,16 +349,16 @@ fn every_kernel_of_every_radius_integrates_to_one() {
     let edges = |k: usize| (DVec3::new(if k.is_multiple_of(2) { 1e-4 } else { 1.0 - 1e-4 }, 0.0, k as f64 / 64.0 + 1e-3), DVec3::Y);
     let mut family = Family::default();
     for (kernel, radius) in rows.iter().flat_map(|(kernel, radii)| radii.iter().map(move |radius| (*kernel, *radius))) {
-        // Points see other photons by small radii, and the same by large ones, for which a few points tell as much.
+        // Points see other photons by small radii, and the same by large ones, for which a few points show as much.
         let is_small = radius < 0.05;
         let (photons, step) = if is_small { (15_000, 1) } else { (6000, 3) };
         let places = || (0..64).step_by(step);
         let points: Vec<_> = places().map(middle).chain(places().map(edges)).collect();
         let count = points.len() / 2;
         let settings = SceneSettings { kernel, photons, rounds: 16, ..furnace_settings(radius) };
-        let lit = received(&gpu, &scene("furnace"), &settings, &points);
+        let result = received(&gpu, &scene("furnace"), &settings, &points);
         for (what, of) in [("middle", 0..count), ("edges", count..2 * count)] {
-            let found: Vec<(f64, f64)> = of.map(|point| red(&lit, point)).collect();
+            let found: Vec<(f64, f64)> = of.map(|point| red(&result, point)).collect();
             let mean = found.iter().map(|(mean, _)| mean).sum::<f64>() / count as f64;
             let error =
                 if is_small { found.iter().map(|(_, error)| error * error).sum::<f64>().sqrt() } else { found.iter().map(|of| of.1).sum() };
@@ -366,8 +366,8 @@ fn every_kernel_of_every_radius_integrates_to_one() {
             family.expect_estimate(format!("{kernel:?}, {size}radius {radius}, {what}"), mean, error / count as f64, 16, TAU);
         }
     }
-    family.assert_tells(0.06, |what| what.contains("wide"));
-    family.assert_tells(0.5, |what| !what.contains("0.002"));
+    family.assert_detects(0.06, |what| what.contains("wide"));
+    family.assert_detects(0.5, |what| !what.contains("0.002"));
 }
 
 /// Outside of what positions allow a radius is refused.
@@ -382,12 +382,12 @@ fn radii_beyond_what_positions_allow_are_refused() {
         assert!(plan(radius).unwrap_err().to_string().starts_with("`radius`"), "{radius}");
     }
     // Where no photon is in reach of any point there is nothing, and no division by it.
-    let lit = received(&gpu, &furnace, &furnace_settings(least), &[(DVec3::new(0.5, 0.0, 0.5), DVec3::Y)]);
-    assert!(lit.film.mean(0).is_finite());
+    let result = received(&gpu, &furnace, &furnace_settings(least), &[(DVec3::new(0.5, 0.0, 0.5), DVec3::Y)]);
+    assert!(result.film.mean(0).is_finite());
 }
 
 /// Without correction an estimate at an edge is dark by the share of the disc beyond it, a half on the edge and
-/// three quarters in a corner; with it, by nothing. The same photons tell both.
+/// three quarters in a corner; with it, by nothing. The same photons show both.
 #[test]
 fn edges_and_corners_are_dark_by_what_lies_beyond_them() {
     let Some(gpu) = device() else { return };
@@ -395,8 +395,9 @@ fn edges_and_corners_are_dark_by_what_lies_beyond_them() {
     let at = |x: f64, z: f64| (DVec3::new(x * radius, 0.0, z * radius), DVec3::Y);
     let places = [(0.0, 2.5), (0.25, 2.5), (0.5, 2.5), (0.75, 2.5), (1.0, 2.5), (2.5, 2.5), (0.0, 0.0), (0.5, 0.5), (0.8, 0.8), (0.3, 0.9)];
     let points: Vec<_> = places.iter().map(|(x, z)| at(*x, *z)).collect();
-    let lit = |edge_correction| received(&gpu, &scene("furnace"), &SceneSettings { edge_correction, ..furnace_settings(radius) }, &points);
-    let (with, without) = (lit(true), lit(false));
+    let result_of =
+        |edge_correction| received(&gpu, &scene("furnace"), &SceneSettings { edge_correction, ..furnace_settings(radius) }, &points);
+    let (with, without) = (result_of(true), result_of(false));
     let mut worst = 0.0f64;
     for (place, (x, z)) in places.iter().enumerate() {
         let share = disc_rectangle_area(1.0, [-x, 5.0 - x], [-z, 5.0 - z]) / PI;
@@ -498,7 +499,7 @@ fn maps_of_a_chunk_are_numbered_in_32_bits() {
     let settings = SceneSettings { photons: 1, ..by_rounds() };
     let size = |width, height| scene_plan_within(&limits, &furnace, &settings, Sensor::Picture { width, height });
     assert!(size(1, 1).is_ok() && size(65_536, 1).is_ok());
-    // Film sums and estimates take 48 bytes a pixel.
+    // Film sums and estimates take 48 bytes per pixel.
     let rows = (1 << 27) / 48 / 1024;
     assert!(size(1024, rows).is_ok());
     assert!(size(1024, rows + 1).unwrap_err().to_string().starts_with("`size`"));
@@ -513,10 +514,10 @@ fn photons_of_a_second_row_of_groups_reach_the_map() {
     let points = [(DVec3::new(0.5, 0.0, 0.5), DVec3::Y), (DVec3::new(0.5, 0.5, 0.0), DVec3::Z)];
     // A software device counts less memory than it has.
     let limits = Limits { memory_bytes: 1 << 33, ..engine::limits(gpu.facts()) };
-    let lit = |settings: &SceneSettings| received_within(&gpu, &scene("furnace"), settings, &points, &limits);
-    let whole = lit(&settings);
+    let result_of = |settings: &SceneSettings| received_within(&gpu, &scene("furnace"), settings, &points, &limits);
+    let whole = result_of(&settings);
     assert_eq!(whole.plan.global.as_ref().unwrap().chunk_photons, photons, "the photons do not fit one dispatch here");
-    let split = lit(&SceneSettings { chunk: Some(1_000_003), ..settings.clone() });
+    let split = result_of(&SceneSettings { chunk: Some(1_000_003), ..settings.clone() });
     assert_eq!((&whole.film, &whole.fates), (&split.film, &split.fates));
     let first = &whole.fates[0].bounces[0];
     assert_eq!(first.stored + first.absorbed + first.escaped, u64::from(photons));
@@ -537,9 +538,9 @@ fn pictures_of_any_shape_are_whole() {
             };
             let expected = of(128);
             assert_eq!(expected.pixels() as u32, size[0] * size[1]);
-            let lit = expected.sums.chunks(3).filter(|pixel| pixel.iter().any(|sum| *sum > 0)).count();
+            let lit_pixels = expected.sums.chunks(3).filter(|pixel| pixel.iter().any(|sum| *sum > 0)).count();
             // The camera sees past the room on a wide picture, and nothing but the room on a square one.
-            assert!(lit > 0 && (size[0] > 1000 || lit > expected.pixels() / 2), "{size:?}: {lit} pixels are lit");
+            assert!(lit_pixels > 0 && (size[0] > 1000 || lit_pixels > expected.pixels() / 2), "{size:?}: {lit_pixels} pixels are lit");
             assert!(of(1024) == expected, "{size:?}, work groups of 1024");
         }
     }
@@ -567,11 +568,11 @@ fn the_ends_of_every_setting_give_numbers() {
     for (what, settings) in ends {
         for gather in [Gather::Grid, Gather::Brute] {
             let settings = RoomSettings { gather, ..settings.clone() };
-            let mut outcomes = vec![run_on_cpu(&settings)];
-            outcomes.extend(gpu.as_ref().map(|gpu| run(gpu, &settings)));
-            for outcome in outcomes {
-                assert!(outcome.ledger().closes(), "{what}");
-                for wall in estimate_walls(&outcome.film, &open_box(&settings), &outcome.plan) {
+            let mut results = vec![run_on_cpu(&settings)];
+            results.extend(gpu.as_ref().map(|gpu| run(gpu, &settings)));
+            for result in results {
+                assert!(result.ledger().closes(), "{what}");
+                for wall in estimate_walls(&result.film, &open_box(&settings), &result.plan) {
                     let values = wall.illumination.iter().chain(&wall.radiosity);
                     assert!(values.clone().all(|value| value.is_finite() && *value >= 0.0), "{what}, {gather:?}: {}", wall.name);
                     // Black walls have no radiosity to divide by an albedo of nothing.
@@ -587,7 +588,7 @@ fn the_ends_of_every_setting_give_numbers() {
 /// A spot's light falls off by one law down to half angles of a thousandth of a degree: on its axis and between its cones,
 /// from shadow rays against the closed form, and as a power that photons bring.
 #[test]
-fn narrow_spots_shine_as_wide_ones() {
+fn narrow_spots_emit_as_wide_ones() {
     let Some(gpu) = device() else { return };
     let position = DVec3::new(0.25, 1.0, -0.5);
     let (down, aslant) = (("straight down", DVec3::NEG_Y), ("aslant", DVec3::new(0.3, -1.0, 0.2).normalize()));
@@ -609,25 +610,25 @@ fn narrow_spots_shine_as_wide_ones() {
             let shares = [0.0, 0.25, 0.45, 0.6, 0.75, 0.9, 1.1];
             let places = shares.map(|share| place(share * outer));
             let settings = kept(SceneSettings { rounds: 2, part: Part::Direct, ..by_rounds() });
-            let lit = received(&gpu, &spot, &settings, &places.map(|(point, _)| (point, DVec3::Y)));
+            let result = received(&gpu, &spot, &settings, &places.map(|(point, _)| (point, DVec3::Y)));
             // Single precision knows a direction to 1e-7 radians.
             let tolerance = 2e-5 + 1e-7 * 8.0 / outer;
             for (k, (_, exact)) in places.iter().enumerate() {
-                let found = red(&lit, k).0;
+                let found = red(&result, k).0;
                 println!("{what}, {degrees} degrees, at {} of them: {found:.6}, {exact:.6} is right", shares[k]);
                 assert!((found - exact).abs() <= tolerance, "{what}, {degrees} degrees, at {} of them: {found}, not {exact}", shares[k]);
             }
 
             // Within its whole disc, a photon map holds the spot's power.
             let radius = 1.2 * place(outer).0.distance(place(0.0).0).max(2e-4);
-            let lit = received(&gpu, &spot, &kept(mapped(1000, 2, 1, radius)), &[(place(0.0).0, DVec3::Y)]);
+            let result = received(&gpu, &spot, &kept(mapped(1000, 2, 1, radius)), &[(place(0.0).0, DVec3::Y)]);
             let exact = 2.0 * PI * (versine(inner) + (versine(outer) - versine(inner)) / 3.0) / (PI * radius * radius);
-            assert_holds(format!("{what}, {degrees} degrees"), relative_check("power", red(&lit, 0).0, exact, 1e-5));
+            assert_holds(format!("{what}, {degrees} degrees"), relative_check("power", red(&result, 0).0, exact, 1e-5));
         }
     }
 }
 
-/// Points on a floor that touches walls which shine, at distances around what single precision tells apart.
+/// Points on a floor that touches emissive walls, at distances around what single precision distinguishes.
 #[test]
 fn walls_light_the_points_that_touch_them() {
     let Some(gpu) = device() else { return };
@@ -638,15 +639,15 @@ fn walls_light_the_points_that_touch_them() {
             // With textures, one set of kernels for both scenes.
             let with = if textured { vec![Effect::Textures] } else { vec![] };
             let settings = kept(SceneSettings { rounds: 16, shadow_rays: 64, part: Part::Direct, with, ..by_rounds() });
-            let lit = received(&gpu, scene, &settings, points);
+            let result = received(&gpu, scene, &settings, points);
             for (k, (point, _)) in points.iter().enumerate() {
-                let ((found, error), exact) = (red(&lit, k), expected(*point));
+                let ((found, error), exact) = (red(&result, k), expected(*point));
                 println!("{what}, {point}: {found:.4} +- {error:.4}, {exact:.4} is right");
                 family.expect_estimate(format!("{what}, {point}"), found, error.max(2e-3 * exact), settings.rounds, exact);
             }
         };
         let on = |place: fn(f64) -> DVec3, normal: DVec3| distances.map(|distance| (place(distance), normal));
-        // Every point of a furnace sees walls that shine wherever it looks.
+        // Every point of a furnace sees emissive walls wherever it looks.
         let furnace = scene("furnace");
         check("beside a wall", &furnace, &on(|d| DVec3::new(d, 0.0, 0.37), DVec3::Y), &|_| PI);
         check("in a corner", &furnace, &on(|d| DVec3::new(d, 0.0, d), DVec3::Y), &|_| PI);
@@ -667,12 +668,12 @@ fn walls_light_the_points_that_touch_them() {
             0.5 * (half(0.4) + half(0.6))
         };
         check("a wall aslant", &room, &points, &exact);
-        family.assert_tells(0.2, |_| true);
+        family.assert_detects(0.2, |_| true);
     }
 }
 
 /// Channels that are dim beside another are as bright as their share of it: light of a tinted lamp, and light that a
-/// tinted wall reflects. The same photons carry all channels, so only rounding tells them apart.
+/// tinted wall reflects. The same photons carry all channels, so only rounding distinguishes them.
 #[test]
 fn channels_a_millionth_as_bright_are_right() {
     let Some(gpu) = device() else { return };
@@ -692,14 +693,15 @@ fn channels_a_millionth_as_bright_are_right() {
             grid(0.5, DVec3::NEG_Y, 3).into_iter().map(|(point, normal)| (middle + 0.8 * point + DVec3::Y * 0.1, normal)).collect();
         let runs: Vec<_> = (1..7).map(|seed| received(&gpu, &scene, &SceneSettings { seed, ..settings.clone() }, &points)).collect();
         // Of a point too few photons may be seen for a channel to be right, but not without its error saying so.
-        let off = |lit: &RunResult, point: usize, channel: usize| {
-            let (mean, error) = (lit.film.mean(point), lit.film.stated_error(point));
+        let off = |result: &RunResult, point: usize, channel: usize| {
+            let (mean, error) = (result.film.mean(point), result.film.stated_error(point));
             (mean[channel] - mean.x * f64::from(tint[channel])).abs() / error[channel]
         };
-        let most_off = runs.iter().flat_map(|lit| (0..points.len()).flat_map(move |point| [1, 2].map(|channel| off(lit, point, channel))));
+        let most_off =
+            runs.iter().flat_map(|result| (0..points.len()).flat_map(move |point| [1, 2].map(|channel| off(result, point, channel))));
         let most_off = most_off.fold(0.0, f64::max);
         assert!(most_off < 3.0, "{what}: {most_off} stated errors beside the bright channel");
-        let sums: Vec<DVec3> = runs.iter().map(|lit| means(lit).iter().sum()).collect();
+        let sums: Vec<DVec3> = runs.iter().map(|result| means(result).iter().sum()).collect();
         for channel in [1, 2] {
             let shares: Vec<f64> = sums.iter().map(|sum| sum[channel] / (sum.x * f64::from(tint[channel]))).collect();
             let (share, error) = mean_and_error(&shares);
@@ -722,15 +724,15 @@ fn channels_below_the_films_unit_are_right() {
     for (rounds, done) in [(64, 64), (1 << 20, 4)] {
         let stop = Stop { photons: Some(u64::from(done)), ..Stop::default() };
         let settings = SceneSettings { photons: 1, rounds, shadow_rays: 1, samples: 1, stop, ..kept(by_rounds()) };
-        let lit = seen(&gpu, &plane, &settings, &camera, [16, 16]);
-        assert_eq!(lit.film.rounds, done);
-        let pixels = lit.film.pixels();
+        let result = seen(&gpu, &plane, &settings, &camera, [16, 16]);
+        assert_eq!(result.film.rounds, done);
+        let pixels = result.film.pixels();
         for channel in 0..3 {
-            let (exact, means) = (tint[channel], means(&lit));
-            let errors: Vec<f64> = (0..pixels).map(|pixel| lit.film.standard_error(pixel)[channel]).collect();
+            let (exact, means) = (tint[channel], means(&result));
+            let errors: Vec<f64> = (0..pixels).map(|pixel| result.film.standard_error(pixel)[channel]).collect();
             let found = means.iter().map(|mean| mean[channel]).sum::<f64>() / pixels as f64;
             let error = errors.iter().map(|error| error.powi(2)).sum::<f64>().sqrt() / pixels as f64;
-            println!("channel {channel}: {found:e} +- {error:e}, {exact:e} is right, a unit is {:e}", 1.0 / lit.plan.film.scale);
+            println!("channel {channel}: {found:e} +- {error:e}, {exact:e} is right, a unit is {:e}", 1.0 / result.plan.film.scale);
             assert!(rounds > done || error < 0.05 * exact);
             assert_holds(channel, z_check("radiance", found, exact, error.max(1e-6 * exact)));
             let off = means.iter().zip(&errors).map(|(mean, error)| (mean[channel] - exact).abs() / error.max(1e-6 * exact));

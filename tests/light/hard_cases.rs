@@ -87,7 +87,7 @@ fn flat_lamps_light_nothing_of_their_own_plane() {
     // The lamp is a part of the ceiling, turned so that no coordinate is a round number.
     let turn = DQuat::from_axis_angle(DVec3::new(0.2, 0.7, -0.4).normalize(), 0.8);
     let mut room = closed_room(0.0);
-    room.materials.push(shining(0.0));
+    room.materials.push(emissive(0.0));
     room.meshes.push(Mesh::parallelogram("lamp", DVec3::new(0.3, 1.0, 0.3), DVec3::X * 0.4, DVec3::Z * 0.4, 1));
     let room = moved(room, |at| turn * at);
     let own = grid(turn * DVec3::new(0.5, 1.0, 0.5), turn * DVec3::NEG_Y, 0.8);
@@ -103,10 +103,10 @@ fn closed_room(albedo: f32) -> Scene {
     room
 }
 
-fn none_escapes(what: &str, lit: &RunResult) -> Check {
-    let traced: u64 = lit.fates[0].bounces.iter().map(|bounce| bounce.stored + bounce.absorbed + bounce.escaped).sum();
-    let escaped: u64 = lit.fates.iter().map(|fates| fates.ledger().escaped).sum();
-    require(escaped == 0, || format!("{what}: {escaped} of {} photons and {traced} flights left a closed room", lit.fates[0].emitted))
+fn none_escapes(what: &str, result: &RunResult) -> Check {
+    let traced: u64 = result.fates[0].bounces.iter().map(|bounce| bounce.stored + bounce.absorbed + bounce.escaped).sum();
+    let escaped: u64 = result.fates.iter().map(|fates| fates.ledger().escaped).sum();
+    require(escaped == 0, || format!("{what}: {escaped} of {} photons and {traced} flights left a closed room", result.fates[0].emitted))
 }
 
 /// Floating-point operations of a module that a driver may fuse or reorder, in functions other than `free`: results
@@ -252,21 +252,21 @@ fn photons_leave_a_surface_once_and_for_all() {
             plane.meshes[0].positions.iter_mut().for_each(|position| *position = tilt * *position * size + place);
             plane.lights = vec![lamp(sun(tilt * DVec3::new(0.3, -1.0, 0.2)))];
             let settings = SceneSettings { radius: None, ..kept(flights(40_000, 2)) };
-            let lit = received(&gpu, &plane, &settings, &[(place, tilt * DVec3::Y)]);
+            let result = received(&gpu, &plane, &settings, &[(place, tilt * DVec3::Y)]);
             let what = format!("tilt {number}, {cells} x {cells} cells, size {size} at {place}");
-            assert_holds(&what, none_returns(&what, &lit));
+            assert_holds(&what, none_returns(&what, &result));
         }
     }
     for segments in [8, 64] {
         let mesh = Mesh { normals: Vec::new(), ..Mesh::sphere("ball", DVec3::new(0.2, 0.7, -0.4), 0.9, segments, 0) };
         let mut ball = scene_of(vec![mesh], vec![matt(1.0)], vec![sun(DVec3::new(0.3, -1.0, 0.2))]);
-        let lit = received(&gpu, &ball, &kept(flights(40_000, 2)), &[(DVec3::new(0.2, 1.6, -0.4), DVec3::Y)]);
-        assert_holds(segments, none_returns(&format!("ball of {segments} segments"), &lit));
+        let result = received(&gpu, &ball, &kept(flights(40_000, 2)), &[(DVec3::new(0.2, 1.6, -0.4), DVec3::Y)]);
+        assert_holds(segments, none_returns(&format!("ball of {segments} segments"), &result));
         // A bowl sees itself.
         ball.meshes[0].triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
         ball.lights = vec![lamp(point(DVec3::new(0.2, 0.7, -0.4)))];
-        let lit = received(&gpu, &ball, &kept(flights(40_000, 2)), &[(DVec3::new(0.2, -0.2, -0.4), DVec3::Y)]);
-        assert_complains("the inside of a ball", none_returns("bowl", &lit));
+        let result = received(&gpu, &ball, &kept(flights(40_000, 2)), &[(DVec3::new(0.2, -0.2, -0.4), DVec3::Y)]);
+        assert_complains("the inside of a ball", none_returns("bowl", &result));
     }
 }
 
@@ -293,8 +293,8 @@ fn thin_walls_and_sheets_let_no_light_through() {
     let no_wall = lit_and_dark_room(vec![]);
     let points = [(half, DVec3::NEG_X), (thin, DVec3::X), (DVec3::new(0.99, 0.0, 0.4), y), (DVec3::X, DVec3::NEG_X)]
         .map(|(at, normal)| (at + DVec3::new(0.0, 0.5, 0.5) * (y + z - normal.abs()), normal));
-    let check = |what: &str, lit: &RunResult| -> Check {
-        let means = means(lit);
+    let check = |what: &str, result: &RunResult| -> Check {
+        let means = means(result);
         assert!(means[0].x > 0.1, "{what}: the lit side has {}", means[0]);
         match means[1..].iter().find(|mean| **mean != DVec3::ZERO) {
             None => Ok(()),
@@ -397,7 +397,7 @@ fn axis_parallel_rays_meet_the_same_by_tree_and_list() {
     room.lights = [DVec3::X, DVec3::Y, DVec3::Z].into_iter().flat_map(|axis| [axis, -axis]).map(|way| lamp(sun(way))).collect();
     let flush = [(DVec3::new(0.5, 0.0, 0.5), DVec3::Y), (DVec3::new(0.0, 0.5, 0.5), DVec3::X)];
     room.lights.extend(flush.map(|(centre, normal)| lamp(disc(centre, normal, 0.3, EmissionLaw::Uniform))));
-    let lit = |by_tree: bool, room: &Scene| {
+    let result_of = |by_tree: bool, room: &Scene| {
         // Without aim suns have the kernels of other lights.
         let mut settings = SceneSettings { illumination: Illumination::Photons, photons: 60_000, bounces: 4, aim: false, ..settings() };
         if !by_tree {
@@ -406,11 +406,11 @@ fn axis_parallel_rays_meet_the_same_by_tree_and_list() {
         }
         received(&gpu, room, &settings, &POINTS)
     };
-    let (tree, list) = (lit(true, &room), lit(false, &room));
-    assert!(tree.plan.keeps(Effect::Bvh) && !list.plan.keeps(Effect::Bvh) && mean_red(&list) > 0.0);
+    let (tree, list) = (result_of(true, &room), result_of(false, &room));
+    assert!(tree.plan.simulates(Effect::Bvh) && !list.plan.simulates(Effect::Bvh) && mean_red(&list) > 0.0);
     assert_holds("tree", same_sums("tree", &tree, &list));
     room.meshes.remove(6);
-    assert_complains("a block less", same_sums("a block less", &lit(true, &room), &list));
+    assert_complains("a block less", same_sums("a block less", &result_of(true, &room), &list));
 }
 
 #[test]
@@ -482,7 +482,7 @@ fn two_sheets_at_one_place_show_each_its_own_side() {
 fn room_with_lamp(k: i32) -> (Scene, (DVec3, DVec3)) {
     let edge = 2f64.powi(-k);
     let mut room = closed_room(0.0);
-    room.materials.push(shining(0.0));
+    room.materials.push(emissive(0.0));
     let corner = DVec3::splat(0.5);
     let positions = vec![corner, corner + DVec3::X * edge, corner + DVec3::Z * edge];
     room.meshes.push(Mesh { name: "lamp".into(), positions, triangles: vec![[0, 1, 2]], material: 1, ..Mesh::default() });
@@ -491,7 +491,7 @@ fn room_with_lamp(k: i32) -> (Scene, (DVec3, DVec3)) {
 
 /// Lamps ever smaller are as bright as points of their power, by photons and by shadow rays.
 #[test]
-fn small_lamps_shine_by_their_area() {
+fn small_lamps_emit_by_their_area() {
     let Some(gpu) = device() else { return };
     for k in [3, 4, 6, 8, 12, 16, 22] {
         let (room, below) = room_with_lamp(k);
@@ -513,13 +513,13 @@ fn small_lamps_shine_by_their_area() {
 /// A triangle whose normal any device may take for nothing, the square of its length being below the least normal
 /// number of f32, 2^-126, is left out; any other sends its photons into the room.
 #[test]
-fn the_smallest_lamps_shine_into_the_room_or_are_left_out() {
+fn the_smallest_lamps_emit_into_the_room_or_are_left_out() {
     let Some(gpu) = device() else { return };
     for k in [22, 26, 30, 31, 32, 33, 35, 37, 38, 40, 60, 74] {
         let (room, below) = room_with_lamp(k);
         assert_eq!(Geometry::new(&room).unwrap().left_out, usize::from(4 * k > 126), "a lamp of 2^-{k}");
-        let lit = received(&gpu, &room, &kept(flights(5000, 1)), &[below]);
-        assert_holds(k, none_escapes(&format!("a lamp of 2^-{k}"), &lit));
+        let result = received(&gpu, &room, &kept(flights(5000, 1)), &[below]);
+        assert_holds(k, none_escapes(&format!("a lamp of 2^-{k}"), &result));
     }
 }
 
@@ -537,8 +537,8 @@ fn an_eye_on_a_surface_sees_numbers() {
     ] {
         let camera = Camera::looking_at("eye", eye, target, DVec3::Y, 1.0);
         // The device counts values that are no number, and there are none.
-        let lit = seen(&gpu, &cornell, &settings, &camera, [16, 16]);
-        assert!(mean_red(&lit).is_finite(), "{eye} to {target}");
+        let result = seen(&gpu, &cornell, &settings, &camera, [16, 16]);
+        assert!(mean_red(&result).is_finite(), "{eye} to {target}");
     }
 }
 

@@ -1,9 +1,9 @@
 //! The judge, judged: scenes whose light is known in closed form.
 
 use crate::common::layered::{lobes_at, map_of, mapped_normal, metal, plastic, row_of_texels};
-use crate::common::lit::sides;
 use crate::common::plates::Place;
 use crate::common::prelude::*;
+use crate::common::rendered::sides;
 use photonmill::scene::material::{Coverage, Layers, Medium};
 use photonmill::scene::texture::Filter;
 use photonmill::verify::judge::{Estimate, Image, fresnel, lobes};
@@ -87,11 +87,11 @@ fn disc_irradiance(distance: f64, law: EmissionLaw) -> DVec3 {
 #[test]
 fn a_disc_lights_the_point_on_its_axis() {
     for (law, other) in [(EmissionLaw::Cosine, EmissionLaw::Uniform), (EmissionLaw::Uniform, EmissionLaw::Cosine)] {
-        let lit = scene_of(vec![], vec![], vec![disc(1.5, -DVec3::Z, law)]);
-        let estimate = irradiance(&lit, DVec3::ZERO, DVec3::Z, 20_000);
+        let scene = scene_of(vec![], vec![], vec![disc(1.5, -DVec3::Z, law)]);
+        let estimate = irradiance(&scene, DVec3::ZERO, DVec3::Z, 20_000);
         assert_total("front", &estimate, disc_irradiance(1.5, law));
         assert_eq!(estimate.mean.total(), estimate.mean.direct);
-        assert_eq!(irradiance(&lit, DVec3::Z * 3.0, -DVec3::Z, 100).mean.total(), DVec3::ZERO, "back");
+        assert_eq!(irradiance(&scene, DVec3::Z * 3.0, -DVec3::Z, 100).mean.total(), DVec3::ZERO, "back");
         // The check complains about one per cent, about the other law, and about what is no number.
         let (mean, error) = (estimate.mean.total(), estimate.total_standard_error);
         assert!(!meets(1.01 * mean, error, disc_irradiance(1.5, law)) && !meets(mean, error, disc_irradiance(1.5, other)));
@@ -102,9 +102,9 @@ fn a_disc_lights_the_point_on_its_axis() {
 #[test]
 fn point_lights_fall_off_with_distance_and_cosine_and_add_up() {
     let bulb = LightKind::Point { position: DVec3::new(3.0, 0.0, 4.0), intensity: Vec3::new(50.0, 25.0, 0.0) };
-    let lit = scene_of(vec![], vec![], vec![bulb.clone()]);
+    let scene = scene_of(vec![], vec![], vec![bulb.clone()]);
     let expected = DVec3::new(50.0, 25.0, 0.0) / 25.0 * 0.8;
-    assert_total("alone", &irradiance(&lit, DVec3::ZERO, DVec3::Z, 2), expected);
+    assert_total("alone", &irradiance(&scene, DVec3::ZERO, DVec3::Z, 2), expected);
     // A plate blocks it from either side; the receiver itself, a surface, does not.
     let plates = |height| vec![square(0.0, 9.0, true, 0), square(height, 9.0, true, 0)];
     assert_total("lit", &irradiance(&scene_of(plates(5.0), vec![matt(0.0)], vec![bulb.clone()]), DVec3::ZERO, DVec3::Z, 2), expected);
@@ -120,40 +120,40 @@ fn spots_fall_off_between_their_cones() {
     let (inner_angle, outer_angle) = (0.3f32, 0.9f32);
     let (inner, outer) = (f64::from(inner_angle).cos(), f64::from(outer_angle).cos());
     let spot = LightKind::Spot { position: DVec3::Z, direction: -DVec3::Z, intensity: Vec3::ONE, inner_angle, outer_angle };
-    let lit = scene_of(vec![], vec![], vec![spot]);
+    let scene = scene_of(vec![], vec![], vec![spot]);
     for (cosine, falloff) in [(1.0, 1.0), (0.999 * inner + 0.001, 1.0), (0.5 * (inner + outer), 0.25), (0.99 * outer, 0.0)] {
         let point = DVec3::new((1.0f64 / (cosine * cosine) - 1.0).sqrt(), 0.0, 0.0);
         let expected = DVec3::splat(falloff * cosine.powi(3));
-        assert_meets("spot", irradiance(&lit, point, DVec3::Z, 2).mean.total(), DVec3::splat(1e-12), expected);
+        assert_meets("spot", irradiance(&scene, point, DVec3::Z, 2).mean.total(), DVec3::splat(1e-12), expected);
     }
 }
 
 #[test]
 fn the_sun_lights_by_its_cosine() {
     let sun = LightKind::Directional { direction: DVec3::new(0.6, 0.0, -0.8), irradiance: COLOUR };
-    let lit = plate_under(material(Surface::Lambert, COLOUR), sun);
+    let scene = plate_under(material(Surface::Lambert, COLOUR), sun);
     let expected = 0.8 * COLOUR.as_dvec3();
-    assert_total("irradiance", &irradiance(&lit, DVec3::ZERO, DVec3::Z, 2), expected);
+    assert_total("irradiance", &irradiance(&scene, DVec3::ZERO, DVec3::Z, 2), expected);
     let seen = expected * COLOUR.as_dvec3() / PI;
-    assert_total("radiance", &radiance(&lit, DVec3::new(0.5, 0.2, 3.0), DVec3::new(0.1, 0.2, 0.0), 2), seen);
-    assert_total("back", &radiance(&lit, DVec3::new(0.5, 0.2, -3.0), DVec3::new(0.1, 0.2, 0.0), 2), DVec3::ZERO);
+    assert_total("radiance", &radiance(&scene, DVec3::new(0.5, 0.2, 3.0), DVec3::new(0.1, 0.2, 0.0), 2), seen);
+    assert_total("back", &radiance(&scene, DVec3::new(0.5, 0.2, -3.0), DVec3::new(0.1, 0.2, 0.0), 2), DVec3::ZERO);
 }
 
 #[test]
 fn the_sky_lights_an_open_plane() {
-    let mut lit = plate_under(material(Surface::Lambert, COLOUR), environment());
-    assert_total("irradiance", &irradiance(&lit, DVec3::new(0.3, 0.2, 0.0), DVec3::Z, 100), PI * SKY);
+    let mut scene = plate_under(material(Surface::Lambert, COLOUR), environment());
+    assert_total("irradiance", &irradiance(&scene, DVec3::new(0.3, 0.2, 0.0), DVec3::Z, 100), PI * SKY);
     let (above, below, spot) = (DVec3::new(0.0, 1.0, 2.0), DVec3::new(0.0, 1.0, -2.0), DVec3::new(0.3, 0.2, 0.0));
-    let seen = radiance(&lit, above, spot, 100);
+    let seen = radiance(&scene, above, spot, 100);
     assert_total("plane", &seen, COLOUR.as_dvec3() * SKY);
     assert_eq!(seen.mean.direct, seen.mean.total());
-    assert_total("sky", &radiance(&lit, above, DVec3::Z * 9.0, 2), SKY);
-    assert_total("back", &radiance(&lit, below, spot, 2), DVec3::ZERO);
-    lit.materials[0].two_sided = true;
-    assert_total("both sides", &radiance(&lit, below, spot, 100), COLOUR.as_dvec3() * SKY);
+    assert_total("sky", &radiance(&scene, above, DVec3::Z * 9.0, 2), SKY);
+    assert_total("back", &radiance(&scene, below, spot, 2), DVec3::ZERO);
+    scene.materials[0].two_sided = true;
+    assert_total("both sides", &radiance(&scene, below, spot, 100), COLOUR.as_dvec3() * SKY);
 }
 
-/// A box of walls that all shine alike and are equal but for some of them, by their numbers: 2 is the floor, 3 the ceiling, 4 is on
+/// A box of walls that all emit alike and are equal but for some of them, by their numbers: 2 is the floor, 3 the ceiling, 4 is on
 /// the left.
 fn furnace_of(wall: &Material, others: &[(usize, Material)]) -> Scene {
     let mut walls = vec![wall.clone(); 6];
@@ -173,12 +173,12 @@ fn furnaces_glow_evenly_and_in_the_right_parts() {
     let rough = material(Surface::Lambert, COLOUR);
     // To all but the eye the paper's Phong is Lambertian.
     for wall in [rough.clone(), plain(COLOUR), material(Surface::PaperPhong { exponent: 20.0 }, COLOUR)] {
-        let lit = furnace_of(&wall, &[]);
-        let on_floor = irradiance(&lit, floor, DVec3::Z, 20_000);
+        let scene = furnace_of(&wall, &[]);
+        let on_floor = irradiance(&scene, floor, DVec3::Z, 20_000);
         assert_total("irradiance", &on_floor, PI * expected);
         assert_meets("direct", on_floor.mean.direct, on_floor.standard_error.direct, PI * EMITTED);
         if !matches!(wall.surface, Surface::PaperPhong { .. }) {
-            let seen = radiance(&lit, eye, floor, 20_000);
+            let seen = radiance(&scene, eye, floor, 20_000);
             assert_total("rough", &seen, expected);
             assert_meets("direct", seen.mean.direct, seen.standard_error.direct, EMITTED * (1.0 + colour));
             assert_eq!((seen.mean.specular, seen.mean.caustic), (DVec3::ZERO, DVec3::ZERO));
@@ -205,12 +205,12 @@ fn furnaces_glow_evenly_and_in_the_right_parts() {
 
     // Rough lobes of the same kinds: what is sharp and what is not.
     for (roughness, is_sharp) in [(0.499f32, true), (0.5, false)] {
-        let lit = furnace_of(&plain(COLOUR), &[(2, layered(COLOUR, &metal(roughness)))]);
-        let seen = radiance(&lit, eye, floor, 2000).mean;
+        let scene = furnace_of(&plain(COLOUR), &[(2, layered(COLOUR, &metal(roughness)))]);
+        let seen = radiance(&scene, eye, floor, 2000).mean;
         assert_eq!(seen.direct == EMITTED, is_sharp, "{seen:?}");
         assert_eq!(seen.specular == DVec3::ZERO, !is_sharp, "{seen:?}");
         assert_eq!(seen.indirect == DVec3::ZERO, is_sharp, "{seen:?}");
-        let from_wall = radiance(&lit, eye, DVec3::new(0.3, 0.7, 0.1), 5000).mean;
+        let from_wall = radiance(&scene, eye, DVec3::new(0.3, 0.7, 0.1), 5000).mean;
         assert_eq!(from_wall.caustic == DVec3::ZERO, !is_sharp, "{from_wall:?}");
     }
 }
@@ -219,12 +219,12 @@ fn furnaces_glow_evenly_and_in_the_right_parts() {
 fn bounces_are_a_geometric_series() {
     let camera = Camera::looking_at("ray", DVec3::ZERO, DVec3::new(0.3, 0.5, -0.5), DVec3::Z, 1.0);
     for wall in [material(Surface::Lambert, COLOUR), plain(COLOUR)] {
-        let lit = furnace_of(&wall, &[]);
+        let scene = furnace_of(&wall, &[]);
         let (mut expected, mut term) = (DVec3::ZERO, EMITTED);
         for max_bounces in 0..6 {
             expected += term;
             term *= COLOUR.as_dvec3();
-            let judge = Judge::new(&lit, max_bounces);
+            let judge = Judge::new(&scene, max_bounces);
             assert_total("radiance", &judge.image(&camera, 1, 1, 10_000, 3).pixels[0], expected);
             let at_wall = judge.irradiance_at(&[(DVec3::Z * -0.5, DVec3::Z)], 10_000, 4)[0];
             assert_total("irradiance", &at_wall, PI * expected);
@@ -232,9 +232,9 @@ fn bounces_are_a_geometric_series() {
     }
     // A thin pane scatters nothing.
     let meshes = vec![square(0.0, 1.0, true, 0), square(-1.0, 1.0, true, 1)];
-    let lit = scene_of(meshes, vec![layered(COLOUR, &clear(0.0, 1.5)), lamp_of(Vec3::ONE)], vec![]);
+    let scene = scene_of(meshes, vec![layered(COLOUR, &clear(0.0, 1.5)), lamp_of(Vec3::ONE)], vec![]);
     let camera = Camera::looking_at("down", DVec3::Z, DVec3::ZERO, DVec3::Y, 1e-9);
-    let seen = Judge::new(&lit, 0).image(&camera, 1, 1, 10_000, 3).pixels[0];
+    let seen = Judge::new(&scene, 0).image(&camera, 1, 1, 10_000, 3).pixels[0];
     assert_total("pane", &seen, 0.96 * COLOUR.as_dvec3());
     assert_eq!(seen.mean.direct, seen.mean.total());
 }
@@ -242,23 +242,23 @@ fn bounces_are_a_geometric_series() {
 #[test]
 fn a_lamp_is_seen_in_a_mirror_and_lights_through_it() {
     let materials = vec![material(Surface::Mirror, COLOUR), lamp_of(Vec3::new(1.0, 2.0, 3.0)), matt(0.0)];
-    let lit = scene_of(vec![square(0.0, 5.0, true, 0), square(2.0, 1.0, false, 1)], materials.clone(), vec![]);
-    let seen = radiance(&lit, DVec3::new(3.0, 0.0, 2.0), DVec3::new(1.5, 0.1, 0.0), 2);
+    let scene = scene_of(vec![square(0.0, 5.0, true, 0), square(2.0, 1.0, false, 1)], materials.clone(), vec![]);
+    let seen = radiance(&scene, DVec3::new(3.0, 0.0, 2.0), DVec3::new(1.5, 0.1, 0.0), 2);
     assert_total("lamp", &seen, COLOUR.as_dvec3() * EMITTED);
     assert_eq!(seen.mean.specular, seen.mean.total());
 
     for law in [EmissionLaw::Cosine, EmissionLaw::Uniform] {
         // It lies in the very plane of a black ceiling.
         let meshes = vec![square(0.0, 5.0, true, 0), square(1.0, 5.0, false, 2)];
-        let lit = scene_of(meshes, materials.clone(), vec![disc(1.0, -DVec3::Z, law)]);
-        assert_total("direct", &irradiance(&lit, DVec3::ZERO, DVec3::Z, 20_000), disc_irradiance(1.0, law));
+        let scene = scene_of(meshes, materials.clone(), vec![disc(1.0, -DVec3::Z, law)]);
+        assert_total("direct", &irradiance(&scene, DVec3::ZERO, DVec3::Z, 20_000), disc_irradiance(1.0, law));
         // From below its lamp a receiver sees the lamp's image only, as far below the mirror.
-        let estimate = irradiance(&lit, DVec3::Z * 0.5, -DVec3::Z, 200_000);
+        let estimate = irradiance(&scene, DVec3::Z * 0.5, -DVec3::Z, 200_000);
         assert_total("image", &estimate, COLOUR.as_dvec3() * disc_irradiance(1.5, law));
         assert_eq!(estimate.mean.caustic, estimate.mean.total());
         // The eye sees a disc neither itself nor mirrored.
-        assert_total("disc", &radiance(&lit, DVec3::Z * 0.5, DVec3::Z, 2), DVec3::ZERO);
-        assert_total("mirrored disc", &radiance(&lit, DVec3::Z * 0.5, DVec3::X * 0.01, 2), DVec3::ZERO);
+        assert_total("disc", &radiance(&scene, DVec3::Z * 0.5, DVec3::Z, 2), DVec3::ZERO);
+        assert_total("mirrored disc", &radiance(&scene, DVec3::Z * 0.5, DVec3::X * 0.01, 2), DVec3::ZERO);
     }
 }
 
@@ -284,15 +284,15 @@ fn fresnel_meets_its_special_values() {
 fn refraction_obeys_snell() {
     // A lamp no wider than a pencil at the bottom of a pool, seen where Snell's law says.
     let water = material(Surface::Dielectric { ior: 1.25 }, Vec3::ONE);
-    let lit = scene_of(vec![square(0.0, 5.0, true, 0), square(-1.0, 0.01, true, 1)], vec![water, lamp_of(Vec3::ONE)], vec![]);
+    let scene = scene_of(vec![square(0.0, 5.0, true, 0), square(-1.0, 0.01, true, 1)], vec![water, lamp_of(Vec3::ONE)], vec![]);
     for sine in [0.1, 0.5, 0.9f64] {
         let cosine = (1.0 - sine * sine).sqrt();
         let surface = DVec3::X * (sine / 1.25 / (1.0 - (sine / 1.25).powi(2)).sqrt());
         let eye = surface + DVec3::new(sine, 0.0, cosine);
         let reflectance = fresnel(cosine, 1.0, f64::from(1.25f32));
         let expected = DVec3::splat((1.0 - reflectance) / (1.25 * 1.25));
-        assert_total("lamp", &radiance(&lit, eye, surface, 20_000), expected);
-        assert_total("beside", &radiance(&lit, eye, surface + DVec3::X * 0.05, 100), DVec3::ZERO);
+        assert_total("lamp", &radiance(&scene, eye, surface, 20_000), expected);
+        assert_total("beside", &radiance(&scene, eye, surface + DVec3::X * 0.05, 100), DVec3::ZERO);
     }
 }
 
@@ -311,8 +311,8 @@ fn lobes_weigh_the_light_of_a_point() {
         (Surface::Glossy { exponent: 10.0 }, 12.0 / (2.0 * PI) * cosine.powi(10)),
         (Surface::Mirror, 0.0),
     ] {
-        let lit = plate_under(material(surface, COLOUR), bulb.clone());
-        let seen = radiance(&lit, 3.0 * eye, DVec3::ZERO, 2);
+        let scene = plate_under(material(surface, COLOUR), bulb.clone());
+        let seen = radiance(&scene, 3.0 * eye, DVec3::ZERO, 2);
         // The picture is a little wider than a ray.
         assert_meets("lobe", seen.mean.total(), DVec3::splat(1e-8), expected * arriving);
     }
@@ -352,17 +352,17 @@ fn textures_shade_lamps_and_walls() {
     let ramp = || texture(2, vec![Vec3::ZERO, Vec3::ONE], [Wrap::Clamp; 2]);
     let textured = Some(TextureUse::of(0, 0));
     let plain = |material| scene_of(vec![square(0.0, 1.0, true, 0)], vec![material], vec![]);
-    let mut lit = plain(Material { emission_texture: textured, ..lamp_of(Vec3::new(1.0, 2.0, 3.0)) });
-    lit.textures.push(ramp());
+    let mut scene = plain(Material { emission_texture: textured, ..lamp_of(Vec3::new(1.0, 2.0, 3.0)) });
+    scene.textures.push(ramp());
     for (x, share) in [(-0.75, 0.0), (0.0, 0.5), (0.75, 1.0)] {
-        let seen = radiance(&lit, DVec3::new(x, 0.3, 1.0), DVec3::new(x, 0.3, 0.0), 2);
+        let seen = radiance(&scene, DVec3::new(x, 0.3, 1.0), DVec3::new(x, 0.3, 0.0), 2);
         assert_meets("lamp", seen.mean.total(), DVec3::splat(1e-8), share * EMITTED);
     }
     // A ramp and its mirror image make a plain lamp, so that on the axis each gives half.
     let whole = irradiance(&plain(lamp_of(Vec3::new(1.0, 2.0, 3.0))), DVec3::Z, -DVec3::Z, 100_000);
     let form_factor = 4.0 / (2f64.sqrt() * PI) * (1.0 / 2f64.sqrt()).atan();
     assert_total("plain lamp", &whole, PI * form_factor * EMITTED);
-    assert_total("ramp", &irradiance(&lit, DVec3::Z, -DVec3::Z, 100_000), 0.5 * PI * form_factor * EMITTED);
+    assert_total("ramp", &irradiance(&scene, DVec3::Z, -DVec3::Z, 100_000), 0.5 * PI * form_factor * EMITTED);
 
     // A wall with the same ramp, and one whose vertices are dark at one side.
     let wall = Material { base_colour_texture: textured, ..material(Surface::Lambert, COLOUR) };
@@ -385,20 +385,20 @@ fn shading_normals_bend_reflections() {
     let mut mirror = square(0.0, 1.0, true, 0);
     mirror.normals = vec![DVec3::new(sin, 0.0, cos); 4];
     let side = Mesh::parallelogram("lamp", DVec3::new(2.0, -0.1, 1.9), DVec3::Z * 0.2, DVec3::Y * 0.2, 1);
-    let lit = scene_of(vec![mirror, side], vec![material(Surface::Mirror, COLOUR), lamp_of(Vec3::ONE)], vec![]);
-    assert_total("lamp", &radiance(&lit, DVec3::Z, DVec3::ZERO, 2), COLOUR.as_dvec3());
+    let scene = scene_of(vec![mirror, side], vec![material(Surface::Mirror, COLOUR), lamp_of(Vec3::ONE)], vec![]);
+    assert_total("lamp", &radiance(&scene, DVec3::Z, DVec3::ZERO, 2), COLOUR.as_dvec3());
 }
 
 #[test]
 fn pictures_stand_upright() {
     let top_left = Mesh::parallelogram("lamp", DVec3::new(-1.0, 0.0, 0.0), DVec3::X, DVec3::Y, 0);
-    let lit = scene_of(vec![top_left], vec![lamp_of(Vec3::ONE)], vec![]);
+    let scene = scene_of(vec![top_left], vec![lamp_of(Vec3::ONE)], vec![]);
     let camera = Camera::looking_at("front", DVec3::Z, DVec3::ZERO, DVec3::Y, PI / 2.0);
-    let Image { width, height, pixels } = Judge::new(&lit, 0).image(&camera, 2, 2, 50, 1);
+    let Image { width, height, pixels } = Judge::new(&scene, 0).image(&camera, 2, 2, 50, 1);
     assert_eq!((width, height, pixels.len()), (2, 2, 4));
     assert_eq!(pixels.iter().map(|pixel| pixel.mean.total().x).collect::<Vec<_>>(), [1.0, 0.0, 0.0, 0.0]);
     // Samples cover each pixel evenly: the lamp's edge is where it is.
-    let edge = &Judge::new(&lit, 0).image(&camera, 1, 1, 20_000, 1).pixels[0];
+    let edge = &Judge::new(&scene, 0).image(&camera, 1, 1, 20_000, 1).pixels[0];
     assert_total("quarter", edge, DVec3::splat(0.25));
 }
 
@@ -420,8 +420,8 @@ fn results_depend_on_the_seed_and_not_on_threads() {
 
 #[test]
 fn standard_errors_are_what_means_scatter_by() {
-    let lit = scene_of(vec![], vec![], vec![disc(0.5, -DVec3::Z, EmissionLaw::Cosine)]);
-    let estimates = Judge::new(&lit, 0).irradiance_at(&[(DVec3::ZERO, DVec3::Z); 2000], 100, 5);
+    let scene = scene_of(vec![], vec![], vec![disc(0.5, -DVec3::Z, EmissionLaw::Cosine)]);
+    let estimates = Judge::new(&scene, 0).irradiance_at(&[(DVec3::ZERO, DVec3::Z); 2000], 100, 5);
     let scores = estimates.iter().map(|estimate| {
         assert_eq!(estimate.standard_error.direct, estimate.total_standard_error);
         (estimate.mean.total() - disc_irradiance(0.5, EmissionLaw::Cosine)) / estimate.total_standard_error
@@ -432,15 +432,15 @@ fn standard_errors_are_what_means_scatter_by() {
     // Parts of a sample depend on each other: a lamp in front of a mirror under as bright a sky.
     let half = Mesh::parallelogram("lamp", DVec3::new(-1.0, -1.0, 0.5), DVec3::X, 2.0 * DVec3::Y, 0);
     let materials = vec![lamp_of(Vec3::ONE), material(Surface::Mirror, Vec3::ONE)];
-    let lit = scene_of(vec![half, square(0.0, 1.0, true, 1)], materials, vec![LightKind::Environment { radiance: Vec3::ONE }]);
+    let scene = scene_of(vec![half, square(0.0, 1.0, true, 1)], materials, vec![LightKind::Environment { radiance: Vec3::ONE }]);
     let camera = Camera::looking_at("down", DVec3::Z, DVec3::ZERO, DVec3::Y, 0.5);
-    let estimate = Judge::new(&lit, NO_LIMIT).image(&camera, 1, 1, 10_000, 1).pixels[0];
+    let estimate = Judge::new(&scene, NO_LIMIT).image(&camera, 1, 1, 10_000, 1).pixels[0];
     let binomial = DVec3::splat(0.005);
     assert_meets("direct", estimate.mean.direct, binomial, DVec3::splat(0.5));
     assert!((estimate.standard_error.direct - binomial).abs().max_element() < 1e-5, "{estimate:?}");
     assert!((estimate.standard_error.specular - binomial).abs().max_element() < 1e-5, "{estimate:?}");
     assert!((estimate.mean.total() - 1.0).abs().max_element() < 1e-9 && estimate.total_standard_error.max_element() < 1e-9, "{estimate:?}");
-    let single = Judge::new(&lit, NO_LIMIT).image(&camera, 1, 1, 1, 1).pixels[0];
+    let single = Judge::new(&scene, NO_LIMIT).image(&camera, 1, 1, 1, 1).pixels[0];
     assert_eq!(single.total_standard_error, DVec3::INFINITY);
 }
 
@@ -463,8 +463,8 @@ fn solid(roughness: f32, ior: f32, transmittance: Vec3) -> Layers {
 
 /// A plate under nothing but this light, seen at this cosine.
 fn plate(material: Material, light: LightKind, cosine: f64, samples: u32) -> Estimate {
-    let lit = plate_under(material, light);
-    radiance(&lit, 0.5 * DVec3::new((1.0 - cosine * cosine).sqrt(), 0.0, cosine), DVec3::ZERO, samples)
+    let scene = plate_under(material, light);
+    radiance(&scene, 0.5 * DVec3::new((1.0 - cosine * cosine).sqrt(), 0.0, cosine), DVec3::ZERO, samples)
 }
 
 #[test]
@@ -503,8 +503,8 @@ fn lamps_of_all_sizes_light_lobes_of_all_widths() {
             let above = Mesh::parallelogram("lamp", corner, 2.0 * half * DVec3::Y, 2.0 * half * DVec3::X, 1);
             let plate = layered(COLOUR, &metal(roughness));
             let lobe = lobes_at(&plate, &Place::of_normal(DVec3::Z, wo), DVec3::Z);
-            let lit = scene_of(vec![square(0.0, 0.1, true, 0), above], vec![plate, lamp_of(emitted.as_vec3())], vec![]);
-            let seen = radiance(&lit, 0.5 * wo, DVec3::ZERO, samples);
+            let scene = scene_of(vec![square(0.0, 0.1, true, 0), above], vec![plate, lamp_of(emitted.as_vec3())], vec![]);
+            let seen = radiance(&scene, 0.5 * wo, DVec3::ZERO, samples);
             let mut sum = DVec3::ZERO;
             for place in 0..count * count {
                 let [x, y] = [place % count, place / count].map(|at| (f64::from(at) + 0.5) / f64::from(count));
@@ -540,8 +540,8 @@ fn thin_walls_let_shadow_rays_pass() {
     // The sky behind a rough pane comes by its lobe, whose light is caustic; nothing is lost where nothing is reflected.
     let under = |layers| {
         let meshes = vec![square(0.01, 90.0, true, 0), square(-0.1, 90.0, true, 1)];
-        let lit = scene_of(meshes, vec![layered(Vec3::ONE, &layers), plain(Vec3::ZERO)], vec![environment()]);
-        irradiance(&lit, DVec3::ZERO, DVec3::Z, 40_000)
+        let scene = scene_of(meshes, vec![layered(Vec3::ONE, &layers), plain(Vec3::ZERO)], vec![environment()]);
+        irradiance(&scene, DVec3::ZERO, DVec3::Z, 40_000)
     };
     let rough = under(Layers { specular: 0.0, ..clear(0.3, 1.5) });
     assert_eq!(rough.mean.caustic, rough.mean.total());
@@ -558,9 +558,9 @@ fn through(meshes: Vec<Mesh>, materials: Vec<Material>, sine: f64) -> Estimate {
     let mut meshes = meshes;
     meshes.push(square(-3.0, 90.0, true, materials.len()));
     let materials = materials.into_iter().chain([lamp_of(Vec3::ONE)]).collect();
-    let lit = scene_of(meshes, materials, vec![]);
+    let scene = scene_of(meshes, materials, vec![]);
     let direction = DVec3::new(sine, 0.0, (1.0 - sine * sine).sqrt());
-    radiance(&lit, DVec3::new(0.3, 0.2, 0.0) + 2.0 * direction, DVec3::new(0.3, 0.2, 0.0), 40_000)
+    radiance(&scene, DVec3::new(0.3, 0.2, 0.0) + 2.0 * direction, DVec3::new(0.3, 0.2, 0.0), 40_000)
 }
 
 /// Transmitted by a slab, `kept` of the light being left after one crossing.
@@ -595,9 +595,9 @@ fn slabs_of_glass_reflect_and_absorb() {
     assert_meets("rough", rough.mean.specular, rough.standard_error.specular + 1e-3, expected);
     // Nothing is lost: under an even sky glass is invisible, and inside radiance is n^2 times as high.
     for material in [clear, layered(Vec3::ONE, &solid(0.0, 1.5, Vec3::ONE))] {
-        let lit = scene_of(slab(0.1, 0), vec![material], vec![environment()]);
-        assert_total("slant", &radiance(&lit, DVec3::new(0.3, 0.2, 3.0), DVec3::new(1.0, 0.5, 0.0), 20_000), SKY);
-        assert_total("inside", &radiance(&lit, DVec3::ZERO, DVec3::Z, 20_000), 2.25 * SKY);
+        let scene = scene_of(slab(0.1, 0), vec![material], vec![environment()]);
+        assert_total("slant", &radiance(&scene, DVec3::new(0.3, 0.2, 3.0), DVec3::new(1.0, 0.5, 0.0), 20_000), SKY);
+        assert_total("inside", &radiance(&scene, DVec3::ZERO, DVec3::Z, 20_000), 2.25 * SKY);
     }
 }
 
@@ -639,19 +639,19 @@ fn eyes_and_receivers_know_what_they_are_in() {
     meshes.push(square(-1.0, 0.5, true, 2));
     let glass = |transmittance| layered(Vec3::ONE, &solid(0.0, 1.5, transmittance));
     let materials = vec![glass(tinted), glass(Vec3::ONE), lamp_of(Vec3::ONE)];
-    let lit = scene_of(meshes.clone(), materials.clone(), vec![]);
-    assert_total("one", &radiance(&lit, DVec3::ZERO, -DVec3::Z, 2), kept(1.0));
+    let scene = scene_of(meshes.clone(), materials.clone(), vec![]);
+    assert_total("one", &radiance(&scene, DVec3::ZERO, -DVec3::Z, 2), kept(1.0));
     meshes.extend(cuboid(DVec3::splat(0.25), 1));
-    let lit = scene_of(meshes, materials, vec![]);
-    let seen = radiance(&lit, DVec3::new(0.01, 0.02, 0.0), DVec3::new(0.01, 0.02, -1.0), 2);
+    let scene = scene_of(meshes, materials, vec![]);
+    let seen = radiance(&scene, DVec3::new(0.01, 0.02, 0.0), DVec3::new(0.01, 0.02, -1.0), 2);
     assert_total("two", &seen, kept(0.75));
 
     // Shadow rays within a medium lose light on their way.
     let mut meshes = cuboid(DVec3::splat(2.0), 0);
     meshes.push(square(-1.0, 1.0, true, 1));
     let bulb = LightKind::Point { position: DVec3::Z * 0.5, intensity: Vec3::ONE };
-    let lit = scene_of(meshes, vec![glass(tinted), plain(Vec3::ZERO)], vec![bulb]);
-    let received = irradiance(&lit, DVec3::Z * -1.0, DVec3::Z, 2).mean.direct;
+    let scene = scene_of(meshes, vec![glass(tinted), plain(Vec3::ZERO)], vec![bulb]);
+    let received = irradiance(&scene, DVec3::Z * -1.0, DVec3::Z, 2).mean.direct;
     assert_meets("bulb", received, DVec3::splat(1e-8), kept(1.5) / 2.25);
 }
 
@@ -666,32 +666,32 @@ fn alpha_covers_its_share() {
     };
     for count in [1, 3, 6] {
         for alpha in [0.0f32, 0.25, 0.5, 1.0] {
-            let lit = stack(Coverage::Blend { alpha }, count);
+            let scene = stack(Coverage::Blend { alpha }, count);
             let expected = (1.0 - f64::from(alpha)).powi(count as i32) * EMITTED;
-            let seen = radiance(&lit, DVec3::Z * 3.0, DVec3::ZERO, 20_000);
+            let seen = radiance(&scene, DVec3::Z * 3.0, DVec3::ZERO, 20_000);
             assert_total("seen", &seen, expected);
             assert_eq!(seen.mean.direct, seen.mean.total());
-            assert_total("shadow", &irradiance(&lit, DVec3::ZERO, DVec3::Z, 200), expected);
+            assert_total("shadow", &irradiance(&scene, DVec3::ZERO, DVec3::Z, 200), expected);
         }
     }
     for (alpha, expected) in [(0.49, EMITTED), (0.5, DVec3::ZERO)] {
-        let lit = stack(Coverage::Mask { alpha, cutoff: 0.5 }, 2);
-        assert_total("mask", &irradiance(&lit, DVec3::ZERO, DVec3::Z, 2), expected);
-        assert_total("mask", &radiance(&lit, DVec3::Z * 3.0, DVec3::ZERO, 2), expected);
+        let scene = stack(Coverage::Mask { alpha, cutoff: 0.5 }, 2);
+        assert_total("mask", &irradiance(&scene, DVec3::ZERO, DVec3::Z, 2), expected);
+        assert_total("mask", &radiance(&scene, DVec3::Z * 3.0, DVec3::ZERO, 2), expected);
     }
     // Factors, textures and vertices multiply.
-    let mut lit = stack(Coverage::Blend { alpha: 0.8 }, 1);
-    lit.textures.push(row_of_texels(&[[255, 255, 255, 51]], Filter::Bilinear));
-    lit.materials[0].base_colour_texture = Some(TextureUse::of(0, 0));
-    lit.meshes[0].alphas = vec![0.5; 4];
-    assert_total("all", &irradiance(&lit, DVec3::ZERO, DVec3::Z, 2), (1.0 - 0.8f32 as f64 * 0.2 * 0.5) * EMITTED);
+    let mut scene = stack(Coverage::Blend { alpha: 0.8 }, 1);
+    scene.textures.push(row_of_texels(&[[255, 255, 255, 51]], Filter::Bilinear));
+    scene.materials[0].base_colour_texture = Some(TextureUse::of(0, 0));
+    scene.meshes[0].alphas = vec![0.5; 4];
+    assert_total("all", &irradiance(&scene, DVec3::ZERO, DVec3::Z, 2), (1.0 - 0.8f32 as f64 * 0.2 * 0.5) * EMITTED);
     // A lamp that is half there gives half its light, to lobes and to shadow rays.
     let lamp = Material { emission: Vec3::new(1.0, 2.0, 3.0), ..sheet(Coverage::Blend { alpha: 0.5 }) };
-    let lit = scene_of(vec![square(1.0, 1.0, false, 0), square(0.0, 1.0, true, 1)], vec![lamp, plain(COLOUR)], vec![]);
+    let scene = scene_of(vec![square(1.0, 1.0, false, 0), square(0.0, 1.0, true, 1)], vec![lamp, plain(COLOUR)], vec![]);
     let form_factor = 4.0 / (2f64.sqrt() * PI) * (1.0 / 2f64.sqrt()).atan();
     let expected = 0.5 * form_factor * EMITTED;
-    assert_total("receiver", &irradiance(&lit, DVec3::ZERO, DVec3::Z, 100_000), PI * expected);
-    let lobe = radiance(&lit, DVec3::new(0.0, 0.3, 0.5), DVec3::ZERO, 100_000);
+    assert_total("receiver", &irradiance(&scene, DVec3::ZERO, DVec3::Z, 100_000), PI * expected);
+    let lobe = radiance(&scene, DVec3::new(0.0, 0.3, 0.5), DVec3::ZERO, 100_000);
     assert_meets("lobe", lobe.mean.direct, lobe.standard_error.direct, COLOUR.as_dvec3() * expected);
 }
 
@@ -699,24 +699,24 @@ fn alpha_covers_its_share() {
 fn backs_are_not_there_for_the_eye_alone() {
     let one_sided = Material { two_sided: false, emission: Vec3::ONE, ..plain(COLOUR) };
     // Seen from below, its back; a mirror below shows it to an eye above.
-    let lit = scene_of(vec![square(0.0, 5.0, true, 0)], vec![one_sided.clone()], vec![environment()]);
-    assert_eq!(radiance(&lit, -DVec3::Z, DVec3::ZERO, 2).mean.direct, SKY);
-    assert_total("receiver", &irradiance(&lit, -DVec3::Z, DVec3::Z, 200), DVec3::ZERO);
+    let scene = scene_of(vec![square(0.0, 5.0, true, 0)], vec![one_sided.clone()], vec![environment()]);
+    assert_eq!(radiance(&scene, -DVec3::Z, DVec3::ZERO, 2).mean.direct, SKY);
+    assert_total("receiver", &irradiance(&scene, -DVec3::Z, DVec3::Z, 200), DVec3::ZERO);
     let meshes = vec![square(0.0, 500.0, true, 0), square(-1.0, 5.0, true, 1)];
-    let mut lit = scene_of(meshes, vec![one_sided, layered(Vec3::ONE, &metal(0.0))], vec![environment()]);
-    assert_total("mirrored", &radiance(&lit, DVec3::Z * -0.5, -DVec3::Z, 2), SKY);
+    let mut scene = scene_of(meshes, vec![one_sided, layered(Vec3::ONE, &metal(0.0))], vec![environment()]);
+    assert_total("mirrored", &radiance(&scene, DVec3::Z * -0.5, -DVec3::Z, 2), SKY);
     // The same for a lobe that is sampled by lamps and by itself: white metal loses nothing at such a roughness.
-    lit.materials[1].layers.roughness = 0.1;
-    let seen = radiance(&lit, DVec3::Z * -0.5, -DVec3::Z, 2000);
+    scene.materials[1].layers.roughness = 0.1;
+    let seen = radiance(&scene, DVec3::Z * -0.5, -DVec3::Z, 2000);
     assert_meets("rough", seen.mean.specular, seen.total_standard_error + 1e-3, SKY);
-    // Matt lobes see the back, which is black.
-    lit.materials[1].layers.roughness = 1.0;
-    let seen = radiance(&lit, DVec3::Z * -0.5, -DVec3::Z, 200);
+    // Rough lobes see the back, which is black.
+    scene.materials[1].layers.roughness = 1.0;
+    let seen = radiance(&scene, DVec3::Z * -0.5, -DVec3::Z, 200);
     assert!(seen.mean.total().max_element() < 0.01, "{seen:?}");
     // What transmits has two sides.
     let pane = Material { two_sided: false, ..layered(Vec3::ONE, &clear(0.0, 1.5)) };
-    let lit = scene_of(vec![square(0.0, 5.0, true, 0)], vec![pane], vec![environment()]);
-    let seen = radiance(&lit, -DVec3::Z, DVec3::ZERO, 20_000);
+    let scene = scene_of(vec![square(0.0, 5.0, true, 0)], vec![pane], vec![environment()]);
+    let seen = radiance(&scene, -DVec3::Z, DVec3::ZERO, 20_000);
     assert_meets("pane", seen.mean.specular, seen.standard_error.specular, 0.04 * SKY);
 }
 
@@ -728,11 +728,11 @@ fn unlit_surfaces_are_seen_and_light_nothing() {
     let with = |floor: Layers, lights| {
         scene_of(meshes(), vec![Material { emission: Vec3::ONE, ..unlit.clone() }, layered(Vec3::ONE, &floor)], lights)
     };
-    let lit = with(metal(0.0), vec![]);
-    assert_eq!(radiance(&lit, DVec3::Z * 0.5, DVec3::Z, 2).mean.direct, colour);
-    assert_eq!(radiance(&lit, DVec3::Z * 0.5, DVec3::ZERO, 2).mean.specular, colour);
-    assert_eq!(irradiance(&lit, DVec3::Z * 0.5, DVec3::Z, 2).mean.total(), DVec3::ZERO);
-    // Sharp lobes show it, matt ones do not.
+    let scene = with(metal(0.0), vec![]);
+    assert_eq!(radiance(&scene, DVec3::Z * 0.5, DVec3::Z, 2).mean.direct, colour);
+    assert_eq!(radiance(&scene, DVec3::Z * 0.5, DVec3::ZERO, 2).mean.specular, colour);
+    assert_eq!(irradiance(&scene, DVec3::Z * 0.5, DVec3::Z, 2).mean.total(), DVec3::ZERO);
+    // Sharp lobes show it, rough ones do not.
     let rough = radiance(&with(metal(0.1), vec![]), DVec3::Z * 0.5, DVec3::ZERO, 2000).mean;
     assert!(((rough.specular - colour) / colour).abs().max_element() < 2e-3, "{rough:?}");
     assert_eq!(radiance(&with(metal(1.0), vec![]), DVec3::Z * 0.5, DVec3::ZERO, 200).mean.total(), DVec3::ZERO);
@@ -749,9 +749,9 @@ fn normal_maps_turn_the_light() {
     for (tangent, sign, scale) in [(DVec3::X, 1.0, 1.0f32), (DVec3::X, -1.0, 1.0), (DVec3::new(0.6, 0.8, 0.0), 1.0, 0.5)] {
         for above in [1.0, -1.0] {
             let plate = Material { normal_map: Some(map_of(0, scale)), ..plain(COLOUR) };
-            let mut lit = plate_under(plate, LightKind::Directional { direction: above * sun, irradiance: Vec3::ONE });
-            lit.meshes[0].tangents = tangents(tangent, sign);
-            lit.textures.push(row_of_texels(&[code], Filter::Bilinear));
+            let mut scene = plate_under(plate, LightKind::Directional { direction: above * sun, irradiance: Vec3::ONE });
+            scene.meshes[0].tangents = tangents(tangent, sign);
+            scene.textures.push(row_of_texels(&[code], Filter::Bilinear));
             let frame = (above * tangent, above * sign * DVec3::Z.cross(tangent), above * DVec3::Z);
             // Seen from behind, the plate has the same shape; seen from where its normal faces away, that is moved to the eye.
             for eye in [DVec3::Z, DVec3::new(-0.96, 0.0, 0.28), DVec3::new(0.0, 0.96, 0.28)] {
@@ -759,7 +759,7 @@ fn normal_maps_turn_the_light() {
                 let n = mapped_normal(code, f64::from(scale), frame, eye);
                 let expected = COLOUR.as_dvec3() / PI * (-above * sun).dot(n).max(0.0);
                 let target = DVec3::new(0.1, 0.2, 0.0);
-                let seen = radiance(&lit, target + 3.0 * eye, target, 2);
+                let seen = radiance(&scene, target + 3.0 * eye, target, 2);
                 assert_meets("turned", seen.mean.total(), DVec3::splat(1e-6), expected);
             }
         }
@@ -774,11 +774,11 @@ fn normal_maps_turn_the_light() {
         let wi = 2.0 * n.z * n - DVec3::Z;
         let (u, v) = wi.any_orthonormal_pair();
         let lamp_mesh = Mesh::parallelogram("lamp", 0.5 * wi - 0.01 * (u + v), 0.02 * u, 0.02 * v, 1);
-        let mut lit = scene_of(vec![mesh, lamp_mesh], vec![plate, Material { two_sided: true, ..lamp_of(Vec3::ONE) }], vec![]);
-        lit.textures.push(row_of_texels(&[code], Filter::Bilinear));
+        let mut scene = scene_of(vec![mesh, lamp_mesh], vec![plate, Material { two_sided: true, ..lamp_of(Vec3::ONE) }], vec![]);
+        scene.textures.push(row_of_texels(&[code], Filter::Bilinear));
         let expected = 0.04 + 0.96 * (1.0 - n.z).powi(5);
         let eye = if coat_map { DVec3::Z } else { DVec3::Z * 0.4 };
-        let seen = radiance(&lit, eye, DVec3::ZERO, 2).mean;
+        let seen = radiance(&scene, eye, DVec3::ZERO, 2).mean;
         // Texels are f32.
         assert_meets("coat", seen.specular, DVec3::splat(1e-7), DVec3::splat(expected));
     }
@@ -802,9 +802,9 @@ fn textures_of_layers_have_their_channels() {
     };
     let seen = |layers: Layers, texel: [u8; 4]| {
         let sun = LightKind::Directional { direction: DVec3::new(0.6, 0.0, -0.8), irradiance: Vec3::ONE };
-        let mut lit = scene_of(vec![square(0.0, 1.0, true, 0)], vec![layered(COLOUR, &layers)], vec![environment(), sun]);
-        lit.textures.push(row_of_texels(&[texel], Filter::Bilinear));
-        radiance(&lit, DVec3::new(0.3, 0.0, 0.5), DVec3::ZERO, 4000).mean.total()
+        let mut scene = scene_of(vec![square(0.0, 1.0, true, 0)], vec![layered(COLOUR, &layers)], vec![environment(), sun]);
+        scene.textures.push(row_of_texels(&[texel], Filter::Bilinear));
+        radiance(&scene, DVec3::new(0.3, 0.0, 0.5), DVec3::ZERO, 4000).mean.total()
     };
     let plain = seen(all, [255; 4]);
     for (texel, textured, scaled) in [

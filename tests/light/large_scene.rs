@@ -27,8 +27,8 @@ fn a_million_triangles_load_and_render() {
     let read = began.elapsed();
     assert!(loaded.triangle_count() > 1_000_000, "{} triangles", loaded.triangle_count());
     let settings = SceneSettings { photons: 100_000, caustic_photons: 100_000, rounds: 4, ..by_rounds() };
-    let lit = seen(&gpu, &loaded, &settings, &loaded.cameras[0], [256; 2]);
+    let result = seen(&gpu, &loaded, &settings, &loaded.cameras[0], [256; 2]);
     println!("read in {read:?}, all {:?}", began.elapsed());
     // The caustic under the ball and the plane around it are lit.
-    assert!(lit.film.part_totals[0] > 0 && lit.film.part_totals[1] > 0 && lit.film.part_totals[2] > 0);
+    assert!(result.film.part_totals[0] > 0 && result.film.part_totals[1] > 0 && result.film.part_totals[2] > 0);
 }

@@ -3,13 +3,13 @@
 use std::sync::Arc;
 
 use crate::common::estimate_check;
-use crate::common::lit::around_hole;
 use crate::common::prelude::*;
 use crate::common::rectangles::{self, Rectangle};
+use crate::common::rendered::around_hole;
 use crate::tests::engine::unseen_light::room_without_floor;
 use crate::tests::light::skies::{a_patch_of_sun_keeps_its_rays, a_sun_that_shines_in_has_as_many_rays_as_without_openings, sky, sunny};
 use glam::dvec3;
-use photonmill::engine::scene::{RunResult, Target};
+use photonmill::engine::scene::{Receivers, RunResult};
 use photonmill::scene::sky::Sky;
 
 /// Half the edge of the hole, which has 1 % of 80 m2 of walls.
@@ -25,7 +25,7 @@ fn room_under_an_even_sky() -> Scene {
     room_under(0.5, LightKind::Environment { radiance: Vec3::ONE })
 }
 
-/// What shines with 1 W/m2/sr, as an even sky does in an opening.
+/// What emits 1 W/m2/sr, as an even sky does in an opening.
 fn opening(origin: DVec3, u: DVec3, v: DVec3) -> Rectangle {
     Rectangle { origin, u, v, albedo: DVec3::ZERO, emission: DVec3::ONE, blocks: false }
 }
@@ -37,8 +37,8 @@ fn points() -> Vec<(DVec3, DVec3)> {
     [-1.5, -0.5, 0.0, 0.5, 1.5].iter().flat_map(|x| [-1.5, 0.0, 1.5].map(|z| (dvec3(*x, 0.0, z), DVec3::Y))).collect()
 }
 
-fn lit(gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> RunResult {
-    render(gpu, scene, settings, Target::Points(&points())).unwrap()
+fn result_of(gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> RunResult {
+    render(gpu, scene, settings, Receivers::Points(&points())).unwrap()
 }
 
 fn settings(part: Part, aim: bool) -> SceneSettings {
@@ -78,9 +78,9 @@ fn lights_through_a_window(gpu: &Gpu, sky: &str, albedo: f32, picture: Sky, part
     assert!(sky == "sunny" || albedo == 0.0 || (scattered / SCATTERED - 1.0).abs() < 0.02, "{scattered}");
     for &part in parts {
         let settings = if part == Part::Direct { direct } else { indirect };
-        let [aimed, other] = [true, false].map(|aim| lit(gpu, &scene, &settings(aim)));
+        let [aimed, other] = [true, false].map(|aim| result_of(gpu, &scene, &settings(aim)));
         assert_eq!(aimed.plan.trial.as_ref().map(|trial| trial.openings.len()), Some(1), "{sky}, {part:?}");
-        let [little, much] = [&aimed, &other].map(|lit| lit.film.relative_error());
+        let [little, much] = [&aimed, &other].map(|result| result.film.relative_error());
         println!("{sky}, {part:?}: {:.2} % and {:.2} %", 100.0 * little, 100.0 * much);
         assert!((much / little).powi(2) > 10.0, "{sky}, {part:?}: {little} and {much}");
         // Paths seldom meet the sun, so that points together are asked for its light.
@@ -103,12 +103,12 @@ fn lights_through_a_window(gpu: &Gpu, sky: &str, albedo: f32, picture: Sky, part
 /// rounds.
 pub fn light_through_a_window(gpu: &Gpu) -> Check<Complaint> {
     let scene = room_under_an_even_sky();
-    let direct = lit(gpu, &scene, &SceneSettings { shadow_rays: 64, ..settings(Part::Direct, true) });
+    let direct = result_of(gpu, &scene, &SceneSettings { shadow_rays: 64, ..settings(Part::Direct, true) });
     let hole = opening(dvec3(-HALF, 3.0, -HALF), 2.0 * HALF * DVec3::X, 2.0 * HALF * DVec3::Z);
     let ((found, error), exact) = (red(&direct, 7), rectangles::direct(&[hole], DVec3::ZERO, DVec3::Y).x);
     assert!(error < 0.02 * found, "{found} +- {error}");
     estimate_check("below the hole", found, exact, error)?;
-    let indirect = lit(gpu, &scene, &settings(Part::Indirect, true));
+    let indirect = result_of(gpu, &scene, &settings(Part::Indirect, true));
     let errors: f64 = (0..points().len()).map(|point| red(&indirect, point).1).sum();
     estimate_check("scattered light", mean_red(&indirect), SCATTERED, errors / points().len() as f64)
 }
@@ -135,16 +135,16 @@ pub fn second_opening(gpu: &Gpu) -> Check<Complaint> {
     // Of the hole: from the middle of the point's view of it.
     let way = dvec3(0.15, 0.125, 0.0);
     let missing = 0.0009 * way.x * way.y / way.length_squared().powi(2);
-    let lit = render(gpu, &room, &by_rounds(), Target::Points(&points)).unwrap();
-    let hidden = lit.film.unknown(0.95).hidden;
-    println!("{hidden:?}, {missing} may be missing; {:?}", red(&lit, 200));
-    assert_eq!(lit.plan.trial.as_ref().map(|trial| trial.openings.len()), Some(1));
-    let (found, error) = red(&lit, 200);
+    let result = render(gpu, &room, &by_rounds(), Receivers::Points(&points)).unwrap();
+    let hidden = result.film.unknown(0.95).hidden;
+    println!("{hidden:?}, {missing} may be missing; {:?}", red(&result, 200));
+    assert_eq!(result.plan.trial.as_ref().map(|trial| trial.openings.len()), Some(1));
+    let (found, error) = red(&result, 200);
     assert!(found > 0.01 && error < 0.5 * missing, "the window alone: {found} +- {error}");
     if hidden.points < 150 || hidden.upper_bound < missing {
         return Err(Complaint::new(Kind::TooDark, format!("{missing} W/m2 may be missing, and {hidden:?} is known")));
     }
-    assert!(lit.film.unknown(0.95).text("point", "W/m2", 0.95, 16).contains("some part of the sky"));
+    assert!(result.film.unknown(0.95).text("point", "W/m2", 0.95, 16).contains("some part of the sky"));
     Ok(())
 }
 
@@ -154,7 +154,7 @@ pub fn second_opening(gpu: &Gpu) -> Check<Complaint> {
 fn a_second_opening_is_next_to_nothing_in_a_picture() {
     let Some(gpu) = device() else { return };
     let eye = Camera::looking_at("eye", dvec3(-1.9, 2.0, -1.9), dvec3(0.5, 0.5, 0.5), DVec3::Y, 1.0);
-    let seen = render(&gpu, &room_under_an_even_sky(), &by_rounds(), Target::Picture(&eye, [64, 64])).unwrap();
+    let seen = render(&gpu, &room_under_an_even_sky(), &by_rounds(), Receivers::Image(&eye, [64, 64])).unwrap();
     let hidden = seen.film.unknown(0.95).hidden;
     assert!(hidden.of_mean < 0.01, "{hidden:?}");
 }
@@ -167,7 +167,7 @@ fn an_open_scene_has_no_openings_and_the_same_bits(gpu: &Gpu) {
     assert_eq!(scene.meshes.len(), 2);
     // What they scatter is not asked for here: a black floor needs no photons in the trial.
     let black = Scene { materials: vec![matt(0.0)], ..scene.clone() };
-    let [aimed, other] = [true, false].map(|aim| lit(gpu, &black, &SceneSettings { rounds: 4, ..direct(aim) }));
+    let [aimed, other] = [true, false].map(|aim| result_of(gpu, &black, &SceneSettings { rounds: 4, ..direct(aim) }));
     assert!(aimed.plan.trial.as_ref().is_none_or(|trial| trial.openings.is_empty()));
     assert!(aimed.film.sums.iter().any(|sum| *sum > 0));
     assert_eq!(aimed.film.sums, other.film.sums);
@@ -208,7 +208,7 @@ pub fn sun_through_a_small_window(gpu: &Gpu) -> Check<Complaint> {
     let black = Material { two_sided: true, ..matt(0.0) };
     let scene = scene_of(meshes, vec![black], vec![LightKind::Sky(Arc::new(picture))]);
     let settings = SceneSettings { rounds: 64, shadow_rays: 4, ..direct(true) };
-    let aimed = render(gpu, &scene, &settings, Target::Points(&points)).unwrap();
+    let aimed = render(gpu, &scene, &settings, Receivers::Points(&points)).unwrap();
     assert!(aimed.plan.trial.as_ref().is_some_and(|trial| !trial.openings.is_empty()));
     // Without a least share of the table one point has a tenth of its light.
     for (number, (at, normal)) in points.iter().enumerate() {

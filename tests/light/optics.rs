@@ -39,7 +39,7 @@ fn along(gpu: &Gpu, scene: &Scene, eye: DVec3, side: u32) -> Vec<DVec3> {
     means(&seen(gpu, scene, &rays(1), &camera, [side, side]))
 }
 
-/// Mean of a channel where nothing is random: what shines behind a surface is seen by all its ways at once. Near the critical angle
+/// Mean of a channel where nothing is random: what emits light behind a surface is seen by all its ways at once. Near the critical angle
 /// single precision knows a direction to a thousandth of what it lets through.
 fn expect_exactly(family: &mut Family, what: String, found: &[DVec3], channel: usize, exact: f64) {
     let mean = found.iter().map(|seen| seen[channel]).sum::<f64>() / found.len() as f64;
@@ -64,7 +64,7 @@ fn glass_reflects_by_fresnel_up_to_the_horizon() {
         let found = along(&gpu, &over_glass(ior, 0.25, 0.0), slanting(angle, 1.0), 16);
         expect_exactly(&mut family, format!("reflected, index {ior}, {degrees} degrees"), &found, 1, reflectance(angle, ior));
     }
-    family.assert_tells_one_per_cent();
+    family.assert_detects_one_per_cent();
 }
 
 /// From inside, the sky is seen by (1 - F) n^2 short of the critical angle of 41.8103 degrees, as radiance is compressed, and not at
@@ -87,7 +87,7 @@ fn total_reflection_begins_at_the_critical_angle() {
             expect_exactly(&mut family, format!("seen from inside, {degrees} degrees"), &found, 1, passed);
         }
     }
-    family.assert_tells_one_per_cent();
+    family.assert_detects_one_per_cent();
 }
 
 /// An index of 1 is no surface: whatever the angle, nothing of the sky is reflected.
@@ -105,7 +105,7 @@ fn an_index_of_one_reflects_nothing_at_any_angle() {
 /// (1 - F)^2 F^2; everywhere else is dark. All of a wide lamp is (1 - F) / (1 + F).
 #[test]
 fn a_slab_shifts_a_slanting_ray() {
-    let (side, told, told_inside) = of_run((256, 0.03, 0.1), (1024, 0.01, 0.02));
+    let (side, detected, detected_inside) = of_run((256, 0.03, 0.1), (1024, 0.01, 0.02));
     let Some(gpu) = device() else { return };
     let mut family = Family::default();
     let (thickness, below) = (0.2, 0.4);
@@ -140,8 +140,8 @@ fn a_slab_shifts_a_slanting_ray() {
         }
     }
     let is_rare = |what: &str| what.contains("reflected inside");
-    family.assert_tells(told, |what| !is_rare(what));
-    family.assert_tells(told_inside, |what| what.ends_with("reflected inside"));
+    family.assert_detects(detected, |what| !is_rare(what));
+    family.assert_detects(detected_inside, |what| what.ends_with("reflected inside"));
 }
 
 /// Share of evenly scattered light that a surface lets through from outside: the integral of (1 - F) 2 sin cos.
@@ -188,11 +188,11 @@ fn diffuse_light_crosses_glass_by_its_mean_transmittance() {
         }
     }
     // What returns into the air is so little of the light that it notices less.
-    family.assert_tells(0.045, |what| !what.starts_with("back into the air"));
+    family.assert_detects(0.045, |what| !what.starts_with("back into the air"));
 }
 
 /// A spot light between two mirrors of reflectance 0.8, 1 m before the end of their corridor: the end is lit by all
-/// images, sum of 0.8^|n| I cos / d^2 over those whose ray leaves the lamp within its cone. Photons tell the mean over
+/// images, sum of 0.8^|n| I cos / d^2 over those whose ray leaves the lamp within its cone. Photons give the mean over
 /// a disc, here by a raster whose error is below 1e-4; shadow rays add the lamp's own part at the middle.
 #[test]
 fn images_light_the_end_of_a_corridor() {
@@ -235,12 +235,12 @@ fn images_light_the_end_of_a_corridor() {
     for &illumination in illuminations {
         let settings = SceneSettings { caustic_photons: 40_000, ..fixed_radius(illumination, 20_000, 24, 8, radius) };
         let points = [(DVec3::ZERO, DVec3::Z)];
-        let lit = received(&gpu, &scene, &optics(settings), &points);
+        let result = received(&gpu, &scene, &optics(settings), &points);
         let own = if illumination == Illumination::Split { image(0, 0.0, 0.0) } else { over_disc(&|x, y| image(0, x, y)) };
-        let (mean, error) = red(&lit, 0);
+        let (mean, error) = red(&result, 0);
         family.expect_estimate(format!("corridor, {illumination:?}"), mean, error, 24, own + reflected);
     }
-    family.assert_tells(0.02, |_| true);
+    family.assert_detects(0.02, |_| true);
 }
 
 const FOCUS: f64 = 0.5;
@@ -278,7 +278,7 @@ fn caustics(illumination: Illumination, radius: f64) -> SceneSettings {
 
 /// Light from the focus leaves a paraboloid parallel to its axis, so that a plane across it has the same irradiance at
 /// any distance: what leaves at the angle a to the axis arrives at r = 2 f tan(a / 2), hence
-/// I / f^2 / (1 + r^2 / 4 f^2)^2, and as the mean over a disc of radius h, which photons tell,
+/// I / f^2 / (1 + r^2 / 4 f^2)^2, and as the mean over a disc of radius h, which photons show,
 /// I / f^2 / (1 + h^2 / 4 f^2).
 /// The reverse, sunlight that meets in the focus, is tested by both illuminations.
 #[test]
@@ -292,12 +292,12 @@ fn light_from_a_focus_leaves_in_parallel() {
         let lamp = cone(DVec3::Y * FOCUS, DVec3::NEG_Y, 1.0);
         let scene = scene_of(vec![paraboloid(0), level(distance, [2.0; 2], false, 1)], vec![mirror(0.9), matt(0.0)], vec![lamp]);
         for &illumination in illuminations {
-            let lit = received(&gpu, &scene, &caustics(illumination, h), &[(DVec3::Y * distance, DVec3::NEG_Y)]);
-            let (mean, error) = red(&lit, 0);
+            let result = received(&gpu, &scene, &caustics(illumination, h), &[(DVec3::Y * distance, DVec3::NEG_Y)]);
+            let (mean, error) = red(&result, 0);
             family.expect_estimate(format!("{distance} m off, {illumination:?}"), mean, error, 24, expected);
         }
     }
-    family.assert_tells(0.02, |_| true);
+    family.assert_detects(0.02, |_| true);
 }
 
 /// All sunlight that enters a paraboloid along its axis passes its focus: through a disc of 1 cm there goes what the
@@ -312,11 +312,11 @@ fn sunlight_meets_in_the_focus() {
     let scene = scene_of(vec![paraboloid(0), level(FOCUS, [plate; 2], false, 1)], vec![mirror(0.9), matt(0.0)], vec![sun(DVec3::NEG_Y)]);
     let expected = 0.9 * (opening - plate * plate) / (PI * radius * radius);
     for illumination in BOTH {
-        let lit = received(&gpu, &scene, &caustics(illumination, radius), &[(DVec3::Y * FOCUS, DVec3::NEG_Y)]);
-        let (mean, error) = red(&lit, 0);
+        let result = received(&gpu, &scene, &caustics(illumination, radius), &[(DVec3::Y * FOCUS, DVec3::NEG_Y)]);
+        let (mean, error) = red(&result, 0);
         family.expect_estimate(format!("in the focus, {illumination:?}"), mean, error, 24, expected);
     }
-    family.assert_tells(0.02, |_| true);
+    family.assert_detects(0.02, |_| true);
 }
 
 /// An eye in the focus looks along the axis wherever it looks into the mirror: at the angle a it sees what lies
@@ -330,7 +330,7 @@ fn an_eye_in_the_focus_looks_in_parallel() {
         let off = 2.0 * FOCUS * (0.5 * angle).tan();
         let see = |middle: f64| {
             let lamp = Mesh::parallelogram("lamp", DVec3::new(middle - 0.01, distance, -1.0), DVec3::X * 0.02, DVec3::Z * 2.0, 1);
-            let scene = scene_of(vec![paraboloid(0), lamp], vec![mirror(0.9), shining(0.0)], vec![]);
+            let scene = scene_of(vec![paraboloid(0), lamp], vec![mirror(0.9), emissive(0.0)], vec![]);
             let eye = DVec3::Y * FOCUS;
             radiances(&gpu, &scene, &rays(1), eye, eye + DVec3::new(angle.sin(), -angle.cos(), 0.0), 32)
         };
@@ -339,5 +339,5 @@ fn an_eye_in_the_focus_looks_in_parallel() {
             assert!(see(off + beside).iter().all(|seen| *seen == 0.0), "{degrees} degrees, {distance} m off: light {beside} m beside");
         }
     }
-    family.assert_tells_one_per_cent();
+    family.assert_detects_one_per_cent();
 }

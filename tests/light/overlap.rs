@@ -2,8 +2,8 @@
 
 use crate::common::known::{kept, of_any_room};
 use crate::common::layered::{CLEAR, dull, layered, metal, plastic, row_of_texels, without_maps};
-use crate::common::lit::{around_hole, sides};
 use crate::common::prelude::*;
+use crate::common::rendered::{around_hole, sides};
 use photonmill::constants::HIDDEN;
 use photonmill::scene::material::{Coverage, Layers};
 use photonmill::scene::solids;
@@ -13,7 +13,7 @@ use photonmill::scene::texture::Filter;
 fn room() -> Scene {
     let mut meshes = sides(DVec3::new(-2.0, 0.0, -2.0), DVec3::new(4.0, 3.0, 4.0), true, [0; 6]);
     meshes.push(Mesh { name: "lamp".into(), ..level(2.5, [1.0; 2], false, 1) });
-    scene_of(meshes, vec![matt(0.6), shining(0.6)], vec![])
+    scene_of(meshes, vec![matt(0.6), emissive(0.6)], vec![])
 }
 
 /// Turned and moved, so that no coordinate is a round number.
@@ -49,8 +49,8 @@ fn points(height: f64) -> Vec<(DVec3, DVec3)> {
 
 /// Red irradiance at each point, with its standard error.
 fn irradiance(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, points: &[(DVec3, DVec3)]) -> Vec<(f64, f64)> {
-    let lit = received(gpu, scene, settings, points);
-    (0..points.len()).map(|point| red(&lit, point)).collect()
+    let result = received(gpu, scene, settings, points);
+    (0..points.len()).map(|point| red(&result, point)).collect()
 }
 
 fn settings() -> SceneSettings {
@@ -67,11 +67,11 @@ fn assert_lit_like(gpu: &Gpu, what: &str, settings: &SceneSettings, (scene, poin
 }
 
 /// A rug is lit as the floor is, however high it lies, however it is cut, and so is the floor beside it. And a lamp in the plane of the
-/// ceiling shines, by the same kernels.
+/// ceiling emits, by the same kernels.
 #[test]
 fn a_rug_on_the_floor_is_lit_like_the_floor() {
     let Some(gpu) = device() else { return };
-    a_lamp_in_the_plane_of_the_ceiling_shines(&gpu);
+    a_lamp_in_the_plane_of_the_ceiling_emits(&gpu);
     for room in [with_overlap_outside(room()), room()].into_iter().take(of_run(1, 2)) {
         let expected = irradiance(&gpu, &room, &settings(), &points(0.0));
         let heights = [(0.0, 1), (0.0, 7), (1e-7, 1), (1e-6, 1), (1e-5, 7), (3e-5, 1), (1e-4, 1), (1e-3, 1)];
@@ -97,9 +97,9 @@ fn other_diagonal(mut mesh: Mesh) -> Mesh {
     mesh
 }
 
-/// A lamp that was exported twice shines once, by photons and by shadow rays, and the warning names both.
+/// A lamp that was exported twice emits once, by photons and by shadow rays, and the warning names both.
 #[test]
-fn a_lamp_that_is_given_twice_shines_once() {
+fn a_lamp_that_is_given_twice_emits_once() {
     let Some(gpu) = device() else { return };
     let power = Geometry::new(&room()).unwrap().power;
     for illumination in BOTH {
@@ -122,7 +122,7 @@ fn a_lamp_that_is_given_twice_shines_once() {
 }
 
 /// A lamp that is a part of the ceiling's plane is seen in full from wherever, and lights the room as one a hair below.
-fn a_lamp_in_the_plane_of_the_ceiling_shines(gpu: &Gpu) {
+fn a_lamp_in_the_plane_of_the_ceiling_emits(gpu: &Gpu) {
     let with_lamp = |height: f64| {
         let mut scene = room();
         scene.meshes[6] = Mesh { name: "lamp".into(), ..level(height, [1.0; 2], false, 1) };
@@ -176,9 +176,9 @@ fn sheets_in_one_plane_cover_their_union() {
     closed.materials[0] = matt(0.9);
     closed.meshes.extend([carpet(0.1, 0.2, 2.0, 7), carpet(0.9, 0.0, 1.5, 3)]);
     let (closed, points) = turned(true, closed, &points(0.0)[..1]);
-    let lit = received(&gpu, &closed, &kept(flights(50_000, 8)), &points);
-    let fates = lit.fates[0].ledger();
-    assert!(fates.escaped == 0, "{} photons of {} left the room", fates.escaped, lit.fates[0].emitted);
+    let result = received(&gpu, &closed, &kept(flights(50_000, 8)), &points);
+    let fates = result.fates[0].ledger();
+    assert!(fates.escaped == 0, "{} photons of {} left the room", fates.escaped, result.fates[0].emitted);
 }
 
 /// What touches, stands on, crosses, rises from or lies back to back is no overlap, and neither is what lies a hair above.
@@ -317,8 +317,8 @@ pub fn floor_beside(gpu: &Gpu, what: &str, other: Material) -> Check<Complaint> 
     let half = |x: f64, material: usize| Mesh::parallelogram("half", DVec3::new(x, 0.0, 0.0), DVec3::Z, DVec3::X * 0.5, material);
     let points = [(DVec3::new(0.499, 0.0, 0.5), DVec3::Y), (DVec3::new(0.25, 0.0, 0.5), DVec3::Y)];
     let scene = scene_of(vec![half(0.0, 0), half(0.5, 1)], vec![matt(0.5), other], vec![LightKind::Environment { radiance: Vec3::ONE }]);
-    let lit = received(gpu, &scene, &mapped(20_000, 16, 2, 0.1), &points);
-    (0..2).try_for_each(|place| red_check(&format!("a floor beside {what}"), &lit, place, PI, [0.05, 0.0]))
+    let result = received(gpu, &scene, &mapped(20_000, 16, 2, 0.1), &points);
+    (0..2).try_for_each(|place| red_check(&format!("a floor beside {what}"), &result, place, PI, [0.05, 0.0]))
 }
 
 #[test]
@@ -369,9 +369,9 @@ fn a_liquid_that_fills_its_vessel_neither_gains_nor_loses_light() {
     let camera = Camera::looking_at("eye", DVec3::new(0.0, 2.5, 1.8), DVec3::new(0.0, 0.5, 0.0), DVec3::Y, 0.7);
     let mean = |two_sided: bool, thick: bool, sunk: f64| {
         let scene = vessel(two_sided, thick, sunk);
-        let lit = seen(&gpu, &scene, &SceneSettings { samples: 4, bounces: 64, ..brief() }, &camera, [8, 8]);
-        let error = standard_errors(&lit).iter().map(|error| error.x.powi(2)).sum::<f64>().sqrt() / 64.0;
-        (mean_red(&lit), error)
+        let result = seen(&gpu, &scene, &SceneSettings { samples: 4, bounces: 64, ..brief() }, &camera, [8, 8]);
+        let error = standard_errors(&result).iter().map(|error| error.x.powi(2)).sum::<f64>().sqrt() / 64.0;
+        (mean_red(&result), error)
     };
     // Of thick walls only the sides are there, so that some light is lost between them.
     for (two_sided, thick) in [(true, false), (false, true)].into_iter().filter(|(_, thick)| all || !thick) {
@@ -424,11 +424,11 @@ fn a_block_that_stands_out_of_water_catches_no_light() {
     let ceiling = Mesh::parallelogram("ceiling", DVec3::Y, DVec3::X, DVec3::Z, 3);
     let water = cuboid("water", DVec3::ZERO, DVec3::new(1.0, 0.25, 1.0), 1);
     let block = cuboid("block", DVec3::new(0.15, 0.025, 0.15), DVec3::new(0.45, 0.4, 0.45), 2);
-    let shining = Material { emission: Vec3::splat(0.5), ..matt(0.5) };
-    let scene = scene_of(vec![walls, ceiling, water, block], vec![matt(1.0), clear_solid(1.33), clear_solid(1.6), shining], vec![]);
+    let emissive = Material { emission: Vec3::splat(0.5), ..matt(0.5) };
+    let scene = scene_of(vec![walls, ceiling, water, block], vec![matt(1.0), clear_solid(1.33), clear_solid(1.6), emissive], vec![]);
     let camera = Camera::looking_at("eye", DVec3::new(0.9, 0.85, 0.9), DVec3::splat(0.3), DVec3::Y, 1.22);
-    let lit = seen(&gpu, &scene, &SceneSettings { samples: 16, rounds: 32, ..brief() }, &camera, [8, 8]);
-    let found: Vec<(f64, f64)> = (0..64).map(|pixel| red(&lit, pixel)).collect();
+    let result = seen(&gpu, &scene, &SceneSettings { samples: 16, rounds: 32, ..brief() }, &camera, [8, 8]);
+    let found: Vec<(f64, f64)> = (0..64).map(|pixel| red(&result, pixel)).collect();
     let mean = found.iter().map(|(mean, _)| mean).sum::<f64>() / 64.0;
     println!("a block in water: {mean}, {found:?}");
     assert!((mean - 1.0).abs() < 0.02, "{mean}");
@@ -457,8 +457,8 @@ fn a_decal_in_the_plane_of_a_wall_is_seen_where_its_alpha_is() {
         let mut scene = scene_of(meshes, materials, vec![LightKind::Environment { radiance: Vec3::ONE }]);
         scene.textures = vec![halves.clone()];
         let camera = Camera::looking_at("above", DVec3::Y * 10.0, DVec3::ZERO, DVec3::NEG_Z, 0.08);
-        let lit = seen(&gpu, &scene, &without_photons(), &camera, [4, 4]);
-        let means: Vec<f64> = means(&lit).iter().map(|mean| mean.x).collect();
+        let result = seen(&gpu, &scene, &without_photons(), &camera, [4, 4]);
+        let means: Vec<f64> = means(&result).iter().map(|mean| mean.x).collect();
         // The left half has gaps, the right half none.
         for (place, mean) in means.iter().enumerate() {
             let expected = if place % 4 < 2 { 0.5 } else { 0.0 };
@@ -530,8 +530,8 @@ fn many_solids_in_one_another_each_count_or_are_refused() {
     assert_eq!(bits(&alike).unwrap(), 1);
     let Some(gpu) = device() else { return };
     let camera = Camera::looking_at("eye", DVec3::Z * 6.0, DVec3::ZERO, DVec3::Y, 0.3);
-    let lit = seen(&gpu, &nested_balls(6), &SceneSettings { samples: 4, rounds: 4, ..without_photons() }, &camera, [8, 8]);
-    let means: Vec<f64> = means(&lit).iter().map(|mean| mean.x).collect();
+    let result = seen(&gpu, &nested_balls(6), &SceneSettings { samples: 4, rounds: 4, ..without_photons() }, &camera, [8, 8]);
+    let means: Vec<f64> = means(&result).iter().map(|mean| mean.x).collect();
     // Few paths at rims end before they are out.
     assert!(means.iter().all(|mean| (mean - 1.0).abs() < 0.1), "{means:?}");
 }
@@ -539,7 +539,7 @@ fn many_solids_in_one_another_each_count_or_are_refused() {
 /// What a surface of the table is made of.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Made {
-    Matt,
+    Rough,
     Mirror,
     Metal,
     SolidGlass,
@@ -551,14 +551,14 @@ enum Made {
 }
 
 const MADE: [Made; 9] =
-    [Made::Matt, Made::Mirror, Made::Metal, Made::SolidGlass, Made::ThinGlass, Made::HalfAlpha, Made::Mask, Made::Unlit, Made::Lamp];
+    [Made::Rough, Made::Mirror, Made::Metal, Made::SolidGlass, Made::ThinGlass, Made::HalfAlpha, Made::Mask, Made::Unlit, Made::Lamp];
 
 impl Made {
     /// `colour` multiplies what it gives back.
     fn material(self, colour: f32) -> Material {
         let grey = Vec3::splat(colour);
         let of = match self {
-            Made::Matt => matt(colour),
+            Made::Rough => matt(colour),
             Made::Mirror => mirror(colour),
             Made::Metal => layered(grey, &metal(0.0)),
             Made::SolidGlass => clear_solid(1.5),
@@ -630,16 +630,16 @@ fn seen_of_table(gpu: &Gpu, scene: &Scene, rows: usize, from: f64) -> Vec<(f64, 
     let camera = Camera::looking_at("table", DVec3::Y * from * distance, DVec3::ZERO, DVec3::NEG_Z, angle);
     let settings = SceneSettings { samples: 64, rounds: 8, photons: 20_000, caustic_photons: 20_000, ..brief() };
     let columns = 2 * rows;
-    let lit = seen(gpu, scene, &settings, &camera, [columns as u32, rows as u32]);
+    let result = seen(gpu, scene, &settings, &camera, [columns as u32, rows as u32]);
     let place = |row: usize, column: usize| columns * row + if from > 0.0 { column } else { columns - 1 - column };
-    (0..rows * columns).map(|k| red(&lit, place(k / columns, k % columns))).collect()
+    (0..rows * columns).map(|k| red(&result, place(k / columns, k % columns))).collect()
 }
 
 /// Each of these kinds of surface against each other in one plane: none gains or loses light, from whichever side.
 /// Glass has kernels of its own: short tests of it are those of a liquid in its vessel and of solids that touch.
 #[test]
 fn surfaces_in_one_plane_keep_the_light_of_a_furnace() {
-    let kinds = of_run::<&[_]>(&[Made::Matt, Made::Mirror], &MADE);
+    let kinds = of_run::<&[_]>(&[Made::Rough, Made::Mirror], &MADE);
     let Some(gpu) = device() else { return };
     let scene = table(kinds, 0.0, [1.0; 2]);
     let mut complaints = Vec::new();
@@ -701,9 +701,9 @@ fn solids_that_meet_in_one_plane_keep_the_light_of_a_furnace() {
     for meshes in [[&large, &above, &flush], [&above, &flush, &large]] {
         let mut scene = furnace_with(meshes.map(Clone::clone).to_vec(), [1.33, 1.6, 1.47].map(clear_solid).to_vec());
         scene.materials[0] = Material { emission: Vec3::splat(0.1), ..matt(0.9) };
-        let lit = seen(&gpu, &scene, &SceneSettings { samples: 4, rounds: 16, bounces: 256, ..brief() }, &camera, [8, 8]);
-        println!("three blocks: {}", mean_red(&lit));
-        assert!((mean_red(&lit) - 1.0).abs() < 0.03, "{}", mean_red(&lit));
+        let result = seen(&gpu, &scene, &SceneSettings { samples: 4, rounds: 16, bounces: 256, ..brief() }, &camera, [8, 8]);
+        println!("three blocks: {}", mean_red(&result));
+        assert!((mean_red(&result) - 1.0).abs() < 0.03, "{}", mean_red(&result));
     }
 }
 
@@ -736,7 +736,7 @@ fn light_goes_from_solid_to_solid_without_air_between() {
     ];
     for (what, meshes, indices) in cases {
         let lamp = level(-1.0, [3.0; 2], true, 0);
-        let materials = vec![shining(0.0), clear_solid(1.5), clear_solid(1.33)];
+        let materials = vec![emissive(0.0), clear_solid(1.5), clear_solid(1.33)];
         let scene = scene_of([vec![lamp], meshes].concat(), materials, vec![]);
         let settings = without_maps(SceneSettings { rounds: 8, samples: 4, ..by_rounds() });
         let found = radiances(&gpu, &scene, &settings, DVec3::new(0.01, 3.0, 0.02), DVec3::new(0.01, 0.0, 0.02), 8);

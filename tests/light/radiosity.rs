@@ -6,11 +6,11 @@ use std::sync::OnceLock;
 
 use crate::common::family::chi_squared_z;
 use crate::common::known::kept;
-use crate::common::lit::light;
 use crate::common::prelude::*;
+use crate::common::rendered::light;
 use photonmill::bake::{Layout, Map, TexelEstimate, estimates};
 use photonmill::engine::room::film::estimate_walls;
-use photonmill::engine::scene::View;
+use photonmill::engine::scene::Viewpoint;
 use photonmill::verify::judge::radiosity::{ByLamp, Law, Radiosity, WALLS, cells_of, exchange, form_factor_from, inward, on_wall};
 
 const ALBEDO: f64 = 0.75;
@@ -193,7 +193,7 @@ fn pattern_z(counts: &Counts, order: usize, chance: impl Fn(usize) -> ByLamp) ->
 /// Stored photons of each order, of each order and wall, and in squares of 1/16 m, for 262 144 photons a seed: g_(k+1) = K g_k, a
 /// photon being stored at order k with the chance albedo g_k.
 ///
-/// A share is noticed that is wrong by `told` in the orders up to the fourth, which have 86 % of all photons, and by twice that in what
+/// A share is noticed that is wrong by `detected` in the orders up to the fourth, which have 86 % of all photons, and by twice that in what
 /// a wall stores of the first; the later ones have too few for that and notice what is printed. A pattern is noticed that is brighter by twice as much at
 /// one end of each wall than in the middle, up to the third order.
 ///
@@ -201,7 +201,7 @@ fn pattern_z(counts: &Counts, order: usize, chance: impl Fn(usize) -> ByLamp) ->
 /// (`tests/engine/strict.rs`).
 #[test]
 fn photons_of_every_order_land_as_radiosity_says() {
-    let (seeds, told) = of_run((4, 0.02), (16, 0.01));
+    let (seeds, detected) = of_run((4, 0.02), (16, 0.01));
     let gpu = device();
     for (law, emission, builder) in ways(gpu.as_ref()) {
         let solution = solution(law);
@@ -230,40 +230,40 @@ fn photons_of_every_order_land_as_radiosity_says() {
             family.expect(format!("{what}, pattern"), z, 0.0, 1.0);
             let tilt = |square: usize| {
                 let end = (square % SQUARES) as f64 / (0.5 * (SQUARES as f64 - 1.0)) - 1.0;
-                of_squares[square].map(|chance| chance * (1.0 + 2.0 * told * end))
+                of_squares[square].map(|chance| chance * (1.0 + 2.0 * detected * end))
             };
             let tilted = pattern_z(&counts, order, tilt);
-            assert!(order >= 3 || tilted > 6.0, "{what}: a tilt by {told} is not noticed, z = {tilted}");
+            assert!(order >= 3 || tilted > 6.0, "{what}: a tilt by {detected} is not noticed, z = {tilted}");
         }
         let is_bright = |what: &str| (1..=4).any(|order| what.ends_with(&format!("order {order}")));
-        family.assert_tells(told, is_bright);
-        family.assert_tells(2.0 * told, |what| what.contains("order 1, wall"));
+        family.assert_detects(detected, is_bright);
+        family.assert_detects(2.0 * detected, |what| what.contains("order 1, wall"));
     }
 }
 
 /// Irradiance of the film, W/m2, from stored photons over the albedo, in 64 discs of 3 cm a wall: direct light by
 /// intensity * cosine / distance^2, the rest by the walls' radiosity and the exact form factors of a point, each as the
-/// mean over the disc, which is what photons within a radius tell. The mean of a wall notices `told`.
+/// mean over the disc, which is what photons within a radius show. The mean of a wall notices `detected`.
 #[test]
 fn the_film_has_the_irradiance_of_radiosity() {
-    let (photons, told) = of_run((1 << 15, 0.03), (1 << 18, 0.01));
+    let (photons, detected) = of_run((1 << 15, 0.03), (1 << 18, 0.01));
     let gpu = device();
     for (law, emission, builder) in ways(gpu.as_ref()) {
         let rounds = 16;
         let settings = RoomSettings { photons, rounds, seed: 7, ..settings(builder, emission) };
-        let outcome = match gpu.as_ref().filter(|_| builder != Builder::Cpu) {
+        let result = match gpu.as_ref().filter(|_| builder != Builder::Cpu) {
             Some(gpu) => run(gpu, &settings),
             None => run_on_cpu(&settings),
         };
         let mut family = Family::default();
-        for (k, wall) in estimate_walls(&outcome.film, &open_box(&settings), &outcome.plan).into_iter().enumerate() {
+        for (k, wall) in estimate_walls(&result.film, &open_box(&settings), &result.plan).into_iter().enumerate() {
             let exact: f64 = disc_middles().map(|at| solution(law).over_disc(k, at, DISC_RADIUS)).sum();
             // Few photons are stored in two discs of a wall.
             let error = wall.irradiance_error.iter().map(|error| error * error).sum::<f64>().sqrt();
             let what = format!("{law:?}, {}, wall {k}", builder.name());
             family.expect_estimate(what, wall.irradiance.iter().sum(), error, rounds, exact);
         }
-        family.assert_tells(told, |_| true);
+        family.assert_detects(detected, |_| true);
     }
 }
 
@@ -304,7 +304,7 @@ fn the_box_of_triangles_has_the_irradiance_of_radiosity() {
             let means: Vec<f64> = runs.iter().map(|run| run[of_wall.clone()].iter().map(|light| light.x).sum()).collect();
             family.expect_mean(format!("{law:?}, {illumination:?}, {builder:?}, wall {wall}"), &means, expected);
         }
-        family.assert_tells_one_per_cent();
+        family.assert_detects_one_per_cent();
     }
 }
 
@@ -326,8 +326,8 @@ fn baked_box(gpu: &Device, illumination: Illumination, has_set: bool) -> (Layout
     let phases = layout.receivers(settings.rounds, &geometry);
     let sensor = Sensor::Receivers { count: layout.texel_count() as u32 };
     let plan = ScenePlan::new(&scene, &geometry, &settings, sensor, &engine::limits(gpu.facts())).unwrap();
-    let lit = light(gpu, &View { geometry: &geometry, camera: None, phases: &phases }, plan);
-    (layout, estimates(&lit))
+    let result = light(gpu, &Viewpoint { geometry: &geometry, camera: None, phases: &phases }, plan);
+    (layout, estimates(&result))
 }
 
 /// Texels of all walls, each with the points that it is looked at in.
@@ -380,9 +380,9 @@ fn the_baked_box_has_the_irradiance_of_the_room() {
         rng: Rng::Philox,
         ..RoomSettings::default()
     };
-    let outcome = run(&gpu, &room_settings);
+    let result = run(&gpu, &room_settings);
     let room = open_box(&room_settings);
-    let walls = estimate_walls(&outcome.film, &room, &outcome.plan);
+    let walls = estimate_walls(&result.film, &room, &result.plan);
     let (layout, estimates) = baked_box(&gpu, Illumination::Photons, true);
     let in_room = |(wall, points): &(usize, Vec<DVec3>)| {
         let rectangle = room.rectangle(walls[*wall].face);

@@ -9,10 +9,10 @@ use std::fmt::Write;
 use std::sync::atomic::AtomicBool;
 
 use crate::common::known::of_any_room;
-use crate::common::lit::light;
 use crate::common::prelude::*;
 use crate::common::rectangles::{Radiosity, Rectangle};
-use photonmill::engine::scene::{Target, View, bias, trial};
+use crate::common::rendered::light;
+use photonmill::engine::scene::{Receivers, Viewpoint, bias, trial};
 use photonmill::plan::radius::mean_squared_radius;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -304,18 +304,20 @@ const ROUNDS: u32 = 16;
 const PHOTONS: u32 = 1 << 14;
 
 /// All points of a seed's rooms.
-fn lit_rooms(gpu: &Gpu, seed: u64, with_bias: bool) -> Vec<Found> {
+fn points_of_rooms(gpu: &Gpu, seed: u64, with_bias: bool) -> Vec<Found> {
     let rooms = rooms(seed);
     let (scene, points) = scene_of_rooms(&rooms, seed);
     let settings = of_any_room(SceneSettings { photons: PHOTONS, rounds: ROUNDS, seed, ..by_rounds() });
-    let (geometry, target) = (Geometry::new(&scene).unwrap(), Target::Points(&points));
-    let view = View { geometry: &geometry, camera: None, phases: &target.phases(&geometry) };
-    let lit = light(gpu, &view, trial::plan(gpu, &scene, &view, &settings, target.sensor()).unwrap());
+    let (geometry, receivers) = (Geometry::new(&scene).unwrap(), Receivers::Points(&points));
+    let viewpoint = Viewpoint { geometry: &geometry, camera: None, phases: &receivers.phases(&geometry) };
+    let result = light(gpu, &viewpoint, trial::plan(gpu, &scene, &viewpoint, &settings, receivers.sensor()).unwrap());
     let radii = mean_squared_radius(settings.alpha, ROUNDS).sqrt();
-    let bias = with_bias.then(|| bias::measure(gpu, &scene, &view, &lit.plan, (radii, 1), &AtomicBool::new(false)).unwrap().unwrap());
+    let bias =
+        with_bias.then(|| bias::measure(gpu, &scene, &viewpoint, &result.plan, (radii, 1), &AtomicBool::new(false)).unwrap().unwrap());
     // The same at all points, as it is stated for all of them.
-    let bias = bias.map_or(0.0, |bias| bias.relative / lit.film.measure().relative_to_mean(1.0) / (3.0 * lit.film.pixels() as f64).sqrt());
-    let unseen = lit.film.unseen_bounds();
+    let bias =
+        bias.map_or(0.0, |bias| bias.relative / result.film.measure().relative_to_mean(1.0) / (3.0 * result.film.pixels() as f64).sqrt());
+    let unseen = result.film.unseen_bounds();
     let mut all = Vec::new();
     for room in &rooms {
         for (own, expected) in pairs(&room.points, expected(room)) {
@@ -323,7 +325,7 @@ fn lit_rooms(gpu: &Gpu, seed: u64, with_bias: bool) -> Vec<Found> {
             let channel = point % 3;
             all.push(expected.map(|light| {
                 let [expected, tolerance] = light.map(|light| light[channel]);
-                let [found, noise] = [lit.film.mean(point), lit.film.stated_error(point)].map(|light| light[channel]);
+                let [found, noise] = [result.film.mean(point), result.film.stated_error(point)].map(|light| light[channel]);
                 let place = place(room, *own, rooms.len() > 1);
                 Found { seed, point, place, expected, tolerance, found, noise, bias, unseen: unseen(point) }
             }));
@@ -414,7 +416,7 @@ fn histogram(z: &[f64]) -> String {
 #[test]
 fn few_hits_say_little_of_colours_that_they_lack() {
     let Some(gpu) = device() else { return };
-    let found = lit_rooms(&gpu, 105, false);
+    let found = points_of_rooms(&gpu, 105, false);
     assert_holds("room 105", judge(&found));
     let rare: Vec<Found> = found.iter().filter(|found| found.found < 0.1 * found.expected).copied().collect();
     assert!(!rare.is_empty(), "all colours were found: look for another room");
@@ -432,12 +434,12 @@ fn two_hundred_random_rooms_are_right_within_their_errors() {
             room.shown.iter().for_each(|rectangle| println!("{rectangle:?}"));
             room.points.iter().for_each(|point| println!("{point:?}"));
         }
-        let found = lit_rooms(&gpu, seed, false);
+        let found = points_of_rooms(&gpu, seed, false);
         found.iter().for_each(|found| print!("{}", found.line()));
         assert!(found.iter().all(|found| found.z().abs() < MOST), "a point of this room is off by more than {MOST}");
         return;
     }
-    let found: Vec<Found> = (0..200).flat_map(|seed| lit_rooms(&gpu, seed, true)).collect();
+    let found: Vec<Found> = (0..200).flat_map(|seed| points_of_rooms(&gpu, seed, true)).collect();
     let unknown = found.iter().filter(|found| found.noise.is_infinite()).count();
     println!("{} points, {unknown} of them without light and without a stated error", found.len());
     let plain: Vec<Found> = found.iter().map(|found| Found { bias: 0.0, ..*found }).collect();

@@ -9,12 +9,12 @@
 use std::fmt::Write;
 
 use crate::common::known::kept;
-use crate::common::lit::{around_hole, sides};
 use crate::common::prelude::*;
 use crate::common::rectangles::{self, Rectangle};
+use crate::common::rendered::{around_hole, sides};
 use crate::common::sources::read;
 use glam::dvec3;
-use photonmill::engine::scene::{RunResult, Target};
+use photonmill::engine::scene::{Receivers, RunResult};
 use photonmill::settings::stop::LEAST_BLOCKS;
 
 struct Case {
@@ -128,7 +128,7 @@ fn even(meshes: Vec<Mesh>, materials: Vec<Material>, radiance: f64) -> Setup {
 /// A cavity that emits with radiance 1 and scatters this share, at points inside, where light has met its walls so many times.
 fn after_bounces(albedo: f32, bounces: u32) -> Setup {
     let radiance = (0..bounces).map(|bounce| f64::from(albedo).powi(bounce as i32)).sum();
-    let setup = even(room(DVec3::ZERO, 1.0, 0), vec![shining(albedo)], radiance);
+    let setup = even(room(DVec3::ZERO, 1.0, 0), vec![emissive(albedo)], radiance);
     let settings = SceneSettings { bounces, illumination: Illumination::Photons, radius: Some(0.3), alpha: 1.0, ..usual() };
     Setup { sure: 0.05, ..with(settings, setup) }
 }
@@ -167,7 +167,7 @@ const CASES: &[Case] = &[
         let mut meshes = room(DVec3::ZERO, 1.0, 0);
         meshes.push(Mesh::parallelogram("wall", dvec3(0.5, 0.0, 0.0), DVec3::Y, DVec3::Z, 1));
         meshes.push(Mesh::parallelogram("lamp", dvec3(0.65, 0.99, 0.4), DVec3::X * 0.2, DVec3::Z * 0.2, 2));
-        let scene = scene_of(meshes, vec![matt(0.5), Material { two_sided: true, ..matt(0.5) }, shining(0.0)], vec![]);
+        let scene = scene_of(meshes, vec![matt(0.5), Material { two_sided: true, ..matt(0.5) }, emissive(0.0)], vec![]);
         perhaps(points(scene, [1e-4, 1e-3, 1e-2].map(|d| (dvec3(0.5 - d, 0.0, 0.5), UP, 0.0)).into()))
     } },
     Case { family: "too near", name: "the dark floor behind walls of 1 mm, 1 cm, leaning, of 3200 triangles", setup: || {
@@ -185,7 +185,7 @@ const CASES: &[Case] = &[
             meshes.extend(moved(scene_of([room(DVec3::ZERO, 1.0, 0), walls, vec![lamp.clone()]].concat(), vec![], vec![]), |at| at + way).meshes);
             asked.extend([1e-5, 1e-4, 1e-3, 1e-2, 0.05].iter().flat_map(|behind| [0.01, 0.3, 0.6, 0.999].map(|z| (way + dvec3(0.5 + behind, 0.0, z), UP, 0.0))));
         }
-        perhaps(points(scene_of(meshes, vec![matt(0.7), Material { two_sided: true, ..matt(0.7) }, shining(0.5)], vec![]), asked))
+        perhaps(points(scene_of(meshes, vec![matt(0.7), Material { two_sided: true, ..matt(0.7) }, emissive(0.5)], vec![]), asked))
     } },
     Case { family: "too far", name: "a lamp of 1 km at 100 km", setup: || {
         plates(&[floor(2.0), level_lamp(UP * 1e5, 1e3, 1e3, 1.0)], &[(DVec3::ZERO, UP), (DVec3::X * 0.9, UP)])
@@ -329,9 +329,9 @@ const CASES: &[Case] = &[
         setup.scene.materials.push(Material { two_sided: true, ..grey(0.8, 1.0) });
         long(setup)
     } },
-    Case { family: "degenerate", name: "a single triangle that shines", setup: || {
+    Case { family: "degenerate", name: "a single emissive triangle", setup: || {
         let corners = [dvec3(0.0, 1.0, 0.0), dvec3(1.0, 1.0, 0.0), dvec3(0.0, 1.0, 1.0)];
-        points(scene_of(vec![triangle(corners)], vec![shining(0.0)], vec![]), vec![(DVec3::ZERO, UP, triangle_irradiance(corners))])
+        points(scene_of(vec![triangle(corners)], vec![emissive(0.0)], vec![]), vec![(DVec3::ZERO, UP, triangle_irradiance(corners))])
     } },
     Case { family: "degenerate", name: "a single triangle under a point light", setup: || {
         let floor = triangle([DVec3::ZERO, DVec3::Z, DVec3::X]);
@@ -433,29 +433,30 @@ fn found(gpu: &Gpu, setup: &Setup) -> Vec<[f64; 4]> {
     match &setup.asked {
         Asked::Points(asked) => {
             let points: Vec<(DVec3, DVec3)> = asked.iter().map(|(at, normal, _)| (*at, *normal)).collect();
-            let lit = render(gpu, &setup.scene, &setup.settings, Target::Points(&points)).unwrap();
-            let found =
-                |k: usize| [0, 1, 2].map(|channel| [asked[k].2, lit.film.mean(k)[channel], error(&lit, k)[channel], unseen(&lit, k)]);
+            let result = render(gpu, &setup.scene, &setup.settings, Receivers::Points(&points)).unwrap();
+            let found = |k: usize| {
+                [0, 1, 2].map(|channel| [asked[k].2, result.film.mean(k)[channel], error(&result, k)[channel], unseen(&result, k)])
+            };
             (0..asked.len()).flat_map(found).collect()
         }
         Asked::Picture(camera, size, expected) => {
-            let lit = render(gpu, &setup.scene, &setup.settings, Target::Picture(camera, *size)).unwrap();
+            let result = render(gpu, &setup.scene, &setup.settings, Receivers::Image(camera, *size)).unwrap();
             // Pixels share their photons: as if their errors were one.
-            let errors = (0..lit.film.pixels()).map(|pixel| error(&lit, pixel).x);
-            let unseen = (0..lit.film.pixels()).map(|pixel| unseen(&lit, pixel)).fold(0.0, f64::max);
-            vec![[*expected, mean_red(&lit), errors.sum::<f64>() / lit.film.pixels() as f64, unseen]]
+            let errors = (0..result.film.pixels()).map(|pixel| error(&result, pixel).x);
+            let unseen = (0..result.film.pixels()).map(|pixel| unseen(&result, pixel)).fold(0.0, f64::max);
+            vec![[*expected, mean_red(&result), errors.sum::<f64>() / result.film.pixels() as f64, unseen]]
         }
     }
 }
 
 /// What is stated, or where too few rounds are asked for that, their spread.
-fn error(lit: &RunResult, place: usize) -> DVec3 {
-    if lit.film.blocks < LEAST_BLOCKS { lit.film.standard_error(place) } else { lit.film.stated_error(place) }
+fn error(result: &RunResult, place: usize) -> DVec3 {
+    if result.film.blocks < LEAST_BLOCKS { result.film.standard_error(place) } else { result.film.stated_error(place) }
 }
 
 /// The bound of what nothing has met there, which is stated beside the error.
-fn unseen(lit: &RunResult, place: usize) -> f64 {
-    lit.film.unseen_bounds()(place)
+fn unseen(result: &RunResult, place: usize) -> f64 {
+    result.film.unseen_bounds()(place)
 }
 
 /// Relative error of what is not random.

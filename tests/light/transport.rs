@@ -2,11 +2,11 @@
 //! up, effects that are missed, and plans that the device's work is counted against.
 
 use crate::common::layered::{self, map_of, row_of_texels};
-use crate::common::lit::{Viewed, light};
 use crate::common::pairwise::pairwise;
 use crate::common::prelude::*;
+use crate::common::rendered::{Viewed, light};
 use photonmill::constants::GATHER_SLICE;
-use photonmill::engine::scene::{self, RunResult, Target, View};
+use photonmill::engine::scene::{self, Receivers, RunResult, Viewpoint};
 use photonmill::scene::Projection;
 use photonmill::scene::material::{Coverage, Layers, Medium};
 use photonmill::scene::texture::Filter;
@@ -20,13 +20,13 @@ fn small() -> SceneSettings {
 }
 
 fn picture(gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> RunResult {
-    lit(gpu, scene, settings, Target::Picture(&scene.first_camera(), [SIZE; 2]))
+    result_of(gpu, scene, settings, Receivers::Image(&scene.first_camera(), [SIZE; 2]))
 }
 
 /// A run of a scene without what the settings leave out.
-fn lit(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, target: Target) -> RunResult {
-    let (geometry, plan) = scene_plan(gpu, scene, settings, target.sensor()).unwrap();
-    light(gpu, &View { geometry: &geometry, camera: target.camera(), phases: &target.phases(&geometry) }, plan)
+fn result_of(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, receivers: Receivers) -> RunResult {
+    let (geometry, plan) = scene_plan(gpu, scene, settings, receivers.sensor()).unwrap();
+    light(gpu, &Viewpoint { geometry: &geometry, camera: receivers.camera(), phases: &receivers.phases(&geometry) }, plan)
 }
 
 fn same_film(what: &str, found: &RunResult, expected: &RunResult) -> Check<Complaint> {
@@ -39,7 +39,7 @@ pub fn appends_agree(gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> Chec
     let viewed = Viewed::new(scene.clone());
     let of = |builder| {
         let settings = SceneSettings { builder: Some(builder), ..settings.clone() };
-        viewed.lit(gpu, viewed.planned(gpu, &settings, square_picture(SIZE)))
+        viewed.run(gpu, viewed.planned(gpu, &settings, square_picture(SIZE)))
     };
     let ballot = of(Builder::Ballot);
     let mut others = Builder::ON_GPU.into_iter().filter(|builder| *builder != Builder::Ballot);
@@ -81,34 +81,34 @@ fn no_split_and_no_builder_changes_a_bit() {
 }
 
 /// Points near which more photons lie than an invocation tests: others share them, as small chunks do.
-pub fn crowd_check(gpu: &Gpu) -> Check<Complaint> {
+pub fn dense_points_check(gpu: &Gpu) -> Check<Complaint> {
     let scene = scene("cornell");
-    let crowded = SceneSettings { photons: 20_000, radius: Some(1.0), rounds: 1, ..small() };
-    let few = SceneSettings { chunk: Some(700), ..crowded.clone() };
-    let [whole, parts] = [&crowded, &few].map(|settings| picture(gpu, &scene, settings));
+    let dense = SceneSettings { photons: 20_000, radius: Some(1.0), rounds: 1, ..small() };
+    let few = SceneSettings { chunk: Some(700), ..dense.clone() };
+    let [whole, parts] = [&dense, &few].map(|settings| picture(gpu, &scene, settings));
     // Few enough photons in a chunk that no point has more candidates than one slice.
     let stored = whole.fates[0].ledger().stored;
     assert!(stored > 3 * u64::from(GATHER_SLICE) && 2 * stored * 700 / 20_000 < u64::from(GATHER_SLICE), "{stored} stored");
-    same_film("crowded points", &whole, &parts)
+    same_film("dense points", &whole, &parts)
 }
 
-/// Cameras and lookups take pixels in tiles, which no picture need be a multiple of. Where walls only shine, all pixels are the same to
+/// Cameras and lookups take pixels in tiles, which no picture need be a multiple of. Where walls only emit, all pixels are the same to
 /// the bit: none is left out, and none is taken twice.
 #[test]
 fn every_pixel_is_lit_whatever_the_size_of_the_picture() {
     let Some(gpu) = device() else { return };
     let furnace = scene("furnace");
-    let mut shining_room = furnace.clone();
-    shining_room.materials.iter_mut().for_each(|material| *material = shining(0.0));
+    let mut emitting_room = furnace.clone();
+    emitting_room.materials.iter_mut().for_each(|material| *material = emissive(0.0));
     let (similar, same) = (0.4..1.6, 1.0 - 1e-12..1.0 + 1e-12);
     for (room, size, range) in [
         (&furnace, [1, 1], &similar),
         (&furnace, [13, 7], &similar),
         (&furnace, [21, 9], &similar),
-        (&shining_room, [13, 7], &same),
-        (&shining_room, [64, 64], &same),
-        (&shining_room, [5, 67], &same),
-        (&shining_room, [131, 70], &same),
+        (&emitting_room, [13, 7], &same),
+        (&emitting_room, [64, 64], &same),
+        (&emitting_room, [5, 67], &same),
+        (&emitting_room, [131, 70], &same),
     ] {
         let sums = seen(&gpu, room, &small(), &room.first_camera(), size).film.of_blocks.sums;
         assert_eq!(sums.len() as u32, 3 * size[0] * size[1]);
@@ -172,7 +172,7 @@ fn unneeded_effects_change_no_bit(gpu: &Gpu, name: &str, ways: impl Fn(&[Effect]
     assert!(unneeded.len() > 5, "{name}: {unneeded:?}");
     for with in ways(&unneeded) {
         let forced = picture(gpu, &scene, &SceneSettings { with: with.clone(), ..small() });
-        assert!(with.iter().all(|effect| forced.plan.keeps(*effect)), "{with:?}");
+        assert!(with.iter().all(|effect| forced.plan.simulates(*effect)), "{with:?}");
         assert_holds(format!("{with:?}"), same_film(&format!("{name} with {with:?}"), &forced, &reference));
     }
 }
@@ -258,9 +258,9 @@ fn plates() -> (Scene, Vec<Effect>) {
 }
 
 /// Red mean of all pixels.
-fn estimate(lit: &RunResult) -> Estimate {
-    let squares: f64 = standard_errors(lit).iter().map(|error| error.x.powi(2)).sum();
-    Estimate { mean: mean_red(lit), standard_error: squares.sqrt() / lit.film.pixels() as f64 }
+fn estimate(result: &RunResult) -> Estimate {
+    let squares: f64 = standard_errors(result).iter().map(|error| error.x.powi(2)).sum();
+    Estimate { mean: mean_red(result), standard_error: squares.sqrt() / result.film.pixels() as f64 }
 }
 
 /// Whether an estimate differs by more than both errors and two per cent of what it was.
@@ -286,7 +286,7 @@ fn plates_are_missed(gpu: &Gpu, groups: &[&[Effect]]) {
     // What photons bring is missed elsewhere.
     let no_photons = vec![Effect::Indirect, Effect::ReflectiveCaustics, Effect::RefractiveCaustics];
     let settings = SceneSettings { samples: 64, rounds: 128, without: no_photons, ..small() };
-    let run = |settings: &SceneSettings| lit(gpu, &scene, settings, Target::Picture(&eye, [5, 4]));
+    let run = |settings: &SceneSettings| result_of(gpu, &scene, settings, Receivers::Image(&eye, [5, 4]));
     let reference = run(&settings);
     for group in groups {
         let without = without(group, &settings, run);
@@ -314,8 +314,8 @@ fn lit_points() -> (Scene, [LitPoint; 6]) {
     ];
     // Rays choose the sun and the sky by the size of the scene.
     let floor = Mesh::parallelogram("floor", DVec3::new(-1.0, -0.5, -1.0), DVec3::Z * 2.0, DVec3::X * 15.0, 1);
-    let shining = Material { emission: Vec3::splat(100.0), ..matt(0.0) };
-    let scene = scene_of(vec![lamp, floor], vec![shining, matt(0.0)], lights);
+    let emissive = Material { emission: Vec3::splat(100.0), ..matt(0.0) };
+    let scene = scene_of(vec![lamp, floor], vec![emissive, matt(0.0)], lights);
     let below = |x: f64| (DVec3::X * x, DVec3::Y);
     // Configuration factors of a disc and of a square.
     let points = [
@@ -335,7 +335,7 @@ fn lights_are_missed(gpu: &Gpu, groups: &[&[Effect]]) {
     let (scene, points) = lit_points();
     let settings = SceneSettings { part: Part::Direct, shadow_rays: 64, rounds: 64, ..small() };
     let places = points.map(|(_, point, _)| point);
-    let run = |settings: &SceneSettings| lit(gpu, &scene, settings, Target::Points(&places));
+    let run = |settings: &SceneSettings| result_of(gpu, &scene, settings, Receivers::Points(&places));
     for group in groups {
         let without = without(group, &settings, run);
         for (place, (effect, _, before)) in points.iter().enumerate() {
@@ -371,7 +371,7 @@ fn an_effect_that_the_scene_needs_is_missed_when_it_is_left_out() {
             let of = |plan: &ScenePlan| (plan.constants.clone(), plan.caustic_surfaces, plan.global.is_some());
             let changed = of(&other) != of(&whole);
             // Gaps of alpha are closed in the scene itself.
-            assert!(!other.keeps(effect) && (effect == Alpha || changed), "{effect:?}");
+            assert!(!other.simulates(effect) && (effect == Alpha || changed), "{effect:?}");
             planned.insert(effect);
         }
     }
@@ -410,13 +410,13 @@ fn what_is_dropped_is_not_there() {
     let fresh = device_with(Options { by_plan: true, ..Options::default() }).unwrap();
     let before = fresh.work().pipelines;
     let direct = picture(&fresh, &cornell, &SceneSettings { part: Part::Direct, ..small() });
-    let count = |lit: &RunResult, pass: &str| lit.timings.row(pass).map_or(0, |row| row.count);
-    for (lit, global, caustic) in [(&all, 3, 3), (&needed, 3, 0), (&direct, 0, 0)] {
-        assert_eq!(count(lit, "round/global"), global);
-        assert_eq!(count(lit, "round/caustic"), caustic);
-        assert_eq!(count(lit, "round/visible points"), 3);
+    let count = |result: &RunResult, pass: &str| result.timings.row(pass).map_or(0, |row| row.count);
+    for (result, global, caustic) in [(&all, 3, 3), (&needed, 3, 0), (&direct, 0, 0)] {
+        assert_eq!(count(result, "round/global"), global);
+        assert_eq!(count(result, "round/caustic"), caustic);
+        assert_eq!(count(result, "round/visible points"), 3);
     }
-    // Two dispatches a round to see and resolve, one to weigh what maps hold and one to end a block of what tells their bias; a map has one to shine, flights with their
+    // Two dispatches a round to see and resolve, one to turn the flux of maps into radiance and one to end a block of what gives their bias; a map has one to emit, flights with their
     // sizes, the index and the lookup.
     assert_eq!(direct.dispatches, 2 * 3);
     let map = (needed.dispatches - direct.dispatches) / 3 - 2;
@@ -435,8 +435,8 @@ fn samples_of_a_pixel_leave_little_noise() {
     let Some(gpu) = device() else { return };
     let error = |samples, shadow_rays, rounds| {
         let settings = SceneSettings { part: Part::Direct, samples, shadow_rays, rounds, ..small() };
-        let lit = picture(&gpu, &scene("cornell-spheres"), &settings);
-        (lit.film.relative_error(), estimate(&lit))
+        let result = picture(&gpu, &scene("cornell-spheres"), &settings);
+        (result.film.relative_error(), estimate(&result))
     };
     let ((by_chance, light), (even, same)) = (error(1, 1, 64), error(16, 1, 4));
     assert_holds("samples", same_light("samples", same, light));
@@ -449,10 +449,10 @@ fn a_scene_without_light_is_black_and_costs_no_photon() {
     let Some(gpu) = device() else { return };
     let mut scene = scene("cornell");
     scene.materials.iter_mut().for_each(|material| material.emission = Vec3::ZERO);
-    let lit = picture(&gpu, &scene, &small());
-    assert!(lit.film.sums.iter().all(|sum| *sum == 0));
-    assert_eq!(lit.plan.maps().count(), 0);
-    assert_eq!(lit.fates[0].emitted, 0);
+    let result = picture(&gpu, &scene, &small());
+    assert!(result.film.sums.iter().all(|sum| *sum == 0));
+    assert_eq!(result.plan.maps().count(), 0);
+    assert_eq!(result.fates[0].emitted, 0);
 }
 
 /// The stated error is that of many runs: the spread of means over seeds, pixel by pixel. A tenth more or less is noticed.
@@ -465,10 +465,10 @@ fn stated_errors_are_the_spread_over_seeds() {
     let pixels = runs[0].film.pixels();
     let (mut stated, mut spread) = (0.0, 0.0);
     for pixel in 0..pixels {
-        let means: Vec<DVec3> = runs.iter().map(|lit| lit.film.mean(pixel)).collect();
+        let means: Vec<DVec3> = runs.iter().map(|result| result.film.mean(pixel)).collect();
         let mean = means.iter().sum::<DVec3>() / means.len() as f64;
         spread += means.iter().map(|value| (*value - mean).length_squared()).sum::<f64>() / (means.len() - 1) as f64;
-        stated += runs.iter().map(|lit| lit.film.standard_error(pixel).length_squared()).sum::<f64>() / runs.len() as f64;
+        stated += runs.iter().map(|result| result.film.standard_error(pixel).length_squared()).sum::<f64>() / runs.len() as f64;
     }
     let ratio = (stated / spread).sqrt();
     assert!((0.9..1.1).contains(&ratio), "stated errors are {ratio} of the spread");
@@ -478,11 +478,11 @@ fn stated_errors_are_the_spread_over_seeds() {
 /// samples do not know how seldom.
 fn agrees_with_the_judge(gpu: &Gpu, scene: &Scene, [photons, rounds]: [u32; 2], samples: u32) {
     let settings = SceneSettings { photons, caustic_photons: photons, rounds, ..by_rounds() };
-    let lit = picture(gpu, scene, &settings);
+    let result = picture(gpu, scene, &settings);
     let judged = Judge::new(scene, settings.bounces).image(&scene.first_camera(), SIZE, SIZE, samples, 77);
     let verdict = |share: f64| {
-        let means: Vec<DVec3> = lit.film.means().map(|mean| share * mean).collect();
-        Verdict::new(&means, &standard_errors(&lit), rounds, &judged, None)
+        let means: Vec<DVec3> = result.film.means().map(|mean| share * mean).collect();
+        Verdict::new(&means, &standard_errors(&result), rounds, &judged, None)
     };
     assert!(verdict(1.0).agrees(), "{}: {}", scene.name, verdict(1.0));
     assert!(!verdict(1.3).agrees(), "{}, a third brighter, is not noticed", scene.name);

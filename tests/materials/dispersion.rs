@@ -181,10 +181,10 @@ pub fn prism_photons(gpu: &Gpu) -> Check<Complaint> {
     let heights = [edges[0] + 0.1, 0.5 * (edges[0] + edges[1]), 0.5 * (edges[1] + edges[2]), edges[2] - 0.1]
         .map(|y| (DVec3::new(at, y, 0.0), DVec3::NEG_X));
     let settings = SceneSettings { part: Part::Caustic, caustic_photons: 150_000, caustic_radius: Some(0.07), alpha: 1.0, ..by_rounds() };
-    let lit = received(gpu, &scene, &settings, &heights);
+    let result = received(gpu, &scene, &settings, &heights);
     // The beam's width is that of the face, times the cosines on either side.
     let irradiance = passed.map(|of| of.transmitted * PRISM.incidence.cos() / of.leaving.cos() * of.along.x);
-    for (place, (found, error)) in pairs(means(&lit), standard_errors(&lit)).enumerate() {
+    for (place, (found, error)) in pairs(means(&result), standard_errors(&result)).enumerate() {
         let expected = DVec3::from_array([0, 1, 2].map(|channel| if place > channel { irradiance[channel] } else { 0.0 }));
         println!("point {place}: {found} +- {error}, {expected} expected");
         colour_check(&format!("photons of a prism, point {place}"), found, expected, error.max(DVec3::splat(1e-6)))?;
@@ -205,7 +205,7 @@ fn glass_without_dispersion_keeps_its_bits() {
     let sums = [vec![], vec![Effect::Dispersion]].map(|with| {
         let settings = SceneSettings { with, ..mapped(5000, 2, 8, 0.2) };
         [received(&gpu, &scene, &settings, &grid(0.0, DVec3::Y, 4)), seen(&gpu, &scene, &settings, &camera, [16, 16])]
-            .map(|lit| lit.film.sums.clone())
+            .map(|result| result.film.sums.clone())
     });
     assert!(sums[0].iter().all(|sums| sums.iter().any(|sum| *sum > 0)));
     assert_eq!(sums[0], sums[1]);

@@ -134,8 +134,8 @@ fn a_sun_in_a_plate_is_a_power_of_the_cosine() {
                 }
                 let camera = Camera::looking_at("eye", eye, DVec3::ZERO, DVec3::Z, 1e-9);
                 let settings = SceneSettings { rounds: 1, shadow_rays: 1, part: Part::Direct, ..settings() };
-                let lit = seen(&gpu, &plate(surface, sun()), &settings, &camera, [4, 4]);
-                let found = mean_red(&lit);
+                let result = seen(&gpu, &plate(surface, sun()), &settings, &camera, [4, 4]);
+                let found = mean_red(&result);
                 let what = format!("{surface:?}, {off} off");
                 if off > PI / 2.0 {
                     assert_eq!(found, 0.0, "{what}");

@@ -7,7 +7,7 @@ use crate::common::plates::{Place, Plates};
 use crate::common::prelude::*;
 use crate::common::{estimate_check, known, planted, sheets};
 use crate::tests::materials::media;
-use photonmill::engine::scene::{RunResult, Target};
+use photonmill::engine::scene::{Receivers, RunResult};
 use photonmill::scene::material::{Coverage, Layers, Medium, NormalMap};
 use photonmill::scene::texture::Filter;
 use photonmill::verify::judge::lobes::{Frame, Inputs, Lobes};
@@ -53,17 +53,18 @@ const SEEDS: u32 = 4;
 fn runs(gpu: &Gpu, scene: &Scene, rounds: u32, camera: &Camera, size: [u32; 2]) -> Runs {
     let of = |seed: u32| {
         let settings = SceneSettings { seed: seed.into(), photons: 10_000, caustic_photons: 10_000, rounds, ..by_rounds() };
-        render(gpu, scene, &settings, Target::Picture(camera, size)).unwrap()
+        render(gpu, scene, &settings, Receivers::Image(camera, size)).unwrap()
     };
     let all: Vec<RunResult> = (1..=SEEDS).map(of).collect();
     let pixels = all[0].film.pixels();
     let share = 1.0 / f64::from(SEEDS);
-    let means = (0..pixels).map(|place| all.iter().map(|lit| share * lit.film.mean(place)).sum()).collect();
-    let squared = |place: usize| all.iter().map(|lit| lit.film.standard_error(place).powf(2.0)).sum::<DVec3>();
+    let means = (0..pixels).map(|place| all.iter().map(|result| share * result.film.mean(place)).sum()).collect();
+    let squared = |place: usize| all.iter().map(|result| result.film.standard_error(place).powf(2.0)).sum::<DVec3>();
     let errors = (0..pixels).map(|place| share * squared(place).map(f64::sqrt)).collect();
     let parts = std::array::from_fn(|part| {
-        let of_run =
-            |lit: &RunResult| lit.film.part_totals[part] as f64 / (lit.plan.film.scale * f64::from(lit.film.rounds) * pixels as f64);
+        let of_run = |result: &RunResult| {
+            result.film.part_totals[part] as f64 / (result.plan.film.scale * f64::from(result.film.rounds) * pixels as f64)
+        };
         mean_and_error(&all.iter().map(of_run).collect::<Vec<f64>>())
     });
     Runs { means, errors, parts, rounds: SEEDS * rounds }
@@ -257,8 +258,8 @@ fn light_that_is_clamped_at_a_plate_alone_is_little() {
     scene.meshes[0].tangents = vec![[DVec3::X.extend(1.0); 3]; 2];
     let camera = Camera::looking_at("aside", DVec3::new(3.0, 1.0, 0.0), DVec3::ZERO, DVec3::Y, 0.1);
     let settings = SceneSettings { photons: 4000, caustic_photons: 1000, rounds: 8, ..by_rounds() };
-    let lit = seen(&gpu, &scene, &settings, &camera, [4, 4]);
-    assert!(lit.losses.clamped > 0.0 && lit.losses.relative < 1e-3, "{:?}", lit.losses);
+    let result = seen(&gpu, &scene, &settings, &camera, [4, 4]);
+    assert!(result.losses.clamped > 0.0 && result.losses.relative < 1e-3, "{:?}", result.losses);
 }
 
 /// A direction in red and green, and a strength in blue.
@@ -354,7 +355,7 @@ fn alphas_of_vertices_are_looked_up_without_colours() {
     let sheet = Mesh { alphas: vec![0.5; 4], ..level(0.0, [1.0; 2], true, 0) };
     let scene = scene_of(vec![sheet], vec![layered::dull(0.5)], vec![sun(DVec3::NEG_Y)]);
     let plan = scene_plan_within(&Limits::of_host(), &scene, &by_rounds(), square_picture(1)).unwrap();
-    assert!(plan.keeps(Effect::VertexColours));
+    assert!(plan.simulates(Effect::VertexColours));
     assert!(scene.without(&[Effect::VertexColours]).meshes[0].alphas.is_empty());
 }
 
@@ -420,23 +421,23 @@ fn caustics_are_kept_at_every_sheet_that_they_pass() {
     let mut meshes = media::cuboid("pane", DVec3::new(-2.0, 2.0, -2.0), DVec3::new(2.0, 2.1, 2.0), 1);
     meshes.extend([level(0.0, [4.0, 4.0], true, 0), level(0.5, [4.0, 4.0], true, 2)]);
     let sheet = Material { coverage: Coverage::Blend { alpha: 0.25 }, ..layered::dull(0.5) };
-    let scene = scene_of(meshes, vec![matt(0.5), crate::common::lit::glass(1.5), sheet], vec![sun(DVec3::NEG_Y)]);
+    let scene = scene_of(meshes, vec![matt(0.5), crate::common::rendered::glass(1.5), sheet], vec![sun(DVec3::NEG_Y)]);
     let points = [0.5, 0.0].map(|y| (DVec3::new(0.3, y, 0.2), DVec3::Y));
-    let lit_by = |gpu: &Gpu, builder: Builder| {
+    let result_by = |gpu: &Gpu, builder: Builder| {
         let settings = SceneSettings { builder: Some(builder), caustic_photons: 3001, part: Part::Caustic, rounds: 2, ..by_rounds() };
         received(gpu, &scene, &settings, &points)
     };
-    let expected = lit_by(&gpu, Builder::Persistent);
+    let expected = result_by(&gpu, Builder::Persistent);
     // Of the irradiance of 1 glass lets 0.92 through, and the sheet three quarters of that.
     for (place, right) in [(0, 0.923), (1, 0.692)] {
         let found = expected.film.mean(place).x;
         assert!((found / right - 1.0).abs() < 0.3, "point {place}: {found}, {right} expected");
     }
-    let naive = lit_by(&gpu, Builder::Naive);
+    let naive = result_by(&gpu, Builder::Naive);
     assert_holds("the naive builder", equal_sums("light", &naive.film.sums, &expected.film.sums));
     assert_eq!(naive.fates, expected.fates);
     let one_slot = [("push.map.lands_once != 0 ? index", "push.map.caustic_only != 0 ? index")];
     gpu.replace(planted::kernels(&["trace_scene_naive"], "world/scene/bounce.glsl", &one_slot));
-    let spoiled = lit_by(&gpu, Builder::Naive);
+    let spoiled = result_by(&gpu, Builder::Naive);
     assert_complains("one slot for all landings", equal_sums("light", &spoiled.film.sums, &expected.film.sums));
 }

@@ -74,7 +74,7 @@ fn stretched(strength: f32, case: LobeCase) -> LobeCase {
 }
 
 /// A lobe by itself.
-struct Subject {
+struct SampledLobe {
     what: &'static str,
     kind: Kind,
     cosines: &'static [f64],
@@ -82,23 +82,23 @@ struct Subject {
 }
 
 #[rustfmt::skip]
-const SUBJECTS: [Subject; 8] = [
-    Subject { what: "reflection of a metal", kind: Kind::Reflection, cosines: &COSINES,
+const SAMPLED_LOBES: [SampledLobe; 8] = [
+    SampledLobe { what: "reflection of a metal", kind: Kind::Reflection, cosines: &COSINES,
         case: |alpha, cosine| LobeCase { metallic: 1.0, ..plastic(alpha, cosine) } },
     // Over black, of which nothing comes back.
-    Subject { what: "coat", kind: Kind::Coat, cosines: &COSINES,
+    SampledLobe { what: "coat", kind: Kind::Coat, cosines: &COSINES,
         case: |alpha, cosine| LobeCase { coat: 0.8, coat_alpha: alpha, specular: 0.0, base_colour: Vec3::ZERO, ..plastic(0.5, cosine) } },
-    Subject { what: "thin transmission", kind: Kind::Transmission, cosines: &COSINES, case: pane },
-    Subject { what: "refraction into glass", kind: Kind::Transmission, cosines: &COSINES,
+    SampledLobe { what: "thin transmission", kind: Kind::Transmission, cosines: &COSINES, case: pane },
+    SampledLobe { what: "refraction into glass", kind: Kind::Transmission, cosines: &COSINES,
         case: |alpha, cosine| LobeCase { is_solid: 1, eta: 1.0 / 1.5, ..pane(alpha, cosine) } },
     // Total reflection begins at 0.745.
-    Subject { what: "refraction out of glass", kind: Kind::Transmission, cosines: &[1.0, 0.8, 0.76, 0.5, 0.2, 0.05],
+    SampledLobe { what: "refraction out of glass", kind: Kind::Transmission, cosines: &[1.0, 0.8, 0.76, 0.5, 0.2, 0.05],
         case: |alpha, cosine| LobeCase { is_solid: 1, eta: 1.5, carries_radiance: 0, ..pane(alpha, cosine) } },
-    Subject { what: "reflection in glass", kind: Kind::Reflection, cosines: &COSINES,
+    SampledLobe { what: "reflection in glass", kind: Kind::Reflection, cosines: &COSINES,
         case: |alpha, cosine| LobeCase { is_solid: 1, eta: 1.5, ..pane(alpha, cosine) } },
-    Subject { what: "reflection of an anisotropic metal", kind: Kind::Reflection, cosines: &COSINES,
+    SampledLobe { what: "reflection of an anisotropic metal", kind: Kind::Reflection, cosines: &COSINES,
         case: |alpha, cosine| LobeCase { metallic: 1.0, ..stretched(0.7, plastic(alpha, cosine)) } },
-    Subject { what: "refraction into anisotropic glass", kind: Kind::Transmission, cosines: &COSINES,
+    SampledLobe { what: "refraction into anisotropic glass", kind: Kind::Transmission, cosines: &COSINES,
         case: |alpha, cosine| LobeCase { is_solid: 1, eta: 1.0 / 1.5, ..stretched(0.4, pane(alpha, cosine)) } },
 ];
 
@@ -192,7 +192,7 @@ impl Facets<'_> {
     }
 
     /// Where a half vector sends light, and the solid angle there over its own.
-    fn lit(&self, h: DVec3) -> Option<(DVec3, f64)> {
+    fn incoming(&self, h: DVec3) -> Option<(DVec3, f64)> {
         let v_h = self.wo.dot(h);
         if v_h <= 0.0 {
             return None;
@@ -217,7 +217,7 @@ impl Facets<'_> {
         let slope = psi_sin / psi_cos;
         let local = (slope * self.alphas * DVec2::from_angle(azimuth)).extend(1.0).normalize();
         let solid_angle = slope * local.z.powi(3) * self.alphas.element_product() / (psi_cos * psi_cos) * FRAC_PI_2;
-        self.lit(self.frame * local).map_or(0.0, |(wi, spread)| self.lobes.density(self.kind, wi) * spread * solid_angle)
+        self.incoming(self.frame * local).map_or(0.0, |(wi, spread)| self.lobes.density(self.kind, wi) * spread * solid_angle)
     }
 
     /// Probabilities of the cells, and that no light goes on.
@@ -324,9 +324,9 @@ fn value_errors(case: &LobeCase, of: &Facets, sample: &LobeSample) -> Option<[f6
     let (density, value) = (of.lobes.density(of.kind, wi), of.lobes.evaluate(of.kind, wi) * wi.dot(of.lobes.axis(of.kind)));
     // Refraction compresses radiance, and no flux.
     let flux = if case.carries_radiance == 0 && of.eta.is_some() { f64::from(case.eta).powi(-2) } else { 1.0 };
-    let is_matt = sample.is_sharp == 0;
-    let own = if is_matt { sample.matt } else { sample.sharp };
-    let own_unit = if is_matt && of.kind == Kind::Coat { PACKED_NORMAL } else { ULP };
+    let is_rough = sample.is_sharp == 0;
+    let own = if is_rough { sample.rough } else { sample.sharp };
+    let own_unit = if is_rough && of.kind == Kind::Coat { PACKED_NORMAL } else { ULP };
     Some([
         largest_relative_error(sample.weight, value * flux / (density * chance)) / (smooth * ULP),
         relative_error(sample.density.into(), density * chance) / (sharp * ULP),
@@ -352,14 +352,14 @@ pub(super) fn ask(gpu: &Gpu, math: Math, all: bool, cases: &[LobeCase], samples:
 }
 
 /// All checks of a lobe at these roughnesses, by itself and over all of them.
-fn subject_check(gpu: &Gpu, subject: usize, alphas: &[f32]) -> Check {
-    let Subject { what, kind, cosines, case } = &SUBJECTS[subject];
-    let (seed, lobe) = (subject as u32, number(*kind));
+fn sampled_lobe_check(gpu: &Gpu, sampled: usize, alphas: &[f32]) -> Check {
+    let SampledLobe { what, kind, cosines, case } = &SAMPLED_LOBES[sampled];
+    let (seed, lobe) = (sampled as u32, number(*kind));
     let with = |alpha: f32| cosines.iter().map(move |cosine| LobeCase { seed, lobe, ..case(alpha, *cosine) });
     let cases: Vec<LobeCase> = alphas.iter().flat_map(|alpha| with(*alpha)).collect();
     let samples = ask(gpu, Math::Fast, false, &cases, SAMPLES);
     let (mut worst, mut left_out, mut all_counts, mut all_probabilities) = ([0.0f64; 3], 0u32, Vec::new(), Vec::new());
-    let mut rng = random(subject as u64, 1);
+    let mut rng = random(sampled as u64, 1);
     for (case, samples) in pairs(&cases, samples.chunks(SAMPLES)) {
         let lobes = judged(case);
         let of = Facets::new(case, &lobes, *kind);
@@ -402,8 +402,8 @@ fn subject_check(gpu: &Gpu, subject: usize, alphas: &[f32]) -> Check {
 fn lobes_by_themselves_follow_their_densities() {
     let alphas = alphas(of_run(ALPHAS, 40));
     let Some(gpu) = device() else { return };
-    for (number, subject) in SUBJECTS.iter().enumerate() {
-        assert_holds(subject.what, subject_check(&gpu, number, &alphas));
+    for (number, sampled) in SAMPLED_LOBES.iter().enumerate() {
+        assert_holds(sampled.what, sampled_lobe_check(&gpu, number, &alphas));
     }
 }
 
@@ -420,7 +420,7 @@ fn mixtures() -> [(&'static str, LobeCase); 4] {
     let all = LobeCase { metallic: 0.3, transmission: 0.4, coverage: 0.7, ..paper };
     [
         ("a thin wall of all lobes", LobeCase { ng: tilted(all.ng, Vec3::X), coat_normal: tilted(all.ns, Vec3::Z), ..all }),
-        ("matt lobes", LobeCase { alpha: 0.5, coat_alpha: 0.4, transmission: 0.0, sheen_alpha: 0.1, coverage: 0.2, ..all }),
+        ("rough lobes", LobeCase { alpha: 0.5, coat_alpha: 0.4, transmission: 0.0, sheen_alpha: 0.1, coverage: 0.2, ..all }),
         ("anisotropic plastic", stretched(0.6, LobeCase { metallic: 0.2, coat: 0.3, coat_alpha: 0.3, ..plastic(0.3, 0.6) })),
         (
             "coated glass",
@@ -491,7 +491,7 @@ fn mixture_check(gpu: &Gpu, math: Math) -> Check {
                 let expected = lobes.evaluate(kind, wi) * cosine / (density * f64::from(sample.chance));
                 let weight = largest_relative_error(sample.weight, expected);
                 let all: DVec3 = KINDS.into_iter().map(|kind| lobes.evaluate(kind, wi) * wi.dot(lobes.axis(kind)).max(0.0)).sum();
-                let together = largest_relative_error(sample.matt + sample.sharp, all);
+                let together = largest_relative_error(sample.rough + sample.sharp, all);
                 require(weight < TABLE_ERROR, || format!("{what}: {sample:?}: the weight is {weight} off {expected}"))?;
                 require(together < TABLE_ERROR, || format!("{what}: {sample:?}: the BRDF is {together} off {all}"))?;
                 worst = [worst[0].max(weight), worst[1].max(together)];
@@ -517,47 +517,47 @@ struct Fault {
     file: &'static str,
     from: &'static str,
     to: &'static str,
-    subject: Option<usize>,
+    sampled: Option<usize>,
     /// Part of the complaint.
     noticed: &'static str,
 }
 
 #[rustfmt::skip]
 const FAULTS: [Fault; 12] = [
-    Fault { what: "facets of a stretch 2 % too large", subject: Some(6), noticed: "chi-square",
+    Fault { what: "facets of a stretch 2 % too large", sampled: Some(6), noticed: "chi-square",
         file: "material/ggx.glsl", from: "alpha.x = facets.is_stretched ? facets.alpha_along : facets.alpha;",
         to: "alpha.x = facets.is_stretched ? 1.02 * facets.alpha_along : facets.alpha;" },
-    Fault { what: "stretched facets that shadow as even ones", subject: Some(6), noticed: "weights are off",
+    Fault { what: "stretched facets that shadow as even ones", sampled: Some(6), noticed: "weights are off",
         file: "material/ggx.glsl", from: "return sqrt(dot(beside, beside) + cosine * cosine);",
         to: "return ggx_root(facets.alpha, cosine);" },
-    Fault { what: "a density of stretched facets along the wrong axis", subject: Some(7), noticed: "densities are off",
+    Fault { what: "a density of stretched facets along the wrong axis", sampled: Some(7), noticed: "densities are off",
         file: "material/ggx.glsl", from: "ratio * h.x * h.x + divide(h.y * h.y, ratio)",
         to: "ratio * h.y * h.y + divide(h.x * h.x, ratio)" },
-    Fault { what: "facets of an alpha 2 % too large", subject: Some(0), noticed: "chi-square",
+    Fault { what: "facets of an alpha 2 % too large", sampled: Some(0), noticed: "chi-square",
         file: "material/ggx.glsl", from: "return normalize(vec3(alpha * h.xy,",
         to: "return normalize(vec3(1.02 * alpha * h.xy," },
-    Fault { what: "facets that are seen from the normal", subject: Some(1), noticed: "chi-square",
+    Fault { what: "facets that are seen from the normal", sampled: Some(1), noticed: "chi-square",
         file: "material/ggx.glsl", from: "vec3 stretched = normalize(vec3(alpha * v.xy, v.z));",
         to: "vec3 stretched = vec3(0.0, 0.0, 1.0);" },
-    Fault { what: "a weight with the masking of an alpha 1 % too large", subject: Some(1), noticed: "weights are off",
+    Fault { what: "a weight with the masking of an alpha 1 % too large", sampled: Some(1), noticed: "weights are off",
         file: "material/ggx.glsl", from: "4.0 * facet_visibility(facets,",
         to: "4.0 * facet_visibility(even_facets(facets.n, 1.01 * facets.alpha)," },
-    Fault { what: "a density 1 % too large", subject: Some(2), noticed: "densities are off",
+    Fault { what: "a density 1 % too large", sampled: Some(2), noticed: "densities are off",
         file: "material/ggx.glsl", from: "density *= 0.25;",
         to: "density *= 0.2525;" },
-    Fault { what: "refraction by an index 1 % too large", subject: Some(3), noticed: "weights are off",
+    Fault { what: "refraction by an index 1 % too large", sampled: Some(3), noticed: "weights are off",
         file: "material/lobes/transmission.glsl", from: "refracted_cosine_squared(facet.along, eta);",
         to: "refracted_cosine_squared(facet.along, 1.01 * eta);" },
-    Fault { what: "a density without the cosine of what is refracted", subject: Some(4), noticed: "densities are off",
+    Fault { what: "a density without the cosine of what is refracted", sampled: Some(4), noticed: "densities are off",
         file: "material/lobes/transmission.glsl", from: "density *= facet.along * divide(l_h,",
         to: "density *= facet.along * divide(1.0," },
-    Fault { what: "a BTDF without the squared index", subject: Some(4), noticed: "the BRDF is off",
+    Fault { what: "a BTDF without the squared index", sampled: Some(4), noticed: "the BRDF is off",
         file: "material/lobes/transmission.glsl", from: "float value = eta * eta * both",
         to: "float value = both" },
-    Fault { what: "a number that chooses the lobe and the direction", subject: None, noticed: "chi-square",
+    Fault { what: "a number that chooses the lobe and the direction", sampled: None, noticed: "chi-square",
         file: "material/bsdf.glsl", from: "return sample_facet_lobe(surface, lobes, wo, u.yz,",
         to: "return sample_facet_lobe(surface, lobes, wo, u.xz," },
-    Fault { what: "a number that chooses the gap and the direction", subject: None, noticed: "chi-square",
+    Fault { what: "a number that chooses the gap and the direction", sampled: None, noticed: "chi-square",
         file: "material/bsdf.glsl", from: "u.y = divide(u.y - lobes.pass_chance, 1.0 - lobes.pass_chance);",
         to: "" },
 ];
@@ -566,14 +566,14 @@ const FAULTS: [Fault; 12] = [
 #[test]
 fn faults_of_the_sampling_are_noticed() {
     let mut noticed = HashSet::new();
-    let faults = FAULTS.iter().filter(|fault| is_long_run() || noticed.insert((fault.noticed, fault.subject.is_some())));
+    let faults = FAULTS.iter().filter(|fault| is_long_run() || noticed.insert((fault.noticed, fault.sampled.is_some())));
     let Some(mut gpu) = device() else { return };
     let alphas = alphas(ALPHAS);
-    for Fault { what, file, from, to, subject, noticed } in faults.copied() {
+    for Fault { what, file, from, to, sampled, noticed } in faults.copied() {
         gpu.replace(planted::kernels(&["check_lobes"], file, &[(from, to)]));
-        let check = match subject {
+        let check = match sampled {
             // Each value is wrong, and samples are by their number.
-            Some(subject) => subject_check(&gpu, subject, if noticed == "chi-square" { &alphas } else { &alphas[4..6] }),
+            Some(sampled) => sampled_lobe_check(&gpu, sampled, if noticed == "chi-square" { &alphas } else { &alphas[4..6] }),
             None => mixture_check(&gpu, Math::Fast),
         };
         println!("{what}: {check:?}");

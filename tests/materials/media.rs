@@ -18,19 +18,19 @@ pub fn cuboid(name: &str, low: DVec3, high: DVec3, material: usize) -> Vec<Mesh>
     vec![side(low, y, x), side(low, z, y), side(low, x, z), side(high, -x, -y), side(high, -y, -z), side(high, -z, -x)]
 }
 
-/// The radiance that arrives from beyond slabs of one index, which shines with 1 on one side only: a white lamp behind, black before.
+/// The radiance that arrives from beyond slabs of one index, which emits 1 on one side only: a white lamp behind, black before.
 /// Of what enters they keep the share `down`, and of what is reflected back through them the share `up`.
 fn slab_check(gpu: &Gpu, materials: Vec<Material>, slabs: Vec<Mesh>, angle: f64, [down, up]: [f64; 2]) -> Check<Complaint> {
     // Wider than what is seen of it through the slabs.
     let half = 20.0 / 9.0 * slabs[0].positions.iter().map(|at| at.x).fold(0.0, f64::max);
     let (x, y) = (2.0 * half * DVec3::X, 2.0 * half * DVec3::Y);
     let lamp = Mesh::parallelogram("lamp", DVec3::new(-half, -half, -4.0), x, y, materials.len());
-    let scene = scene_of([slabs, vec![lamp]].concat(), [materials, vec![shining(0.0)]].concat(), Vec::new());
+    let scene = scene_of([slabs, vec![lamp]].concat(), [materials, vec![emissive(0.0)]].concat(), Vec::new());
     let eye = DVec3::new(4.0 * angle.tan(), 0.0, 4.0);
     let camera = Camera::looking_at("ray", eye, DVec3::ZERO, DVec3::Y, 1e-3);
     // No photon map knows any of it.
-    let lit = seen(gpu, &scene, &without_maps(SceneSettings { rounds: 64, ..by_rounds() }), &camera, [8, 8]);
-    let (found, error) = mean_of_all(&means(&lit));
+    let result = seen(gpu, &scene, &without_maps(SceneSettings { rounds: 64, ..by_rounds() }), &camera, [8, 8]);
+    let (found, error) = mean_of_all(&means(&result));
     let (found, error) = (found.x, error.x);
     let r = fresnel(angle.cos(), 1.0, 1.5);
     let expected = (1.0 - r).powi(2) * down / (1.0 - r * r * down * up);
@@ -86,8 +86,8 @@ pub fn eye_in_glass(gpu: &Gpu) -> Check<Complaint> {
     let scene = scene_of(slab(9.0, -1.0, 1.0, 0), materials, vec![LightKind::Environment { radiance: Vec3::ONE }]);
     let camera = Camera::looking_at("eye", DVec3::ZERO, DVec3::new(0.3, 0.1, 1.0), DVec3::Y, 0.1);
     let settings = without_maps(SceneSettings { rounds: 4, with: vec![Effect::Direct], ..by_rounds() });
-    let lit = seen(gpu, &scene, &settings, &camera, [8, 8]);
-    estimate_check("an eye in glass", mean_red(&lit), 2.25, 1e-4)
+    let result = seen(gpu, &scene, &settings, &camera, [8, 8]);
+    estimate_check("an eye in glass", mean_red(&result), 2.25, 1e-4)
 }
 
 /// With y for z.
@@ -113,7 +113,7 @@ pub fn photons_through_a_slab(gpu: &Gpu) -> Check<Complaint> {
     let mut meshes = lying(slab(1.5, 0.5, 1.5, 1));
     meshes.push(level(0.0, [2.0; 2], true, 0));
     let scene = scene_of(meshes, vec![matt(0.0), solid("slab", 1.5, Vec3::splat(0.5))], vec![sun(DVec3::NEG_Y)]);
-    let lit = received(gpu, &scene, &mapped(20_000, 16, 16, 0.5), &[(DVec3::ZERO, DVec3::Y)]);
+    let result = received(gpu, &scene, &mapped(20_000, 16, 16, 0.5), &[(DVec3::ZERO, DVec3::Y)]);
     let r = fresnel(1.0, 1.0, 1.5);
-    red_check("photons through a slab", &lit, 0, 0.5 * (1.0 - r).powi(2) / (1.0 - (0.5 * r).powi(2)), [0.02, 0.0])
+    red_check("photons through a slab", &result, 0, 0.5 * (1.0 - r).powi(2) / (1.0 - (0.5 * r).powi(2)), [0.02, 0.0])
 }

@@ -9,7 +9,7 @@ use crate::common::densities::{
 use crate::common::prelude::*;
 use photonmill::constants::EMISSION_BLOCKS;
 use photonmill::engine::scene::replay::{Flights, light_paths};
-use photonmill::records::{LightPath, Tally};
+use photonmill::records::{PhotonState, Tally};
 use photonmill::verify::judge::fresnel;
 
 /// Photons of each scene.
@@ -31,9 +31,9 @@ fn scene(normal: DVec3, material: Material, lights: Vec<LightKind>) -> Scene {
 struct Traced {
     geometry: Geometry,
     /// As they leave the light.
-    emitted: Vec<LightPath>,
+    emitted: Vec<PhotonState>,
     /// Those that one flight left, and what became of all.
-    survivors: Vec<LightPath>,
+    survivors: Vec<PhotonState>,
     tally: Tally,
 }
 
@@ -54,7 +54,7 @@ fn trace(gpu: &Gpu, math: Math, scene: &Scene) -> Traced {
 }
 
 impl Traced {
-    fn directions(paths: &[LightPath]) -> Vec<Vec3> {
+    fn directions(paths: &[PhotonState]) -> Vec<Vec3> {
         paths.iter().map(|path| path.direction).collect()
     }
 
@@ -67,7 +67,7 @@ impl Traced {
 }
 
 #[test]
-fn triangles_shine_by_the_cosine_from_all_of_their_area() {
+fn triangles_emit_by_the_cosine_from_all_of_their_area() {
     let Some(gpu) = device() else { return };
     let texels = vec![Vec3::new(1.0, 0.25, 0.5), Vec3::new(0.125, 1.0, 0.5), Vec3::new(0.5, 0.75, 0.0), Vec3::new(0.25, 0.5, 2.0)];
     let texture = texture(2, texels, [Wrap::Clamp; 2]);
@@ -75,7 +75,7 @@ fn triangles_shine_by_the_cosine_from_all_of_their_area() {
         let mut mesh = Mesh::parallelogram("lamp", DVec3::ZERO, DVec3::new(0.6, 0.1, -0.2), DVec3::new(0.1, 0.3, 0.5), 0);
         mesh.triangles.truncate(1);
         let emission_texture = textured.then_some(TextureUse::of(0, 0));
-        let material = Material { emission_texture, two_sided, ..shining(1.0) };
+        let material = Material { emission_texture, two_sided, ..emissive(1.0) };
         Scene { textures: vec![texture.clone()], ..scene_of(vec![mesh], vec![material], vec![]) }
     };
     for (what, two_sided, textured) in [("one side", false, false), ("two sides", true, false), ("a textured side", false, true)] {
@@ -106,7 +106,7 @@ fn triangles_shine_by_the_cosine_from_all_of_their_area() {
         } else {
             assert_eq!(back, []);
         }
-        let cosine_squared = |path: &LightPath| path.direction.as_dvec3().dot(normal).powi(2);
+        let cosine_squared = |path: &PhotonState| path.direction.as_dvec3().dot(normal).powi(2);
         let joint: Vec<(f64, f64)> =
             pairs(&weights, &traced.emitted).map(|(at, path)| ((at.x + at.y).powi(2), cosine_squared(path))).collect();
         assert_holds("place and direction", independence_check(what, &joint));
@@ -123,7 +123,7 @@ fn triangles_shine_by_the_cosine_from_all_of_their_area() {
 }
 
 /// A light alone over a plane that it need not hit.
-fn lit(kind: LightKind) -> Scene {
+fn scene_with(kind: LightKind) -> Scene {
     scene(DVec3::Y, matt(1.0), vec![kind])
 }
 
@@ -133,14 +133,14 @@ fn lights_emit_as_their_kinds_have_it() {
     let axis = AXIS.normalize().as_vec3().as_dvec3().normalize();
     let position = DVec3::new(0.25, 0.5, -0.125);
 
-    let point = trace(&gpu, Math::Fast, &lit(point(position)));
+    let point = trace(&gpu, Math::Fast, &scene_with(point(position)));
     assert!(point.emitted.iter().all(|path| path.position == position.as_vec3()));
     assert_holds("point", sphere_check("point light", &Traced::directions(&point.emitted)));
 
     for (inner, outer) in [(0f64, 30f64), (0.02, 0.05), (45.0, 90.0)] {
         let (inner_angle, outer_angle) = (inner.to_radians() as f32, outer.to_radians() as f32);
         let spot = LightKind::Spot { position, direction: AXIS.normalize(), intensity: Vec3::ONE, inner_angle, outer_angle };
-        let directions = Traced::directions(&trace(&gpu, Math::Fast, &lit(spot)).emitted);
+        let directions = Traced::directions(&trace(&gpu, Math::Fast, &scene_with(spot)).emitted);
         let spot_check = |inner: f64, outer: f64| {
             // glTF's falloff is linear in the cosine, and squared.
             let (cos_inner, cos_outer) = (inner.cos(), outer.cos());
@@ -156,7 +156,7 @@ fn lights_emit_as_their_kinds_have_it() {
         assert_complains("a spot 3 % narrower than its light", spot_check(1.03 * inner, 1.03 * outer));
     }
 
-    let sun = trace(&gpu, Math::Fast, &lit(sun(AXIS)));
+    let sun = trace(&gpu, Math::Fast, &scene_with(sun(AXIS)));
     assert!(sun.emitted.iter().all(|path| path.direction == AXIS.normalize().as_vec3()));
     let radius = sun.geometry.radius;
     let places: Vec<DVec3> = sun.emitted.iter().map(|path| path.position.as_dvec3() + 2.0 * radius * axis).collect();
@@ -164,9 +164,9 @@ fn lights_emit_as_their_kinds_have_it() {
     assert_complains("a disc 1 % smaller", disc_check("fault", &places, axis, 0.99 * radius));
 
     for (what, law) in [("cosine disc", EmissionLaw::Cosine), ("uniform disc", EmissionLaw::Uniform)] {
-        let disc = trace(&gpu, Math::Fast, &lit(disc(position, AXIS.normalize(), 0.125, law)));
+        let disc = trace(&gpu, Math::Fast, &scene_with(disc(position, AXIS.normalize(), 0.125, law)));
         // Rounding lifted them off the disc.
-        let flat = |path: &LightPath| {
+        let flat = |path: &PhotonState| {
             let from_centre = path.position.as_dvec3() - position;
             from_centre - from_centre.dot(axis) * axis
         };
@@ -181,10 +181,10 @@ fn lights_emit_as_their_kinds_have_it() {
         assert_complains("the other law of discs", as_law(other));
     }
 
-    let sky = trace(&gpu, Math::Fast, &lit(LightKind::Environment { radiance: Vec3::ONE }));
+    let sky = trace(&gpu, Math::Fast, &scene_with(LightKind::Environment { radiance: Vec3::ONE }));
     assert_holds("sky", sphere_check("sky, directions", &Traced::directions(&sky.emitted)));
     let radius = sky.geometry.radius;
-    let place = |path: &LightPath| {
+    let place = |path: &PhotonState| {
         let (start, way) = (path.position.as_dvec3(), path.direction.as_dvec3());
         assert!((start.dot(way) + 2.0 * radius).abs() < 1e-5, "{path:?}");
         ((start + 2.0 * radius * way).length_squared() / (radius * radius), 0.5 + 0.5 * way.z)
@@ -306,7 +306,7 @@ fn glossy_surfaces_scatter_by_their_lobe() {
             };
             // The table has four digits.
             assert_holds(&what, scattered(n, 6e-5));
-            // Where few photons are left they tell less.
+            // Where few photons are left they show less.
             if incidence < 85.0 {
                 assert_complains(&format!("{what}: an exponent 10 % off"), scattered(1.1 * (n + 2.0) - 2.0, 1.0));
             }
@@ -398,13 +398,13 @@ fn photons_with_words_at_their_ends_fly_on() {
     let spot =
         LightKind::Spot { position: DVec3::ZERO, direction: axis, intensity: Vec3::ONE, inner_angle: 0.5, outer_angle: FRAC_PI_2 as f32 };
     let lights = [
-        ("lamp", scene(DVec3::Y, shining(1.0), vec![]), DVec3::Y, 1e-4),
-        ("cosine disc", lit(disc(EmissionLaw::Cosine)), axis, 1e-4),
+        ("lamp", scene(DVec3::Y, emissive(1.0), vec![]), DVec3::Y, 1e-4),
+        ("cosine disc", scene_with(disc(EmissionLaw::Cosine)), axis, 1e-4),
         // Rounding of the frame may turn what all but lies in a surface into it.
-        ("uniform disc", lit(disc(EmissionLaw::Uniform)), axis, -2.0 * ULP),
-        ("spot", lit(spot), axis, -2.0 * ULP),
-        ("point", lit(point(DVec3::ZERO)), DVec3::ZERO, -1.0),
-        ("sky", lit(LightKind::Environment { radiance: Vec3::ONE }), DVec3::ZERO, -1.0),
+        ("uniform disc", scene_with(disc(EmissionLaw::Uniform)), axis, -2.0 * ULP),
+        ("spot", scene_with(spot), axis, -2.0 * ULP),
+        ("point", scene_with(point(DVec3::ZERO)), DVec3::ZERO, -1.0),
+        ("sky", scene_with(LightKind::Environment { radiance: Vec3::ONE }), DVec3::ZERO, -1.0),
     ];
     for photon in [0, 1].into_iter().flat_map(edge_photons) {
         for (what, scene, axis, least) in &lights {

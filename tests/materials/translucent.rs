@@ -21,8 +21,8 @@ pub fn sheet_over_a_floor(gpu: &Gpu) -> Check<Complaint> {
     let layers = Layers { specular: 0.0, diffuse_transmission: 0.7, diffuse_transmission_colour: colour, ..plastic(0.7) };
     let scene = scene_of(meshes, vec![layered(Vec3::splat(0.6), &layers), matt(0.0)], vec![sun(way)]);
     let settings = SceneSettings { part: Part::Caustic, caustic_photons: 100_000, caustic_radius: Some(0.05), alpha: 1.0, ..by_rounds() };
-    let lit = received(gpu, &scene, &settings, &[(DVec3::ZERO, DVec3::Y)]);
-    let (found, error) = (means(&lit)[0], standard_errors(&lit)[0]);
+    let result = received(gpu, &scene, &settings, &[(DVec3::ZERO, DVec3::Y)]);
+    let (found, error) = (means(&result)[0], standard_errors(&result)[0]);
     let expected = (0.7f32 * colour).as_dvec3() * -way.y * form_factor(side, height);
     println!("below a sheet: {found} +- {error}, {expected} expected");
     // The mean over the disc differs by less than a thousandth.

@@ -7,7 +7,7 @@ use crate::common::sources::{files, read, root};
 /// From left to right; what stands side by side does not know each other. The longest name decides for a file.
 const LINE: &[&[&str]] = &[
     &["constants", "error", "text", "records", "rng", "ledger", "timings"],
-    &["settings", "path", "photon"],
+    &["settings", "photon_state", "photon"],
     &["scene"],
     &["verify::judge", "plan"],
     &["cpu", "gpu", "oidn"],
@@ -42,7 +42,7 @@ const LINE: &[&[&str]] = &[
     &["measure::interval", "verify::selfcheck"],
     &["measure::paper"],
     &["measure::study"],
-    &["measure::bench", "measure::gallery", "view"],
+    &["measure::bench", "measure::gallery", "window"],
     &["cli"],
     &["main", "lib"],
 ];
@@ -381,10 +381,10 @@ fn the_check_complains_about_arrows_to_the_right() {
     assert!(complains("plan::buffers", "fn f() { crate::gpu::check::run() }"));
     assert!(complains("scene", "use crate::{error::Result, gpu::{Buffer, Gpu}};"));
     assert!(complains("cpu", "use crate::engine::room::resources::RoomResources;"));
-    assert!(complains("verify::judge::path", "use crate::engine::scene::View;"));
+    assert!(complains("verify::judge::camera_path", "use crate::engine::scene::Viewpoint;"));
     assert!(complains("records", "use crate::scene::room::RoomScene;"));
     assert!(complains("engine::room::trace", "use crate::{\n    error::Result,\n    output,\n};"));
-    assert!(complains("engine::room", "use super::scene::View;"));
+    assert!(complains("engine::room", "use super::scene::Viewpoint;"));
     assert!(complains("engine::scene::film", "use super::super::room::film::RoomFilm;"));
     assert!(complains("engine::run::watch", "use crate::engine::choose_builder::Choice;"));
     assert!(complains("engine::run", "use super::room::trace::chunk;"));

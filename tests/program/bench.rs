@@ -11,7 +11,7 @@ use photonmill::measure::bench::rates::{self, CopyRate, Rates};
 use photonmill::measure::bench::room::{self, Timed};
 use photonmill::measure::bench::scale::{Growth, PassTime, Scale, Series, Slope, Step};
 use photonmill::measure::bench::scene::{self, Job};
-use photonmill::measure::bench::{self, Bench, Lab, Request, Size, scale, table};
+use photonmill::measure::bench::{self, Bench, BenchRequest, Lab, Size, scale, table};
 use photonmill::measure::compaction::Agreed;
 use photonmill::output::destination::Folder;
 use photonmill::timings::Spread;
@@ -30,7 +30,7 @@ fn some_rates() -> Rates {
 fn in_lab<T>(gpu: &Gpu, part: impl FnOnce(&mut Lab) -> T) -> T {
     let deadline = Instant::now() + Duration::from_secs(36_000);
     let cancelled = &AtomicBool::new(false);
-    part(&mut Lab { gpu, rates: some_rates(), scene: None, size: Size::Small, deadline, cancelled, tell: &mut |_| {} })
+    part(&mut Lab { gpu, rates: some_rates(), scene: None, size: Size::Small, deadline, cancelled, report: &mut |_| {} })
 }
 
 /// Some experiments, and one more in which it is interrupted: what is complete is kept, and the rest is named.
@@ -43,9 +43,9 @@ fn a_small_bench_reports_every_pass() {
     let experiments: Vec<_> = names.iter().chain(&["open-box"]).map(|name| experiments::by_name(name).unwrap()).collect();
     let last = format!("[{0}/{0}] ", experiments.len());
     let (command, budget, cancelled) = ("photonmill bench".to_owned(), Duration::from_secs(36_000), AtomicBool::new(false));
-    let request = Request { command, size: Size::Small, experiments, scene, scale: false, budget };
-    let mut tell = |line: &str| cancelled.store(line.starts_with(&last), Ordering::Relaxed);
-    let mut found = bench::run(&gpu, request, &cancelled, &mut tell).unwrap();
+    let request = BenchRequest { command, size: Size::Small, experiments, scene, scale: false, budget };
+    let mut report_progress = |line: &str| cancelled.store(line.starts_with(&last), Ordering::Relaxed);
+    let mut found = bench::run(&gpu, request, &cancelled, &mut report_progress).unwrap();
     assert_eq!(found.left_out, ["the remaining experiments: interrupted"]);
     assert!(found.rates.most_bytes(1e6) >= found.rates.copies[0].rate.median);
 

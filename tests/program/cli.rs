@@ -201,7 +201,7 @@ fn a_run_says_how_wrong_it_is() {
         let fields: Vec<&str> = line.as_object().unwrap().keys().map(String::as_str).collect();
         assert!(fields == ["message"] || fields == STEP, "{line}");
     }
-    let last = lines.last().expect("progress is told");
+    let last = lines.last().expect("progress is reported");
     assert_eq!(last["ledger"]["emitted"], last["photons"]);
     assert!(last["error"].as_f64().unwrap() <= last["error_wanted"].as_f64().unwrap() && last["seconds_left"].is_number(), "{last}");
     let report = place.json("a.json");

@@ -172,7 +172,7 @@ fn no_escapes_reach_who_does_not_want_them() {
     assert!(!(stdout + &stderr).contains('\u{1b}'), "no terminal");
 }
 
-/// bash's answer to the tabulator after some words.
+/// bash's answer to the Tab key after some words.
 fn completed(place: &Place, words: &str) -> Vec<String> {
     let program = program();
     let script = format!(

@@ -118,14 +118,14 @@ fn shrunk(arguments: &[&str], values: &[(&str, &str)]) -> Vec<String> {
 fn short(arguments: &[&str]) -> Vec<String> {
     // Kernels of matt walls are made in a quarter of the time; what a file may hold besides is no matter here.
     let is_lit = matches!(arguments.first(), Some(&"render" | &"bake" | &"probe" | &"map"));
-    let lit = |word: &&str| if is_lit && ["scene.glb", "cornell-spheres"].contains(word) { "cornell" } else { *word }.to_owned();
+    let shorter = |word: &&str| if is_lit && ["scene.glb", "cornell-spheres"].contains(word) { "cornell" } else { *word }.to_owned();
     let has = |options: &[&str]| arguments.iter().any(|argument| options.contains(argument));
     let of_kind: &[(&str, &str)] = match (arguments.first(), arguments.get(1)) {
         (Some(&"plan" | &"info" | &"compare" | &"devices" | &"merge" | &"repeat"), _) | (Some(&"map"), Some(&"info" | &"export")) => {
-            return arguments.iter().map(lit).collect();
+            return arguments.iter().map(shorter).collect();
         }
         // A photon is replayed by its number in the run as it is given.
-        _ if has(&["--replay"]) => return arguments.iter().map(lit).collect(),
+        _ if has(&["--replay"]) => return arguments.iter().map(shorter).collect(),
         (Some(&"render"), _) => &[("--size", "8x8")],
         (Some(&"bake"), _) => &[("--texels-per-metre", "2")],
         (Some(&"probe" | &"map"), _) => &[],
@@ -144,7 +144,7 @@ fn short(arguments: &[&str]) -> Vec<String> {
     // There is one device at least.
     let only_if_there = [("--error", "60%"), ("--samples", "2"), ("--counters", "2"), ("--devices", "0,0")];
     let there: Vec<_> = only_if_there.into_iter().filter(|(option, _)| has(&[option])).collect();
-    let words: Vec<String> = arguments.iter().map(lit).collect();
+    let words: Vec<String> = arguments.iter().map(shorter).collect();
     shrunk(&words.iter().map(String::as_str).collect::<Vec<_>>(), &[&of_run, &there[..], of_kind].concat())
 }
 

@@ -301,7 +301,7 @@ const FORCED: &str = "--with glossy,textures";
 const LEFT_OUT: &str = "--without mesh-lights --illumination photons";
 
 #[test]
-fn tables_and_json_tell_one_plan_with_a_row_an_effect() {
+fn tables_and_json_show_one_plan_with_a_row_an_effect() {
     let cases = [("cornell", [FORCED, LEFT_OUT]), (BLENDER, [LEFT_OUT, FORCED])];
     let place = Place::new();
     for (scene, all_options) in cases {
@@ -400,7 +400,7 @@ fn a_run_explains_itself_and_its_report_closes() {
     assert!((shares.iter().map(|name| share(name)).sum::<f64>() - 1.0).abs() < 1e-9, "{effects:?}");
     assert_trace_counts(&place.json("t.json"), &report);
 
-    // What is not asked for is not told; one round knows no error and still is JSON.
+    // What is not asked for is not printed; one round knows no error and still is JSON.
     let (stdout, _) = place.succeed("render cornell --size 4x4 --photons 10 --rounds 1 --bounces 9 --paranoid -o a.png --json b.json");
     assert!(rows_of(&stdout).is_empty() && stdout.contains("unknown after a single round"), "{stdout}");
     let report = place.json("b.json");
@@ -459,9 +459,9 @@ fn a_scene_without_a_camera_is_seen_whole() {
     let Some(place) = place_with_device() else { return };
     place.write("scene.gltf", square(|v| v["scenes"][0]["nodes"] = json!([0, 3])));
     let pixels = exr(&place, "scene.gltf");
-    let lit = |i: usize, j: usize| pixels[3 * (8 * j + i)] > 0.0;
-    assert!(lit(4, 4), "the middle is dark");
-    assert!((0..8).all(|k| !lit(k, 0) && !lit(k, 7) && !lit(0, k) && !lit(7, k)), "the wall is cut off");
+    let is_lit = |i: usize, j: usize| pixels[3 * (8 * j + i)] > 0.0;
+    assert!(is_lit(4, 4), "the middle is dark");
+    assert!((0..8).all(|k| !is_lit(k, 0) && !is_lit(k, 7) && !is_lit(0, k) && !is_lit(7, k)), "the wall is cut off");
     assert_refused(&place, [("render scene.gltf -o b.exr --camera eye", ["--camera eye", "none"])]);
 }
 

@@ -6,17 +6,17 @@ use std::time::Duration;
 
 use crate::common::prelude::*;
 use photonmill::measure::study::axes::{Axis, Configuration};
+use photonmill::measure::study::case::StudyCase;
 use photonmill::measure::study::point::Point;
 use photonmill::measure::study::strip::strip;
-use photonmill::measure::study::subject::Subject;
-use photonmill::measure::study::{self, Part, Request, Study};
+use photonmill::measure::study::{self, Part, Study, StudyRequest};
 use photonmill::output::destination::Folder;
 
 /// Bounded by rounds alone, so that a slow machine finds the same.
-fn request(scene: &str, most_rounds: u32) -> Request {
+fn request(scene: &str, most_rounds: u32) -> StudyRequest {
     let (scene, budget) = (scene.to_owned(), Duration::from_secs(360_000));
-    Request {
-        view: Vec::new(),
+    StudyRequest {
+        scene_options: Vec::new(),
         scene,
         size: 6,
         photons: 2048,
@@ -31,14 +31,14 @@ fn request(scene: &str, most_rounds: u32) -> Request {
 }
 
 /// A study that is interrupted where it says a word that ends so; a whole one for a word that is never said.
-fn run(gpu: &Gpu, folder: &Path, request: Request, end: &str) -> photonmill::error::Result<Study> {
+fn run(gpu: &Gpu, folder: &Path, request: StudyRequest, end: &str) -> photonmill::error::Result<Study> {
     let cancelled = AtomicBool::new(false);
     let folder = Folder::open("-o", folder)?;
     let scene = scene(&request.scene);
-    let mut tell = |line: &str| {
+    let mut report = |line: &str| {
         cancelled.fetch_or(line.ends_with(end), Ordering::Relaxed);
     };
-    let study = study::run(gpu, &scene, request, &folder, &cancelled, &mut tell)?;
+    let study = study::run(gpu, &scene, request, &folder, &cancelled, &mut report)?;
     study::write(&folder, &study)?;
     Ok(study)
 }
@@ -48,17 +48,17 @@ static UNCANCELLED: AtomicBool = AtomicBool::new(false);
 const NEVER: &str = "never";
 
 /// What a study measures of a scene, without measuring it.
-fn subject(gpu: &Gpu, request: &Request) -> Subject {
-    Subject::all(gpu, &scene(&request.scene), request, &UNCANCELLED, &mut |_| {}).unwrap().remove(0)
+fn case(gpu: &Gpu, request: &StudyRequest) -> StudyCase {
+    StudyCase::all(gpu, &scene(&request.scene), request, &UNCANCELLED, &mut |_| {}).unwrap().remove(0)
 }
 
 /// A point of one choice among all.
-fn point_of(gpu: &Gpu, subject: &Subject, request: &Request, label: &str) -> Point {
-    let mut choices = subject.groups.iter().flat_map(|group| &group.configurations);
+fn point_of(gpu: &Gpu, case: &StudyCase, request: &StudyRequest, label: &str) -> Point {
+    let mut choices = case.groups.iter().flat_map(|group| &group.configurations);
     let choice: &Configuration = choices.find(|choice| choice.label.starts_with(label)).unwrap_or_else(|| panic!("no {label}"));
-    let run = |k: u32| subject.run(gpu, choice, request.most_rounds, request.seed + u64::from(k), &UNCANCELLED).unwrap();
+    let run = |k: u32| case.run(gpu, choice, request.most_rounds, request.seed + u64::from(k), &UNCANCELLED).unwrap();
     let shots: Vec<_> = (0..request.repeats).map(|k| (run(k), Duration::ZERO)).collect();
-    Point::of(&shots, &subject.reference, subject.command(choice, request.most_rounds, request.seed), request.most_rounds)
+    Point::of(&shots, &case.reference, case.command(choice, request.most_rounds, request.seed), request.most_rounds)
 }
 
 /// Points by what they are of: quantity, axis, rounds, curve and command.
@@ -205,7 +205,7 @@ fn study_the_open_box(end: &str) -> Option<(Study, String)> {
     assert_holds("the study that went on", resumed_check(&second, &first, &kept));
 
     // Another study does not mix with it.
-    let error = run(&gpu, folder.path(), Request { photons: 4096, ..request() }, end).unwrap_err().to_string();
+    let error = run(&gpu, folder.path(), StudyRequest { photons: 4096, ..request() }, end).unwrap_err().to_string();
     assert!(error.starts_with("-o ") && error.contains("points.jsonl") && !error.contains('\n'), "{error}");
     Some((first, page))
 }
@@ -216,9 +216,9 @@ fn study_a_picture(scene: &str, end: &str) -> Option<(Study, String)> {
     let folder = Place::new();
     let request = || request(scene, 4);
     let mut study = run(&gpu, folder.path(), request(), end).unwrap();
-    let subject = subject(&gpu, &request());
+    let case = case(&gpu, &request());
     if study.parts[0].strip.is_none() {
-        study.parts[0].strip = strip(&gpu, &subject, &study.parts[0], &request(), &UNCANCELLED).unwrap();
+        study.parts[0].strip = strip(&gpu, &case, &study.parts[0], &request(), &UNCANCELLED).unwrap();
         study::write(&Folder::open("-o", folder.path()).unwrap(), &study).unwrap();
     }
     let part = &study.parts[0];
@@ -233,7 +233,7 @@ fn study_a_picture(scene: &str, end: &str) -> Option<(Study, String)> {
     let page = folder.text("index.html");
     assert!(!strip.frames.is_empty() && page.matches("in false colours").count() == strip.frames.len());
     let base = part.base().unwrap();
-    let without = point_of(&gpu, &subject, &request(), "without indirect");
+    let without = point_of(&gpu, &case, &request(), "without indirect");
     assert!(without.error().value > base.best_error(), "{} {}", without.error().value, base.best_error());
     assert!(part.sentences().join("\n").contains("the base"), "{:?}", part.sentences());
     Some((study, page))
@@ -271,11 +271,11 @@ fn floors_are_studied_against_their_closed_form() {
     let Some(gpu) = device() else { return };
     for name in names {
         let request = request(name, 4);
-        let subject = subject(&gpu, &request);
-        assert!(subject.reference.method.contains("closed form"), "{name}");
+        let case = case(&gpu, &request);
+        assert!(case.reference.method.contains("closed form"), "{name}");
         // Few photons are noisy, and right on average.
         for (label, most) in choices {
-            let point = point_of(&gpu, &subject, &request, label);
+            let point = point_of(&gpu, &case, &request, label);
             let (error, bias) = (point.error(), point.bias());
             assert!(error.value < *most && bias.value < 0.2, "{name}, {label}: {error:?}, bias {bias:?}");
         }
@@ -287,7 +287,7 @@ fn floors_are_studied_against_their_closed_form() {
 #[ignore = "long: kernels of a prism, and of its long run"]
 fn light_that_no_path_finds_is_studied_against_a_long_run() {
     let Some(gpu) = device() else { return };
-    let reference = subject(&gpu, &Request { budget: Duration::from_secs(4), ..request("prism", 1) }).reference;
+    let reference = case(&gpu, &StudyRequest { budget: Duration::from_secs(4), ..request("prism", 1) }).reference;
     assert!(reference.method.contains("a long run of photonmill itself"), "{}", reference.method);
     // How long a second is depends on who else uses the processor.
     assert!(reference.relative_error > 0.0 && reference.values.iter().any(|value| *value > 0.0), "{reference:?}");

@@ -9,10 +9,10 @@ use photonmill::constants::{SHOW_ALL, SHOW_DIRECT, SHOW_ERROR};
 use photonmill::engine::room::film::estimate_walls;
 use photonmill::engine::room::live::LiveRoom;
 use photonmill::engine::scene::live::LiveScene;
-use photonmill::engine::scene::{View, trial};
-use photonmill::output::colour::{ColourPicture, Format, Tone, png_codes};
+use photonmill::engine::scene::{Viewpoint, trial};
+use photonmill::output::colour::{ColourImage, Format, Tone, png_codes};
 use photonmill::settings::stop::LEAST_BLOCKS;
-use photonmill::view::picture::{Exposure, Picture};
+use photonmill::window::display::{DisplayImage, Exposure};
 use x11rb::connection::Connection;
 use x11rb::protocol::xproto::{
     ClientMessageEvent, ConfigureWindowAux, ConnectionExt, EventMask, ImageFormat, InputFocus, KEY_PRESS_EVENT, KEY_RELEASE_EVENT, Window,
@@ -32,8 +32,8 @@ fn spheres(gpu: &Gpu) -> (Geometry, Camera, ScenePlan) {
     let (geometry, camera) = (Geometry::new(&scene).unwrap(), scene.first_camera());
     let few = SceneSettings { photons: 1 << 10, caustic_photons: 1 << 10, ..SceneSettings::default() };
     let settings = SceneSettings { rounds: 1 << 16, keeps_parts: true, ..few };
-    let view = View { geometry: &geometry, camera: Some(&camera), phases: &[] };
-    let plan = trial::plan(gpu, &scene, &view, &settings, Sensor::Picture { width: SIZE[0], height: SIZE[1] }).unwrap();
+    let viewpoint = Viewpoint { geometry: &geometry, camera: Some(&camera), phases: &[] };
+    let plan = trial::plan(gpu, &scene, &viewpoint, &settings, Sensor::Picture { width: SIZE[0], height: SIZE[1] }).unwrap();
     (geometry, camera, plan)
 }
 
@@ -51,7 +51,7 @@ fn a_moved_camera_sees_kept_photons_and_the_picture_of_its_own_run() {
     live.look_from(&moved).unwrap();
     // Half of these rounds have kept photons.
     rounds(&mut live, 8);
-    assert_eq!((live.run.state.rounds(), live.kept().0), (8, 8));
+    assert_eq!((live.run.state.rounds(), live.cached().0), (8, 8));
     let after = live.run.look().unwrap().0;
     let mut own = LiveScene::new(&gpu, &geometry, &moved, &plan, &NEVER).unwrap();
     rounds(&mut own, 8);
@@ -71,7 +71,7 @@ fn the_window_has_the_values_of_the_film_and_the_codes_of_its_file() {
     let Some(gpu) = device() else { return };
     let (geometry, camera, plan) = spheres(&gpu);
     let mut live = LiveScene::new(&gpu, &geometry, &camera, &plan, &NEVER).unwrap();
-    let picture = Picture::new(&gpu, SIZE, SIZE).unwrap();
+    let picture = DisplayImage::new(&gpu, SIZE, SIZE).unwrap();
     let pixels = (SIZE[0] * SIZE[1]) as usize;
     // Before a block is whole, and after several.
     for rounds in [1, 12] {
@@ -103,7 +103,7 @@ fn the_window_has_the_values_of_the_film_and_the_codes_of_its_file() {
         assert!(if rounds > 1 { known_pixels > pixels / 2 } else { known_pixels == 0 }, "{known_pixels}");
     }
     let film = live.run.look().unwrap().0;
-    let colours = ColourPicture {
+    let colours = ColourImage {
         width: SIZE[0],
         height: SIZE[1],
         pixels: film.means().map(|mean| Vec3::new(mean.x as f32, mean.y as f32, mean.z as f32)).collect(),
@@ -138,7 +138,7 @@ fn the_box_is_seen_with_the_illumination_of_its_walls() {
         let (column, row) = (3, 11);
         let texel = rectangle.origin + (f64::from(column) + 0.5) / 16.0 * rectangle.u + (f64::from(row) + 0.5) / 16.0 * rectangle.v;
         let camera = Camera::looking_at("test", middle, texel, DVec3::new(0.1, 0.9, 0.2), 0.01);
-        let picture = Picture::new(&gpu, [3, 3], [3, 3]).unwrap();
+        let picture = DisplayImage::new(&gpu, [3, 3], [3, 3]).unwrap();
         live.show(SHOW_ALL, 1.0, &camera, [3, 3], &picture.shown).unwrap();
         let seen = f64::from(live.run.recorder.read(&picture.shown, 9).unwrap()[4].x);
         let expected = estimate_walls(&film, &room, &plan)[place].illumination[(row * 16 + column) as usize];
@@ -199,10 +199,10 @@ fn wait_for<T>(what: &str, mut found: impl FnMut() -> Option<T>) -> T {
 impl Desktop {
     fn new(place: &Place) -> Desktop {
         let number = place.at("display");
-        let told = std::fs::File::create(&number).unwrap();
+        let reported = std::fs::File::create(&number).unwrap();
         let server = Command::new("Xvfb")
             .args(["-displayfd", "1", "-screen", "0", "900x800x24", "-nolisten", "tcp"])
-            .stdout(told)
+            .stdout(reported)
             .stderr(Stdio::null())
             .spawn()
             .expect("Xvfb starts; tools/setup installs it");

@@ -79,7 +79,7 @@ def add_panel(scene, name, matrix, lamp, made):
     material = bpy.data.materials.new(name)
     made.append((bpy.data.materials, material))
     material.use_nodes = True
-    # One-sided, and black where it does not shine.
+    # One-sided, and black where it emits nothing.
     material.use_backface_culling = True
     shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
     shader.inputs["Base Color"].default_value = (0, 0, 0, 1)

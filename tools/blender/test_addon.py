@@ -32,7 +32,7 @@ def material(name, colour):
 
 
 def fresh():
-    """A floor with a ball on it, seen from above the front, nothing that shines."""
+    """A floor with a ball on it, seen from above the front, no emitter."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     bpy.ops.mesh.primitive_plane_add(size=6)
@@ -150,7 +150,7 @@ class AddOn(unittest.TestCase):
         set_world((0.5, 0.7, 1.0), 0.8)
         self.compare()
 
-    def test_a_turned_picture_lights_from_where_it_shines(self):
+    def test_a_turned_picture_lights_from_where_it_is_bright(self):
         picture = bpy.data.images.new("sky", 64, 32, float_buffer=True)
         values = []
         for row in range(32):

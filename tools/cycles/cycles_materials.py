@@ -19,7 +19,7 @@ Cycles' own GGX, diffuse, refraction, textures, normal maps and light transport 
     surface                                            glass without normal maps reflect
     8-bit colours are filtered before decoding         after
 
-Cycles does not tell a material where light comes from. So n.l of K and of the coat is that of the reference lamp of with_lamp.py. The
+Cycles gives a material no direction of the light. So n.l of K and of the coat is that of the reference lamp of with_lamp.py. The
 sky's and the indirect light get the lamp's factor too, where they should get one that is 1 in the mean. It is at most 1.1, and falls
 to 0 where the lamp's light grazes. Without a reference lamp it is 1.
 

@@ -8,7 +8,7 @@ With --own the light is that of the file: the sum of a picture for each lamp, as
 Point and spot lights have a radius of a fiftieth of the scene's, suns are 2 degrees wide, as paths do not find caustics of points
 otherwise; they do not show in mirrors. Spots fade between their cones as in glTF, not as in Blender.
 
-Each picture is the mean of two renderings with different seeds and SPP paths a pixel each: box filter, 64 bounces, caustics on,
+Each picture is the mean of two renderings with different seeds and SPP paths per pixel each: box filter, 64 bounces, caustics on,
 nothing clamped, one thread. The file holds
 
     image     linear radiance, SIZE x SIZE x 3
@@ -54,9 +54,9 @@ def repair(thing):
 
 
 def own_lamps(scene):
-    """Lights, and meshes that shine."""
-    shines = lambda node: node.type == "BSDF_PRINCIPLED" and node.inputs["Emission Strength"].default_value > 0
-    of_mesh = lambda thing: any(shines(node) for material in thing.data.materials for node in material.node_tree.nodes)
+    """Lights, and meshes that emit."""
+    emits = lambda node: node.type == "BSDF_PRINCIPLED" and node.inputs["Emission Strength"].default_value > 0
+    of_mesh = lambda thing: any(emits(node) for material in thing.data.materials for node in material.node_tree.nodes)
     return [thing for thing in scene.objects if thing.type == "LIGHT" or (thing.type == "MESH" and of_mesh(thing))]
 
 
@@ -79,12 +79,12 @@ def only(scene, number):
 
 
 def axis_of(thing):
-    """Against the direction that a light shines in."""
+    """Against the direction that a light emits in."""
     return thing.matrix_world.to_quaternion() @ mathutils.Vector((0, 0, 1))
 
 
 def as_mesh(thing, centre, radius):
-    """A mesh instead of a light, as Cycles tells meshes what rays meet them. `centre` and `radius` are the scene's."""
+    """A mesh instead of a light, as Cycles lets meshes know which rays meet them. `centre` and `radius` are the scene's."""
     light, axis = thing.data, axis_of(thing)
     if light.type == "SUN":
         far = 1000 * radius

@@ -121,7 +121,7 @@ def prepare(asked):
             raise Failure(f"{path}: there is no folder {path.absolute().parent}; make it first")
     load = os.getloadavg()[0]
     if load > IDLE:
-        tell(f"warning: {load:.1f} processes are already at work on this machine; the times below are worth little")
+        print_progress(f"warning: {load:.1f} processes are already at work on this machine; the times below are worth little")
     confine(asked.threads)
     return load
 
@@ -146,9 +146,9 @@ def step(curves, level, repeats, limit_s, right):
         curve.points.append(point)
         computing_s = statistics.mean(point.computing_s)
         asked = f"{point.sample_count} {curve.contestant.samples}"
-        tell(f"{curve.contestant.name}: {asked}, {computing_s:.2f} s, error {100 * point.mean_error():.2f} %")
+        print_progress(f"{curve.contestant.name}: {asked}, {computing_s:.2f} s, error {100 * point.mean_error():.2f} %")
         if abs(statistics.mean(point.level) - 1) > SAME:
-            tell(f"warning: the mean of {curve.contestant.name} is {statistics.mean(point.level):.3f} of the right one")
+            print_progress(f"warning: the mean of {curve.contestant.name} is {statistics.mean(point.level):.3f} of the right one")
         longer = 2.0 if len(curve.points) < 2 else max(2.0, computing_s / statistics.mean(curve.points[-2].computing_s))
         is_enough = point.mean_error() < 0.98 * min(TARGETS)
         curve.is_done = is_enough or longer * computing_s > limit_s or curve.contestant.budget(level + 1) is None
@@ -171,7 +171,7 @@ def judge(budget, runs, right):
     )
 
 
-def tell(line):
+def print_progress(line):
     print(f"bench_peers: {line}", file=sys.stderr, flush=True)
 
 

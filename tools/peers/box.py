@@ -1,4 +1,4 @@
-"""The paper's open box, told once for all programs: walls, lamps, and the points whose irradiance is asked for.
+"""The paper's open box, described once for all programs: walls, lamps, and the points whose irradiance is asked for.
 
 Wall 2 * axis + (1 on the positive side) is perpendicular to its axis; u and v are the two axes after it, cyclically.
 The face at +z is open."""

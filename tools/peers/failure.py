@@ -1,4 +1,4 @@
-"""What a user is told in one line, instead of a traceback."""
+"""What a user reads in one line, instead of a traceback."""
 
 
 class Failure(Exception):

@@ -42,8 +42,8 @@ class Mitsuba:
         result = self.machine.folder / "mitsuba.npy"
         asked = {"tracer": self.tracer, "launches": budget, "seed": seed, "threads": self.machine.threads, "result": str(result)}
         answer, whole_s = clocked([sys.executable, "-m", "peers.mitsuba3", json.dumps(asked)], env=self.environment)
-        told = json.loads(answer.splitlines()[-1])
-        return Run(np.load(result), whole_s, told["computing_s"], told["sample_count"], {"start-up and scene": told["start_s"]})
+        reported = json.loads(answer.splitlines()[-1])
+        return Run(np.load(result), whole_s, reported["computing_s"], reported["sample_count"], {"start-up and scene": reported["start_s"]})
 
 
 class MitsubaPath(Mitsuba):
@@ -107,8 +107,8 @@ class PathTracer(Tracer):
         self.origins = mi.Point3f(*(points + 1e-3 * normals).T.astype("f4"))
         self.directions = mi.Vector3f(*-normals.T.astype("f4"))
         self.texel_count = len(points)
-        # What the texels of the lamps shine is seen too, and no irradiance.
-        self.shining = np.concatenate([self.lamp_radiance(wall) for wall in range(len(box.WALLS))])
+        # What the texels of the lamps emit is seen too, and no irradiance.
+        self.emitted = np.concatenate([self.lamp_radiance(wall) for wall in range(len(box.WALLS))])
 
     def lamp_radiance(self, wall):
         distance = np.linalg.norm(box.grid(wall, box.texel_coordinates()) - box.on_wall(wall, 0, 0), axis=1)
@@ -124,7 +124,7 @@ class PathTracer(Tracer):
         return dr.block_sum(radiance.x, PATHS_A_TEXEL).numpy().astype(float), count
 
     def irradiance(self, total, launches):
-        return (total / (launches * PATHS_A_TEXEL) - self.shining) * np.pi / box.ALBEDO
+        return (total / (launches * PATHS_A_TEXEL) - self.emitted) * np.pi / box.ALBEDO
 
 
 class ParticleTracer(Tracer):

@@ -2,7 +2,7 @@
 
 Both render the same triangles, with the normals of true balls: photonmill from glTF, Mitsuba from PLY. Each run is a process of its
 own, Mitsuba's is this file as a program. What is right is a long run of the same path tracer with other random numbers, whose own
-error, told by its halves, is taken out of all errors (in squares, as both are independent). Of one thing the two think differently:
+error, estimated from its halves, is taken out of all errors (in squares, as both are independent). Of one thing the two think differently:
 a metal of glTF reflects more at grazing angles (Schlick), a conductor of Mitsuba does not, which is 0.2 % of error in the box.
 
 Settings of Mitsuba were chosen by trying: samplers (independent takes 1.6 to 2.5 times as long to the same error as multijitter;
@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from peers import environment, report
-from peers.bench import SAME, first_below, prepare, processor, tell
+from peers.bench import SAME, first_below, prepare, print_progress, processor
 from peers.failure import Failure
 from peers.mitsuba3 import Mitsuba, started
 from peers.photonmill import Photonmill
@@ -56,7 +56,7 @@ def matt(*colour):
 
 
 def lamp(radiance):
-    """Black, and shines to its front, W/m2/sr."""
+    """Black, and emits to its front, W/m2/sr."""
     material = matt(0, 0, 0)
     material.gltf["emissiveFactor"] = [1, 1, 1]
     material.gltf["extensions"]["KHR_materials_emissive_strength"] = {"emissiveStrength": radiance}
@@ -179,12 +179,12 @@ SCENES = {
 
 
 @dataclass
-class Picture:
+class Image:
     pixels: np.ndarray  # (size, size, 3), W/m2/sr
     whole_s: float
     computing_s: float
     # What the program says of the run.
-    told: dict
+    reported: dict
 
 
 class PhotonmillPicture(Photonmill):
@@ -192,12 +192,12 @@ class PhotonmillPicture(Photonmill):
     settings = "render --size NxN --error E, all else by default"
 
     def run(self, file, size, target):
-        picture, told = self.machine.folder / "photonmill.exr", self.machine.folder / "photonmill.json"
-        places = ["-o", picture, "--json", told, "-q"]
+        picture, reported = self.machine.folder / "photonmill.exr", self.machine.folder / "photonmill.json"
+        places = ["-o", picture, "--json", reported, "-q"]
         _, whole_s = clocked([self.program, "render", file, "--size", f"{size}x{size}", "--error", f"{100 * target:g}%", *places])
-        told = json.loads(told.read_text())
-        wall_s = {pass_["name"]: pass_["wall_ms"] / 1e3 for pass_ in told["timings"] if pass_["wall_ms"] is not None}
-        return Picture(pixels_of(picture), whole_s, wall_s["round"], {**told, "wall_s": wall_s})
+        reported = json.loads(reported.read_text())
+        wall_s = {pass_["name"]: pass_["wall_ms"] / 1e3 for pass_ in reported["timings"] if pass_["wall_ms"] is not None}
+        return Image(pixels_of(picture), whole_s, wall_s["round"], {**reported, "wall_s": wall_s})
 
 
 class MitsubaPicture(Mitsuba):
@@ -211,9 +211,9 @@ class MitsubaPicture(Mitsuba):
         asked = {"scene": scene, "folder": str(self.machine.folder / scene), "size": size, "result": str(result)}
         asked.update(seed=seed, threads=self.machine.threads, budget=budget, together=samples_together(size, **budget))
         answer, whole_s = clocked([sys.executable, "-m", "peers.pictures", json.dumps(asked)], env=self.environment)
-        told = json.loads(answer.splitlines()[-1])
+        reported = json.loads(answer.splitlines()[-1])
         with np.load(result) as found:
-            return Picture(found["pixels"], whole_s, told["computing_s"], {**told, **found})
+            return Image(found["pixels"], whole_s, reported["computing_s"], {**reported, **found})
 
 
 def samples_together(size, samples=None, seconds=None):
@@ -245,7 +245,7 @@ class Reference:
         if not np.isfinite(pixels).all():
             raise Failure("a pixel is no number")
         apart = root_mean_square((pixels - self.pixels)[self.counts]) / self.mean()
-        # The reference's own error is known to some 10 %: below twice it others are told roughly, and far below not at all.
+        # The reference's own error is known to some 10 %: below twice it others are known roughly, and far below not at all.
         return float(np.sqrt(max(apart**2 - self.error**2, (self.error / 10) ** 2)))
 
     def level_of(self, pixels):
@@ -258,7 +258,7 @@ def reference(mitsuba, scene, size, seconds):
     key = hashlib.sha256(Path(__file__).read_bytes() + asked).hexdigest()[:16]
     kept = environment.cache() / f"picture-{key}.npz"
     if not kept.exists():
-        found = mitsuba.run(scene, size, seed=1, seconds=seconds).told
+        found = mitsuba.run(scene, size, seed=1, seconds=seconds).reported
         np.savez(kept, **{name: found[name] for name in ("pixels", "halves_apart", "shining", "samples")})
     with np.load(kept) as known:
         counts = ~(known["shining"] > 0).any(axis=2)
@@ -299,23 +299,23 @@ def compare(scene, size, targets, limit_s, reference_s, photonmill, mitsuba):
     folder.mkdir()
     file = SCENES[scene].write(folder)
     right = reference(mitsuba, scene, size, reference_s)
-    tell(f"{scene}: reference of {right.samples} paths a pixel, off by {100 * right.error:.2f} %")
+    print_progress(f"{scene}: reference of {right.samples} paths a pixel, off by {100 * right.error:.2f} %")
     photonmill.run(file, size, targets[0])
     ours = []
     for target in targets:
         picture = photonmill.run(file, size, target)
-        point = {"asked": target, "claimed": picture.told["total_bound"], **judge(photonmill, scene, picture, right)}
-        chosen = {key: picture.told["settings"][key] for key in CHOSEN}
-        ours.append({**point, "chosen": chosen, **{key: picture.told[key] for key in ("rounds", "error_bound", "end", "device", "wall_s")}})
+        point = {"asked": target, "claimed": picture.reported["total_bound"], **judge(photonmill, scene, picture, right)}
+        chosen = {key: picture.reported["settings"][key] for key in CHOSEN}
+        ours.append({**point, "chosen": chosen, **{key: picture.reported[key] for key in ("rounds", "error_bound", "end", "device", "wall_s")}})
     best = min(point["error"] for point in ours)
     if right.error > best / 2:
-        tell(f"warning: the reference of {scene} is too coarse for an error of {100 * best:.2f} %; try a longer --reference-seconds")
+        print_progress(f"warning: the reference of {scene} is too coarse for an error of {100 * best:.2f} %; try a longer --reference-seconds")
     for samples in {FIRST_SAMPLES, samples_together(size)}:
         mitsuba.run(scene, size, seed=2, samples=samples)
     theirs = []
     for level in count():
         picture = mitsuba.run(scene, size, seed=3 + level, samples=FIRST_SAMPLES << level)
-        theirs.append({"samples": picture.told["samples"], **judge(mitsuba, scene, picture, right)})
+        theirs.append({"samples": picture.reported["samples"], **judge(mitsuba, scene, picture, right)})
         if theirs[-1]["error"] <= best or 2 * picture.computing_s > limit_s:
             break
     errors = [point["error"] for point in theirs]
@@ -332,10 +332,10 @@ def compare(scene, size, targets, limit_s, reference_s, photonmill, mitsuba):
 
 def judge(program, scene, picture, right):
     error, level = right.error_of(picture.pixels), right.level_of(picture.pixels)
-    tell(f"{scene}: {program.name}, {picture.computing_s:.2f} s, error {100 * error:.2f} %")
+    print_progress(f"{scene}: {program.name}, {picture.computing_s:.2f} s, error {100 * error:.2f} %")
     # Few samples may be off by chance.
     if abs(level - 1) > max(SAME, 3 * error / np.sqrt(right.counts.sum())):
-        tell(f"warning: the mean of {program.name} is {level:.3f} of the right one")
+        print_progress(f"warning: the mean of {program.name} is {level:.3f} of the right one")
     return {"error": error, "level": level, "computing_s": picture.computing_s, "whole_s": picture.whole_s}
 
 
@@ -360,8 +360,8 @@ def rows_of(scene):
     for point in scene["photonmill"]:
         error = ("about " if point["error"] < 2 * scene["reference"]["error"] else "") + f"{100 * point['error']:.2f}"
         claimed = "-" if point["claimed"] is None else f"{100 * point['claimed']:.1f}"
-        told = [f"{100 * point['asked']:g}", claimed, error, f"{point['level']:.4f}"]
-        yield [name, "photonmill", *told, f"{point['computing_s']:.2f}", f"{point['whole_s']:.2f}", "1"]
+        reported = [f"{100 * point['asked']:g}", claimed, error, f"{point['level']:.4f}"]
+        yield [name, "photonmill", *reported, f"{point['computing_s']:.2f}", f"{point['whole_s']:.2f}", "1"]
         computing = point["mitsuba"]["computing_s"]
         sign = "above " if not computing else "below " if computing["is_bound"] else ""
         seconds = {clock: times["seconds"] if times else last[clock] for clock, times in point["mitsuba"].items()}

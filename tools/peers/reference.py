@@ -62,16 +62,16 @@ def direct(points, wall):
     nodes, weights = np.polynomial.legendre.leggauss(8)
     angles = 2 * np.pi * (np.arange(32) + 0.5) / 32
     total = np.zeros(len(points))
-    for lit in box.LAMPS:
-        if lit == wall:
+    for lit_wall in box.LAMPS:
+        if lit_wall == wall:
             continue
         for node, weight in zip(nodes, weights):
             radius = box.LAMP_RADIUS * np.sqrt((node + 1) / 2)
             area = np.pi * box.LAMP_RADIUS**2 * weight / 2 / len(angles)
-            for source in box.on_wall(lit, radius * np.cos(angles), radius * np.sin(angles)):
+            for source in box.on_wall(lit_wall, radius * np.cos(angles), radius * np.sin(angles)):
                 way = points - source
                 squared = np.einsum("ij,ij->i", way, way)
-                total += box.lamp_radiance(lit) * area * (way @ box.inward(lit)) * -(way @ box.inward(wall)) / squared**2
+                total += box.lamp_radiance(lit_wall) * area * (way @ box.inward(lit_wall)) * -(way @ box.inward(wall)) / squared**2
     return total
 
 

@@ -24,7 +24,7 @@ class Run:
     whole_s: float
     computing_s: float
     sample_count: int
-    # Seconds of the parts that the program tells apart.
+    # Seconds of the parts that the program distinguishes.
     parts_s: dict = field(default_factory=dict)
 
 

@@ -332,7 +332,7 @@ class Scene:
 
     @property
     def lights(self) -> list[Light]:
-        """Meshes of an emissive material shine as well."""
+        """Meshes of an emissive material emit light as well."""
 
     @property
     def materials(self) -> list[str]:

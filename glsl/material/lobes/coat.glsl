@@ -18,7 +18,7 @@ float coat_colour(float coat, float cosine)
 }
 
 // The BRDF of what photon maps know of it, 1/sr.
-vec3 coat_brdf(MattCover cover, vec3 n, vec3 wo, vec3 wi)
+vec3 coat_brdf(RoughCover cover, vec3 n, vec3 wo, vec3 wi)
 {
     if (HAS_COATS && cover.has_coat_lobe != 0) {
         vec3 coat_normal = unpack_normal(cover.coat_normal);
@@ -39,7 +39,7 @@ float coat_density(Surface surface, Lobes lobes, vec3 wo, vec3 wi)
 vec3 sharp_coat(Surface surface, Lobes lobes, vec3 wo, vec3 wi, float light_density)
 {
     Layers layers = surface.layers;
-    if (layers.coat_alpha < DELTA_ALPHA || is_matt(layers.coat_alpha) || lobes.coat_chance <= 0.0) {
+    if (layers.coat_alpha < DELTA_ALPHA || is_rough(layers.coat_alpha) || lobes.coat_chance <= 0.0) {
         return vec3(0.0);
     }
     Weighed found = weigh_reflection(coat_facets(surface), wo, wi);

@@ -20,25 +20,25 @@ vec2 reflectance_bound(Base base, Layers layers)
 }
 
 // Share of light from wo that gets below coat and reflection.
-float share_below(Layers layers, MattLobes matt, LayerAlbedos seen, float cosine)
+float share_below(Layers layers, RoughLobes rough, LayerAlbedos seen, float cosine)
 {
-    float below = below_base(matt.e0, matt.e90, seen.base);
+    float below = below_base(rough.e0, rough.e90, seen.base);
     if (HAS_ANISOTROPY && layers.is_stretched) {
-        below = max(below - matt.e90 * stretch_excess(cosine), 0.0);
+        below = max(below - rough.e90 * stretch_excess(cosine), 0.0);
     }
     return below * (1.0 - seen.coat);
 }
 
 // The mean of that share over all directions.
-float mean_share_below(Layers layers, MattLobes matt)
+float mean_share_below(Layers layers, RoughLobes rough)
 {
     vec2 mean = mean_albedo(layers.alpha);
-    float left = 1.0 - (matt.e0 * mean.x + matt.e90 * mean.y);
+    float left = 1.0 - (rough.e0 * mean.x + rough.e90 * mean.y);
     if (HAS_COATS && layers.coat > 0.0) {
         vec2 coat_mean = mean_albedo(layers.coat_alpha);
         vec2 first = mean_products(layers.alpha, layers.coat_alpha, false);
         vec2 second = mean_products(layers.alpha, layers.coat_alpha, true);
-        left += layers.coat * (matt.e0 * (0.04 * first.x + first.y) + matt.e90 * (0.04 * second.x + second.y) - (0.04 * coat_mean.x + coat_mean.y));
+        left += layers.coat * (rough.e0 * (0.04 * first.x + first.y) + rough.e90 * (0.04 * second.x + second.y) - (0.04 * coat_mean.x + coat_mean.y));
     }
     return left;
 }
@@ -59,9 +59,9 @@ float diffuse_weight(Surface surface, Base base, float below)
 }
 
 // The diffuse lobe under coat and sheen, 1/sr.
-vec3 diffuse_brdf(MattLobes lobes, MattCover cover, LayerAlbedos lit)
+vec3 diffuse_brdf(RoughLobes lobes, RoughCover cover, LayerAlbedos towards_light)
 {
-    return below_all(lobes.diffuse, lobes, cover, lit);
+    return below_all(lobes.diffuse, lobes, cover, towards_light);
 }
 
 // Of what is scattered about n as by the cosine.

@@ -21,7 +21,7 @@ bool has_lobe(uint kind)
 // How a lobe weighs light from wi towards wo; 1 on a Lambertian surface.
 float lobe_weight(uint kind, float exponent, vec3 ns, vec3 wo, vec3 wi)
 {
-    // Layered surfaces weigh light by matt_brdf().
+    // Layered surfaces weigh light by rough_brdf().
     if (!has_lobe(kind) || kind == SURFACE_LAYERED) {
         return 1.0;
     }

@@ -37,7 +37,7 @@ Base base_of(Surface surface, float eta)
     base.f90 = layers.metallic + schlick_share * f90;
     base.film = no_film();
     if (HAS_IRIDESCENCE) {
-        base.film = MattFilm(layers.iridescence, layers.film_ior, layers.film_thickness, schlick_share, f0, layers.metallic,
+        base.film = RoughFilm(layers.iridescence, layers.film_ior, layers.film_thickness, schlick_share, f0, layers.metallic,
                              surface.base_colour, 0);
     }
     return base;
@@ -45,13 +45,13 @@ Base base_of(Surface surface, float eta)
 
 // Rays follow what a solid reflects however rough it is: what it transmits they follow too. And they follow what is sharp across a
 // tangent if not along it.
-bool is_matt_reflection(Lobes lobes, Layers layers)
+bool is_rough_reflection(Lobes lobes, Layers layers)
 {
     bool is_stretched = false;
     if (HAS_ANISOTROPY) {
         is_stretched = layers.is_stretched;
     }
-    return is_matt(layers.alpha) && lobes.base.exact_share == 0.0 && !is_stretched;
+    return is_rough(layers.alpha) && lobes.base.exact_share == 0.0 && !is_stretched;
 }
 
 bool is_smooth_reflection(Layers layers, Lobes lobes)
@@ -106,18 +106,18 @@ float reflection_weight(Base base, Layers layers, LayerAlbedos seen, vec3 exact,
 }
 
 // The BRDF of what photon maps know of it, 1/sr.
-vec3 reflection_brdf(MattLobes lobes, MattCover cover, MattFilm film, LayerAlbedos lit, vec3 n, vec3 wo, vec3 wi)
+vec3 reflection_brdf(RoughLobes lobes, RoughCover cover, RoughFilm film, LayerAlbedos towards_light, vec3 n, vec3 wo, vec3 wi)
 {
     if (HAS_IRIDESCENCE && film.share > 0.0) {
-        if (film.is_matt == 0) {
+        if (film.is_rough == 0) {
             return vec3(0.0);
         }
         float along = dot(wo, normalize(wo + wi));
         vec3 colour = lobes.f0 + (lobes.f90 - lobes.f0) * fifth_power(clamp(1.0 - along, 0.0, 1.0));
-        return ggx_lobe(lobes.alpha, vec3(1.0), 1.0, wo, wi, n).x * under_film(colour, film, along) * below_cover(cover, lit);
+        return ggx_lobe(lobes.alpha, vec3(1.0), 1.0, wo, wi, n).x * under_film(colour, film, along) * below_cover(cover, towards_light);
     }
     if (lobes.f90 > 0.0 || largest(lobes.f0) > 0.0) {
-        return ggx_lobe(lobes.alpha, lobes.f0, lobes.f90, wo, wi, n) * below_cover(cover, lit);
+        return ggx_lobe(lobes.alpha, lobes.f0, lobes.f90, wo, wi, n) * below_cover(cover, towards_light);
     }
     return vec3(0.0);
 }

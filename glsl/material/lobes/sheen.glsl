@@ -36,13 +36,13 @@ float sheen_lobe(float alpha, vec3 wo, vec3 wi, vec3 n, vec2 albedos)
 }
 
 // Sheen under a coat, 1/sr.
-vec3 sheen_brdf(MattCover cover, LayerAlbedos lit, vec3 n, vec3 wo, vec3 wi)
+vec3 sheen_brdf(RoughCover cover, LayerAlbedos towards_light, vec3 n, vec3 wo, vec3 wi)
 {
     vec3 sheen = vec3(0.0);
     if (HAS_SHEEN && cover.sheen != vec3(0.0)) {
-        sheen = cover.sheen * sheen_lobe(cover.sheen_alpha, wo, wi, n, vec2(cover.sheen_albedo, lit.sheen));
+        sheen = cover.sheen * sheen_lobe(cover.sheen_alpha, wo, wi, n, vec2(cover.sheen_albedo, towards_light.sheen));
         if (HAS_COATS) {
-            sheen *= 1.0 - max(cover.coat_albedo, lit.coat);
+            sheen *= 1.0 - max(cover.coat_albedo, towards_light.coat);
         }
     }
     return sheen;

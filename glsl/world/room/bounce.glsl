@@ -30,7 +30,7 @@ bool has_next_bounce()
 }
 
 // What the ledger needs, it has: fates.
-void cut_off(LightPath path)
+void cut_off(PhotonState path)
 {
 }
 

@@ -3,7 +3,7 @@
 layout(set = 0, binding = 2, scalar) readonly buffer Lights { DiscLight lights[]; };
 layout(set = 1, binding = 0, scalar) readonly buffer StreamSeeds { uvec2 stream_seeds[]; };
 
-LightPath leave_light(uint index, PhotonRange range)
+PhotonState leave_light(uint index, PhotonRange range)
 {
     uint photon = range.first_photon + index;
     DiscLight light = lights[range.light];
@@ -17,5 +17,5 @@ LightPath leave_light(uint index, PhotonRange range)
     vec3 direction;
     emit_from_disc(light, walls[light.wall], u, position, direction);
     note_unless(is_finite(position) && is_finite(direction) && is_finite(light.flux), NONFINITE_PHOTON, DOMAIN_PHOTONS, push.key.round, photon);
-    return LightPath(position, light.wall, direction, photon, stream, light.flux);
+    return PhotonState(position, light.wall, direction, photon, stream, light.flux);
 }

@@ -13,7 +13,7 @@ layout(set = 1, binding = 1, scalar) writeonly buffer NextPaths { uvec4 next_pat
 #include "rng/rng.glsl"
 #include "rng/sampling.glsl"
 #include "world/room/disc.glsl"
-#include "world/room/path.glsl"
+#include "world/room/photon_state.glsl"
 #include "world/room/emit.glsl"
 
 uint photon_count()

@@ -6,7 +6,7 @@ const uint PATHS_EACH = PATHS_TOGETHER;
 layout(set = 1, binding = 0, scalar) readonly buffer Paths { uvec4 paths[]; };
 layout(set = 1, binding = 1, scalar) writeonly buffer NextPaths { uvec4 next_paths[]; };
 
-LightPath incoming_path(uint index)
+PhotonState incoming_path(uint index)
 {
     uvec4[PATH_WORDS] words;
     for (uint k = 0; k < PATH_WORDS; k++) {
@@ -16,7 +16,7 @@ LightPath incoming_path(uint index)
 }
 
 // Whether a path has not died there; of those that a bounce has read, and of those that it may read.
-bool is_path(LightPath path)
+bool is_path(PhotonState path)
 {
     return path.wall != NO_WALL;
 }
@@ -27,13 +27,13 @@ bool has_path(uint index)
 }
 
 // A path that has died where it stands.
-LightPath emptied(LightPath path)
+PhotonState emptied(PhotonState path)
 {
     path.wall = NO_WALL;
     return path;
 }
 
-void store_path(uint place, LightPath path)
+void store_path(uint place, PhotonState path)
 {
     uvec4[PATH_WORDS] words = pack_path(path);
     for (uint k = 0; k < PATH_WORDS; k++) {

@@ -16,7 +16,7 @@ bool has_photon(uint index)
 
 Photon left_photon(uint index)
 {
-    LightPath path = incoming_path(index);
+    PhotonState path = incoming_path(index);
     float weight = 1.0;
     if (HAS_PHONG) {
         weight = weights[index];

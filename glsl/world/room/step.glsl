@@ -5,7 +5,7 @@ layout(set = 0, binding = 1, scalar) readonly buffer Walls { Wall walls[]; };
 
 #include "world/step.glsl"
 
-Step step_path(inout LightPath path, uint bounce)
+Step step_path(inout PhotonState path, uint bounce)
 {
     Hit hit = intersect_room(rooms[0], path.position, path.direction, path.wall);
     Wall wall = walls[hit.wall];

@@ -12,7 +12,7 @@ layout(push_constant, scalar) uniform Push { TracePush push; };
 #include "rng/sampling.glsl"
 #include "world/room/geometry.glsl"
 #include "world/room/photon.glsl"
-#include "world/room/path.glsl"
+#include "world/room/photon_state.glsl"
 #include "world/room/map.glsl"
 #include "material/phong_weight.glsl"
 #include "world/room/lists.glsl"

@@ -11,7 +11,7 @@ layout(push_constant, scalar) uniform Push { TracePersistentPush push; };
 #include "rng/sampling.glsl"
 #include "world/room/geometry.glsl"
 #include "world/room/photon.glsl"
-#include "world/room/path.glsl"
+#include "world/room/photon_state.glsl"
 #include "world/room/map.glsl"
 #include "material/phong_weight.glsl"
 #include "world/room/disc.glsl"
@@ -44,12 +44,12 @@ uint end_of_bounces()
     return push.bounces;
 }
 
-LightPath take_photon(uint index)
+PhotonState take_photon(uint index)
 {
     return leave_light(index, push.range);
 }
 
 // What becomes of a path that is alive after its last bounce here. The ledger knows its fate.
-void leave_path(LightPath path, uint bounce)
+void leave_path(PhotonState path, uint bounce)
 {
 }

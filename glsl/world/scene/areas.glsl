@@ -1,4 +1,4 @@
-// Points on areas that shine, and directions towards them, from uniform numbers.
+// Points on emissive areas, and directions towards them, from uniform numbers.
 
 // Barycentric weights of the second and third corner, uniform over a triangle.
 vec2 sample_triangle(vec2 u)

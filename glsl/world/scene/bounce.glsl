@@ -30,7 +30,7 @@ bool has_next_bounce()
 }
 
 // A path that is alive, but allowed no further bounce.
-void cut_off(LightPath path)
+void cut_off(PhotonState path)
 {
     count_loss(TOTAL_CUT_OFF, path.flux);
 }

@@ -12,7 +12,7 @@
 #include "world/scene/light_choice.glsl"
 #include "world/scene/direct.glsl"
 #include "world/scene/visible_point.glsl"
-#include "world/scene/one_hit.glsl"
+#include "world/scene/single_hit.glsl"
 #include "film/kept_places.glsl"
 #include "film/kept_parts.glsl"
 #include "world/scene/points.glsl"

@@ -14,7 +14,7 @@ struct CameraPath {
     // bits 6 and 7: visible points found; from bit 8 on: surfaces that it has met.
     uint state;
     vec3 weight;
-    // Of its smooth ways, where the others were followed too (glsl/world/scene/other_ways.glsl).
+    // Of its smooth ways, where the others were followed too (glsl/world/scene/splitting.glsl).
     float chance;
     // What it runs through (glsl/material/media.glsl).
     uint media;
@@ -26,8 +26,8 @@ struct CameraPath {
 
 // What a path is followed for.
 const uint ROLE_EYE = 0; // what the eye sees
-const uint ROLE_OTHER_WAY = 1; // what shines, along a way that a path did not take
-const uint ROLE_TO_LIGHT = 2; // what shines at the next vertex, seen from matt lobes
+const uint ROLE_SPLIT = 1; // what emits light, along a way that a path did not take
+const uint ROLE_TO_LIGHT = 2; // what emits light at the next vertex, seen from rough lobes
 const uint ROLE_GATHER = 3; // indirect light of the first visible point, or of a receiver
 const uint ROLE_GATHER_IN_AIR = 4; // all light of a receiver that no photon can reach
 
@@ -35,11 +35,11 @@ struct Chain {
     vec3 position;
     vec3 direction;
     vec3 weight; // radiance at the eye for radiance that arrives along the ray
-    float chance; // of the smooth ways it took where the others are followed too; what shines counts so often less
+    float chance; // of the smooth ways it took where the others are followed too; what emits light counts so often less
     uint role;
     bool is_smooth; // it has met nothing yet but mirrors, panes and what they show
     bool saw_specular; // before the first visible point
-    bool sees_emission; // what shines at the next vertex has not been counted yet
+    bool sees_emission; // what emits light at the next vertex has not been counted yet
     uint media; // what it runs through
     // Of a path whose direction light samples know too: the density of that direction, 1/sr, and from where; 0: no light sample has
     // counted what it meets.
@@ -49,7 +49,7 @@ struct Chain {
     uint point_count; // visible points found
     bool met_surface; // the eye's path, which scatters light
     vec3 light[3]; // direct, specular, indirect
-    vec3 seen; // what shines by itself and is met by the eye's ray, before any surface that scatters
+    vec3 seen; // what emits light and is met by the eye's ray, before any surface that scatters
 };
 
 // The path of this thread, and ways that it has not taken. No arguments: drivers keep copies of one that has arrays.
@@ -78,7 +78,7 @@ bool gathers_in_air()
 
 bool is_other_way()
 {
-    return HAS_SPECULAR_CHAINS && chain.role == ROLE_OTHER_WAY;
+    return HAS_SPECULAR_CHAINS && chain.role == ROLE_SPLIT;
 }
 
 bool ends_at_light()
@@ -114,8 +114,8 @@ bool is_straight()
     return !chain.saw_specular && !has_gathered() && !ends_at_light();
 }
 
-// What shines by itself at the next vertex. Seen straight it is no light of surfaces.
-void add_shining(vec3 radiance)
+// What emits light at the next vertex. Seen straight it is no light of surfaces.
+void add_emission(vec3 radiance)
 {
     vec3 light = chain.chance * chain.weight * radiance;
     if (HAS_SEEN_LIGHT && is_straight() && (PARTS & PART_DIRECT) != 0) {
@@ -155,14 +155,14 @@ uint arrivals_wanted(bool gathers)
     return wanted;
 }
 
-// Adds what shines at the end of a ray, where light samples have not counted all of it; `light_density` is theirs.
+// Adds what emits light at the end of a ray, where light samples have not counted all of it; `light_density` is theirs.
 void add_emission(vec3 radiance, float light_density)
 {
     float share = 1.0;
     if (HAS_LAYERS && chain.density > 0.0) {
         share = divide(chain.density, chain.density + float(work.shadow_rays) * light_density);
     }
-    add_shining(share * radiance);
+    add_emission(share * radiance);
 }
 
 bool gathers_here(Surface surface)
@@ -185,7 +185,7 @@ const uint LENS_BLOCK = CHANNEL_BLOCK + 1;
 // A direction of the sky that a pixel looks at, two blocks.
 const uint WINDOW_BLOCK = LENS_BLOCK + 1;
 
-// What shines where the path leaves the scene.
+// What emits light where the path leaves the scene.
 void see_sky(uint emitter_count)
 {
     if (chain.sees_emission) {
@@ -201,7 +201,7 @@ void see_sky(uint emitter_count)
     }
 }
 
-// What shines where the path meets a surface.
+// What emits light where the path meets a surface.
 void see_lamp(Surface surface, Hit hit, uint emitter_count)
 {
     if (chain.sees_emission) {
@@ -213,7 +213,7 @@ void see_lamp(Surface surface, Hit hit, uint emitter_count)
     }
 }
 
-// Whether a ray leaves matt lobes of the eye's paths to see what shines. A gather ray would leave them for other light.
+// Whether a ray leaves rough lobes of the eye's paths to see what emits light. A gather ray would leave them for other light.
 bool seeks_light()
 {
     return GATHER_RAYS == GATHER_NONE && !has_gathered() && (PARTS & part_of(ARRIVED_DIRECT)) != 0;
@@ -227,7 +227,7 @@ struct Vertex {
     Lobes lobes; // of a layered surface
     Scatter scatter; // where the path goes on
     bool is_smooth; // and where it goes by a lobe that has one direction alone
-    float matt; // probability of the lobes that photon maps know
+    float rough; // probability of the lobes that photon maps know
     float chance; // chain.chance beyond
 };
 
@@ -240,7 +240,7 @@ bool is_culled()
     return vertex.is_layered && !vertex.surface.scatters && !has_gathered() && !ends_at_light();
 }
 
-#include "world/scene/other_ways.glsl"
+#include "world/scene/splitting.glsl"
 
 // Random numbers: block 1 + VERTEX_BLOCKS * depth goes on, the one after it is for direct light.
 uint block_at(uint depth)
@@ -255,8 +255,8 @@ void sample_way(Draws draws, uint depth)
     vertex.scatter = sample_surface(vertex.surface, vertex.lobes, vertex.wo, u, depth, true);
     vertex.is_smooth = vertex.scatter.is_specular && vertex.scatter.density == 0.0;
     vertex.chance = chain.chance;
-    if (follows_other_ways(depth) && !is_culled()) {
-        vertex.chance *= leave_other_ways(u.x, depth);
+    if (follows_split_paths(depth) && !is_culled()) {
+        vertex.chance *= leave_split_paths(u.x, depth);
     }
 }
 
@@ -267,7 +267,7 @@ void meet_surface(Hit hit, Draws draws, uint depth)
     vertex.wo = -chain.direction;
     vertex.surface = surface_at(hit, vertex.wo);
     vertex.is_layered = has_layers(vertex.surface.kind);
-    vertex.matt = 1.0;
+    vertex.rough = 1.0;
     if (vertex.is_layered) {
         uint channel = 1;
         if (HAS_DISPERSION && is_dispersive(vertex.surface, chain.media)) {
@@ -276,7 +276,7 @@ void meet_surface(Hit hit, Draws draws, uint depth)
             chain.weight = light_of_channel(chain.weight, channel);
         }
         vertex.lobes = lobes_at(vertex.surface, vertex.wo, chain.media, channel, depth);
-        vertex.matt = matt_chance(vertex.lobes, vertex.surface.layers);
+        vertex.rough = rough_chance(vertex.lobes, vertex.surface.layers);
         sample_way(draws, depth);
     } else {
         vertex.scatter.passes = false;
@@ -306,7 +306,7 @@ bool add_direct_light(uint emitter_count, Draws draws, uint block)
         return false;
     }
     vec3 scale = vertex.is_layered ? vec3(1.0) : vertex.surface.base_colour * scatter_scale(vertex.surface.kind, vertex.surface.parameter);
-    Target here = Target(vertex.surface, vertex.wo, vertex.lobes, chain.media, vertex.is_layered && seeks_light());
+    ShadingPoint here = ShadingPoint(vertex.surface, vertex.wo, vertex.lobes, chain.media, vertex.is_layered && seeks_light());
     vec3 light = scale * direct_light(here, emitter_count, draws, own.pixel, own.number, block);
     if (wants_direct) {
         add_light(light);
@@ -325,7 +325,7 @@ bool add_direct_light(uint emitter_count, Draws draws, uint block)
     return true;
 }
 
-// Leaves a visible point for matt lobes. Says whether a ray leaves it to gather light.
+// Leaves a visible point for rough lobes. Says whether a ray leaves it to gather light.
 bool leave_point(bool for_all, uint pixel_count)
 {
     Surface surface = vertex.surface;
@@ -337,13 +337,13 @@ bool leave_point(bool for_all, uint pixel_count)
                               : SEEN | (chain.saw_specular ? SEEN_OVER_SPECULAR : 0) | (has_gathered() ? SEEN_BY_GATHER : 0)
                                     | (for_all ? SEEN_FOR_ALL : 0);
     // What light goes on to the eye.
-    vec3 scale = vertex.is_layered ? vec3(divide(0.31830988618379067, vertex.matt)) : surface.base_colour * scatter_scale(surface.kind, surface.parameter);
+    vec3 scale = vertex.is_layered ? vec3(divide(0.31830988618379067, vertex.rough)) : surface.base_colour * scatter_scale(surface.kind, surface.parameter);
     uint place = place_of_point(chain.point_count++, own.place, pixel_count);
     visible_points[place] = VisiblePoint(surface.position, surface.plane, divide(chain.weight * scale, float(own.count)),
                                          surface.ns == surface.ng ? NONE : pack_normal(surface.ns), pack_direction(vertex.wo, 0), surface.parameter,
                                          surface.kind, arrivals);
     if (HAS_LAYERS) {
-        write_matt_lobes(place, vertex.lobes);
+        write_rough_lobes(place, vertex.lobes);
     }
     return gathers;
 }
@@ -351,22 +351,22 @@ bool leave_point(bool for_all, uint pixel_count)
 // Leaves a visible point, and says what the path goes on for, if it does.
 bool leave_matt_lobes(bool asked_lights, uint pixel_count)
 {
-    if (vertex.matt == 0.0) {
+    if (vertex.rough == 0.0) {
         return false;
     }
     // Where it is by chance that a path gets here, each counts for itself.
-    bool for_all = !chain.saw_specular && !has_gathered() && vertex.matt == 1.0;
+    bool for_all = !chain.saw_specular && !has_gathered() && vertex.rough == 1.0;
     if (leave_point(for_all, pixel_count)) {
         chain.role = ROLE_GATHER;
         chain.density = 0.0;
         chain.weight *= for_all ? float(own.count) : 1.0;
-        // Shadow rays and the caustic map have counted what shines from here on.
+        // Shadow rays and the caustic map have counted what emits light from here on.
         chain.sees_emission = false;
         return true;
     }
     if (asked_lights && vertex.is_layered && seeks_light()) {
         chain.role = ROLE_TO_LIGHT;
-        chain.density = density_of_matt_lobes(vertex.surface, vertex.lobes, vertex.wo, vertex.scatter.direction);
+        chain.density = density_of_rough_lobes(vertex.surface, vertex.lobes, vertex.wo, vertex.scatter.direction);
         return true;
     }
     return false;
@@ -431,7 +431,7 @@ bool step(uint pixel_count, Draws draws, uint emitter_count, uint depth)
     }
     bool is_unlit = vertex.is_layered && vertex.surface.layers.is_unlit;
     if (is_unlit && !has_gathered() && !ends_at_light()) {
-        add_shining(vertex.surface.base_colour);
+        add_emission(vertex.surface.base_colour);
     }
     see_lamp(vertex.surface, hit, emitter_count);
     if (!vertex.surface.scatters || ends_at_light()) {

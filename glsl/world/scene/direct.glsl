@@ -1,27 +1,27 @@
 // Direct light by shadow rays.
 
 // A point that light arrives at: of a surface, or a receiver.
-struct Target {
+struct ShadingPoint {
     Surface surface;
     vec3 wo;
     Lobes lobes; // of a layered surface
     uint media; // on the side of wo
-    bool asks_lobes; // a ray of its matt lobes sees lights, too
+    bool asks_lobes; // a ray of its rough lobes sees lights, too
 };
 
-Target receiver_at(vec3 position, float error, vec3 ng, vec3 ns)
+ShadingPoint receiver_at(vec3 position, float error, vec3 ng, vec3 ns)
 {
-    Target target;
-    target.surface.position = position;
-    target.surface.error = error;
-    target.surface.ng = ng;
-    target.surface.ns = ns;
-    target.surface.kind = SURFACE_RECEIVER;
-    target.surface.parameter = 0.0;
-    target.wo = ns;
-    target.media = 0;
-    target.asks_lobes = false;
-    return target;
+    ShadingPoint point;
+    point.surface.position = position;
+    point.surface.error = error;
+    point.surface.ng = ng;
+    point.surface.ns = ns;
+    point.surface.kind = SURFACE_RECEIVER;
+    point.surface.parameter = 0.0;
+    point.wo = ns;
+    point.media = 0;
+    point.asks_lobes = false;
+    return point;
 }
 
 // What a layered surface lets pass straight.
@@ -79,7 +79,7 @@ struct ShadowRay {
     bool is_hidden;
 };
 
-ShadowRay cast_shadow_ray(Target point, Arriving arriving, Draws draws, uint index)
+ShadowRay cast_shadow_ray(ShadingPoint point, Arriving arriving, Draws draws, uint index)
 {
     ShadowRay ray = ShadowRay(vec3(0.0), vec3(0.0), false, false);
     Surface surface = point.surface;
@@ -92,7 +92,7 @@ ShadowRay cast_shadow_ray(Target point, Arriving arriving, Draws draws, uint ind
     if (largest(arriving.radiance) > 0.0) {
         if (has_layers(surface.kind)) {
             LobeLight light = weigh_light(surface, point.lobes, point.wo, arriving.wi, float(work.shadow_rays) * arriving.density, point.asks_lobes);
-            ray.light = arriving.radiance * light.matt;
+            ray.light = arriving.radiance * light.rough;
             ray.sharp_light = arriving.radiance * light.sharp;
             ray.is_asked = largest(ray.light) > 0.0 || largest(ray.sharp_light) > 0.0;
             leaves_along = arriving.wi;
@@ -134,7 +134,7 @@ vec3 sharp_light = vec3(0.0);
 
 // What arrives straight from lights, times lobe and cosine: irradiance where there is no lobe. The rays of all samples of
 // the place `index` in a block of rounds share random numbers.
-vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uint number, uint block)
+vec3 direct_light(ShadingPoint point, uint emitter_count, Draws draws, uint index, uint number, uint block)
 {
     Surface surface = point.surface;
     vec3 sum = vec3(0.0);

@@ -48,9 +48,9 @@ layout(constant_id = 20) const bool HAS_ENVIRONMENT = true;
 layout(constant_id = 70) const bool HAS_SKY_PICTURE = false;
 // Visible points send rays towards lights; not where the photon maps hold direct light too.
 layout(constant_id = 21) const bool HAS_SHADOW_RAYS = true;
-// The eye may meet what shines by itself: of a picture.
+// Camera rays may hit emitters (pictures only).
 layout(constant_id = 72) const bool HAS_SEEN_LIGHT = false;
-// Whether photons are also counted within a smaller radius, which tells the bias (film/differences.glsl).
+// Whether photons are also counted within a smaller radius, which gives the bias (film/differences.glsl).
 layout(constant_id = 73) const bool HAS_DIFFERENCES = false;
 // Whether a picture keeps the parts of each pixel's light apart (film/kept_parts.glsl).
 layout(constant_id = 74) const bool HAS_PARTS = false;

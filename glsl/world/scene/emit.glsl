@@ -1,6 +1,6 @@
 // A photon as it leaves the lights of a scene (world/scene/lights.glsl), aimed where that pays (world/scene/aim.glsl).
 
-LightPath leave_light(uint photon, Draws draws, PhotonEmission emission)
+PhotonState leave_light(uint photon, Draws draws, PhotonEmission emission)
 {
     vec4 u = philox_floats(uvec4(photon, draws.round, 0, draws.domain), draws.seed);
     vec4 w = philox_floats(uvec4(photon, draws.round, 1, draws.domain), draws.seed);
@@ -26,5 +26,5 @@ LightPath leave_light(uint photon, Draws draws, PhotonEmission emission)
     if (HAS_MEDIA && !emitted.is_far) {
         media = media_at(emitted.position, emitted.direction);
     }
-    return LightPath(emitted.position, photon, emitted.direction, ARRIVED_DIRECT, emitted.flux, media);
+    return PhotonState(emitted.position, photon, emitted.direction, ARRIVED_DIRECT, emitted.flux, media);
 }

@@ -7,11 +7,11 @@ layout(push_constant, scalar) uniform Push { EmissionPush push; };
 #include "world/scene/rays.glsl"
 #include "world/scene/areas.glsl"
 #include "world/scene/lights.glsl"
-#include "world/scene/path.glsl"
+#include "world/scene/photon_state.glsl"
 #include "world/scene/aim.glsl"
 #include "world/scene/emit.glsl"
 
-layout(set = 1, binding = 1, scalar) writeonly buffer NextPaths { LightPath next_paths[]; };
+layout(set = 1, binding = 1, scalar) writeonly buffer NextPaths { PhotonState next_paths[]; };
 
 uint photon_count()
 {

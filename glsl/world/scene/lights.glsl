@@ -1,6 +1,6 @@
 // Lights: where photons start, and what arrives at a point straight from them.
 
-// A light, or a triangle that shines. Lengths are those of the normalised scene.
+// A light, or an emissive triangle. Lengths are those of the normalised scene.
 struct Emitter {
     // `EMITTER_...`.
     uint kind;
@@ -13,7 +13,7 @@ struct Emitter {
     // Radiance, radiant intensity or irradiance, as its kind has it; of a uniform disc the
     // intensity of a unit of area.
     vec3 strength;
-    // Of a triangle the weights of its second and third corner where the piece that shines begins, and the piece's width over the
+    // Of a triangle the weights of its second and third corner where the emitting piece begins, and the piece's width over the
     // triangle's (`scene::geometry::lamp_pieces`).
     vec3 position;
     // Its axis or normal; a directional light's flight; towards the brightest part of a sky's picture.
@@ -57,7 +57,7 @@ float triangle_area(Triangle triangle)
     return 0.5 * norm(cross(triangle.b - triangle.a, triangle.c - triangle.a));
 }
 
-// The corners of a triangle that shines, or of the piece of it that a light is; the rest is the triangle's.
+// The corners of an emissive triangle, or of the piece of it that a light is; the rest is the triangle's.
 Triangle lamp_corners(Emitter light, Triangle triangle)
 {
     vec3 ab = triangle.b - triangle.a, ac = triangle.c - triangle.a;
@@ -214,13 +214,13 @@ struct Arriving {
 // Density with which sample_light() takes a point of a lamp, 1/sr, from a place that the lamp faces.
 float lamp_density(Emitter light, Triangle triangle, vec3 position, vec3 point)
 {
-    Triangle shining = triangle;
+    Triangle lamp = triangle;
     float width = 1.0;
     if (HAS_TEXTURES) {
-        shining = lamp_corners(light, triangle);
+        lamp = lamp_corners(light, triangle);
         width = light.position.z;
     }
-    float angle = sample_spherical_triangle(normalize(shining.a - position), normalize(shining.b - position), normalize(shining.c - position),
+    float angle = sample_spherical_triangle(normalize(lamp.a - position), normalize(lamp.b - position), normalize(lamp.c - position),
                                             vec2(0.5)).w;
     vec3 way = point - position;
     float squared = dot(way, way);
@@ -254,11 +254,11 @@ void sample_lamp(inout Arriving arriving, Emitter light, vec3 position, vec2 u)
 {
     Triangle triangle = triangles[light.triangle];
     SurfaceMaterial material = materials[triangle.material];
-    Triangle shining = triangle;
+    Triangle lamp = triangle;
     float area = triangle_area(triangle);
     vec2 at = sample_triangle(u);
     if (HAS_TEXTURES) {
-        shining = lamp_corners(light, triangle);
+        lamp = lamp_corners(light, triangle);
         area *= light.position.z * light.position.z;
         at = weights_in_triangle(light, at);
     }
@@ -271,7 +271,7 @@ void sample_lamp(inout Arriving arriving, Emitter light, vec3 position, vec2 u)
     float cosine = is_before(side, position, triangle_error(triangle)) ? max(dot(normal, normalize(position - point)), 0.0) : 0.0;
     vec4 direction = vec4(0.0);
     if (cosine > 0.0) {
-        direction = sample_spherical_triangle(normalize(shining.a - position), normalize(shining.b - position), normalize(shining.c - position), u);
+        direction = sample_spherical_triangle(normalize(lamp.a - position), normalize(lamp.b - position), normalize(lamp.c - position), u);
     }
     float approach = -dot(direction.xyz, normal);
     bool by_direction = direction.w > 0.0 && approach > 0.0;

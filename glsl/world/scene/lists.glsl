@@ -4,16 +4,16 @@
 // more.
 const uint PATHS_EACH = 1;
 
-layout(set = 1, binding = 0, scalar) readonly buffer Paths { LightPath paths[]; };
-layout(set = 1, binding = 1, scalar) writeonly buffer NextPaths { LightPath next_paths[]; };
+layout(set = 1, binding = 0, scalar) readonly buffer Paths { PhotonState paths[]; };
+layout(set = 1, binding = 1, scalar) writeonly buffer NextPaths { PhotonState next_paths[]; };
 
-LightPath incoming_path(uint index)
+PhotonState incoming_path(uint index)
 {
     return paths[index];
 }
 
 // Whether a path has not died there; of those that a bounce has read, and of those that it may read.
-bool is_path(LightPath path)
+bool is_path(PhotonState path)
 {
     return path.arrival != 0;
 }
@@ -24,13 +24,13 @@ bool has_path(uint index)
 }
 
 // A path that has died where it stands.
-LightPath emptied(LightPath path)
+PhotonState emptied(PhotonState path)
 {
     path.arrival = 0;
     return path;
 }
 
-void store_path(uint place, LightPath path)
+void store_path(uint place, PhotonState path)
 {
     next_paths[place] = path;
 }

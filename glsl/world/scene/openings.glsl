@@ -87,7 +87,7 @@ float table_share(Emitter sky, vec3 position)
 }
 
 // By the picture's table, towards the openings, or by the cosine. Aimed samples are a share of those that the table leaves, so that a sun
-// that shines in has as many as without openings.
+// that emits in has as many as without openings.
 SampledSky sample_sky(Emitter sky, vec3 position, vec3 ns, vec2 u)
 {
     float sum = sum_of_versines(position);

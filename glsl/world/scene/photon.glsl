@@ -1,5 +1,5 @@
 // A photon where it arrived at a surface that scatters: one entry of the map of a scene of triangles. In memory it is two
-// aligned words of 16 bytes, each read and written at once; the first alone tells whether a photon is near. Twin of
+// aligned words of 16 bytes, each read and written at once; the first alone shows whether a photon is near. Twin of
 // src/photon.rs.
 
 struct Photon {

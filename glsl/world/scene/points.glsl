@@ -6,17 +6,17 @@ layout(set = 1, binding = 1, scalar) writeonly buffer VisiblePoints { VisiblePoi
 layout(set = 1, binding = 2, scalar) buffer PassSums { uvec2 pass_sums[]; };
 
 // Of layered surfaces, beside the visible point of the same number.
-layout(set = 1, binding = 14, scalar) writeonly buffer MattLobesOfPoints { MattLobes matt_lobes[]; };
-layout(set = 1, binding = 16, scalar) writeonly buffer MattCoversOfPoints { MattCover matt_covers[]; };
+layout(set = 1, binding = 14, scalar) writeonly buffer RoughLobesOfPoints { RoughLobes rough_lobes[]; };
+layout(set = 1, binding = 16, scalar) writeonly buffer RoughCoversOfPoints { RoughCover rough_covers[]; };
 
-void write_matt_lobes(uint place, Lobes lobes)
+void write_rough_lobes(uint place, Lobes lobes)
 {
-    matt_lobes[place] = lobes.matt;
+    rough_lobes[place] = lobes.rough;
     if (HAS_IRIDESCENCE) {
         lobes.cover.film = lobes.base.film;
     }
     if (HAS_COATS || HAS_SHEEN || HAS_IRIDESCENCE) {
-        matt_covers[place] = lobes.cover;
+        rough_covers[place] = lobes.cover;
     }
 }
 

@@ -85,6 +85,6 @@ void see_peaks_of_sky(Emitter sky, vec3 eye, Draws draws, uint pixel, uint numbe
     float by_rays = pixel_density(wi), by_window = window_density(sky, wi);
     if (by_rays > 0.0 && by_window > PEAK * by_rays) {
         vec3 passed = passed_straight(eye, wi);
-        add_shining(passed * sky_radiance(sky, wi) * divide(by_rays, by_rays + by_window));
+        add_emission(passed * sky_radiance(sky, wi) * divide(by_rays, by_rays + by_window));
     }
 }

@@ -24,7 +24,7 @@ struct SkyWindow {
     float footprint;
 };
 
-// Set by kernels/view.comp alone.
+// Set by kernels/camera_paths.comp alone.
 SkyWindow window = SkyWindow(false, uvec2(0), uvec2(0), vec3(0.0), 1.0, vec3(0.0), vec3(0.0), vec3(0.0), vec2(1.0), vec2(0.0), 1.0);
 
 float share_of_range(uint shares, uint first, uint last)

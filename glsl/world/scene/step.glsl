@@ -10,7 +10,7 @@ Step no_step()
     return Step(false, false, false, false, Photon(vec3(0.0), 0, vec3(0.0), 0));
 }
 
-Step step_path(inout LightPath path, uint bounce)
+Step step_path(inout PhotonState path, uint bounce)
 {
     Step taken = no_step();
     Hit hit = closest_hit(path.position, path.direction);
@@ -24,7 +24,7 @@ Step step_path(inout LightPath path, uint bounce)
         Surface surface = surface_at(hit, wo);
         bool is_layered = has_layers(surface.kind);
         Lobes lobes;
-        bool has_matt = keeps_photons(triangles[hit.triangle].material);
+        bool has_rough = keeps_photons(triangles[hit.triangle].material);
         vec3 entering = arriving;
         if (is_layered) {
             uint channel = 1;
@@ -35,10 +35,10 @@ Step step_path(inout LightPath path, uint bounce)
                 entering = light_of_channel(arriving, channel);
             }
             lobes = lobes_at(surface, wo, path.media, channel, bounce);
-            has_matt = has_matt && surface.scatters;
+            has_rough = has_rough && surface.scatters;
         }
         // Also where alpha has a gap: the light there is that of the surface about it, whose area the density estimate counts.
-        taken.stored = has_matt && (path.arrival & push.map.stored) != 0;
+        taken.stored = has_rough && (path.arrival & push.map.stored) != 0;
         taken.photon = Photon(surface.position, surface.plane, arriving, pack_direction(wo, findLSB(path.arrival)));
 
         vec4 u = philox_floats(uvec4(path.photon, push.draws.round, EMISSION_BLOCKS + bounce, push.draws.domain), push.draws.seed);
@@ -92,7 +92,7 @@ Step step_path(inout LightPath path, uint bounce)
         if (HAS_MEDIA && is_layered && specular && surface.layers.medium != 0 && dot(scatter.direction, surface.ng) < 0.0) {
             media = media_beyond(surface, media);
         }
-        path = LightPath(start, path.photon, scatter.direction, onward, flux, media);
+        path = PhotonState(start, path.photon, scatter.direction, onward, flux, media);
     }
     return taken;
 }

@@ -27,7 +27,7 @@ uint pixel_in_tiles(uint place, uint width, uint height)
     return pixel.y * width + pixel.x;
 }
 
-// The same of visible points: sets of one a pixel, set after set. Receivers have an order of their own: their width is 0; and so have extra
+// The same of visible points: sets of one per pixel, set after set. Receivers have an order of their own: their width is 0; and so have extra
 // samples.
 uint point_in_tiles(uint place, uint width, uint height, uint pixel_count)
 {

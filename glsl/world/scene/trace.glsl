@@ -9,7 +9,7 @@ layout(push_constant, scalar) uniform Push { FlightPush push; };
 #include "material/bsdf.glsl"
 #include "ledger/totals.glsl"
 #include "world/scene/photon.glsl"
-#include "world/scene/path.glsl"
+#include "world/scene/photon_state.glsl"
 #include "world/scene/map.glsl"
 #include "world/scene/lists.glsl"
 #include "world/scene/bounce.glsl"

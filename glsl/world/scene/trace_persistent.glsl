@@ -9,7 +9,7 @@ layout(push_constant, scalar) uniform Push { SceneTracePersistentPush push; };
 #include "world/scene/rays.glsl"
 #include "world/scene/areas.glsl"
 #include "world/scene/lights.glsl"
-#include "world/scene/path.glsl"
+#include "world/scene/photon_state.glsl"
 #include "world/scene/aim.glsl"
 #include "material/bsdf.glsl"
 #include "ledger/totals.glsl"
@@ -45,7 +45,7 @@ uint end_of_bounces()
     return push.first_bounce + push.flights;
 }
 
-LightPath take_photon(uint index)
+PhotonState take_photon(uint index)
 {
     uint photon = push.emission.first_photon + index;
     if (push.first_bounce == 0) {
@@ -55,7 +55,7 @@ LightPath take_photon(uint index)
 }
 
 // What becomes of a path that is alive after its last bounce here.
-void leave_path(LightPath path, uint bounce)
+void leave_path(PhotonState path, uint bounce)
 {
     if (bounce < push.bounces) {
         store_path(atomicAdd(counters[1], 1), path);

@@ -6,10 +6,10 @@
 //! by half the bias of the larger, and the bias is twice their difference. Both come from the same photons, as a photon
 //! follows from seed, round and number alone: what is noise in one is mostly noise in the other.
 //!
-//! Several independent groups of rounds tell how large the difference D is without its noise: the mean of D_g * D_h over pairs of
+//! Several independent groups of rounds show how large the difference D is without its noise: the mean of D_g * D_h over pairs of
 //! different groups has the mean |E D|^2, where |mean of D|^2 would have the noise on top. Its interval is a jackknife's
 //! over groups with Student's quantile. Of a scene the groups are the blocks of the run itself ([`super::differences`]); where these
-//! do not tell, they are batches of rounds of their own ([`super::bias_batches`]).
+//! do not show it, they are batches of rounds of their own ([`super::bias_batches`]).
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -27,7 +27,7 @@ pub struct Bias {
     pub from: BiasFrom,
 }
 
-/// What tells a bias.
+/// Where a bias comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum BiasFrom {
@@ -59,7 +59,7 @@ impl Bias {
         Bias { relative: 0.0, lower: 0.0, upper: 0.0, confidence, from: BiasFrom::NoMap }
     }
 
-    /// Of radii that are as small as they may be, and still wider than what many points lie in: a wider one tells nothing.
+    /// Of radii that are as small as they may be, and still wider than what many points lie in: a wider one shows nothing.
     pub fn unknown(confidence: f64) -> Bias {
         Bias { relative: f64::INFINITY, upper: f64::INFINITY, from: BiasFrom::Nothing, ..Bias::none(confidence) }
     }
@@ -107,7 +107,7 @@ pub(crate) struct Groups {
 }
 
 impl Groups {
-    /// Fewer tell no spread.
+    /// Fewer give no spread.
     const LEAST: usize = 4;
 
     pub(crate) fn of<T: Copy + Into<f64>>(groups: &[(f64, Vec<T>)]) -> Groups {

@@ -85,11 +85,11 @@ pub(crate) fn difference(
     let means: Vec<f64> = (0..wholes[0].len())
         .map(|value| wholes.iter().map(|whole: &Vec<f32>| f64::from(whole[value])).sum::<f64>() / wholes.len() as f64)
         .collect();
-    let lit = means.iter().filter(|mean| **mean > 0.0).count();
-    if lit == 0 {
+    let positive = means.iter().filter(|mean| **mean > 0.0).count();
+    if positive == 0 {
         return Ok(Some([0.0; 3]));
     }
-    let measure = ErrorMeasure::new(measure, lit as f64, means.iter().sum());
+    let measure = ErrorMeasure::new(measure, positive as f64, means.iter().sum());
     for (_, values) in &mut differences {
         values.iter_mut().zip(&means).for_each(|(value, mean)| *value = measure.relative(f64::from(*value), *mean) as f32);
     }

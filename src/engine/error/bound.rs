@@ -1,4 +1,4 @@
-//! The error of a result: what a film tells of it, and the bound that it has not more of, with a confidence.
+//! The error of a result: what a film says of it, and the bound that it has not more of, with a confidence.
 
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor, StudentsT};
@@ -9,11 +9,11 @@ use super::unknown::Unknown;
 use crate::constants::PART_COUNT;
 use crate::settings::stop::LEAST_BLOCKS;
 
-/// What a film of so many rounds tells of its error, relative to its light.
+/// What a film of so many rounds says of its error, relative to its light.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FilmError {
     pub rounds: u32,
-    /// Whole blocks, of which the spread tells the noise.
+    /// Whole blocks, of which the spread gives the noise.
     pub blocks: u32,
     /// Standard error; infinite of fewer than two blocks.
     pub noise: f64,
@@ -48,7 +48,7 @@ impl ErrorPlaces {
 }
 
 impl FilmError {
-    /// As users are told of it: of few blocks the noise is unknown, and so is where it sits. Black all over is as it was.
+    /// As reported to users: of few blocks the noise is unknown, and so is where it sits. Black all over is as it was.
     pub fn stated(self) -> FilmError {
         match self.blocks < LEAST_BLOCKS && self.noise > 0.0 {
             true => FilmError { noise: f64::INFINITY, places: None, ..self },
@@ -81,7 +81,7 @@ impl FilmError {
 /// quantile of the F distribution (Fisher 1924). With one degree of freedom of the error the root is Student's quantile.
 ///
 /// The standard error is taken one standard error of its own larger, because runs that end at an error end sooner where it is too
-/// small by chance. The bound is infinite where nothing tells the error. The bias of the radius is not part of it.
+/// small by chance. The bound is infinite where nothing gives the error. The bias of the radius is not part of it.
 pub(crate) fn error_bound(relative_error: f64, freedom: DegreesOfFreedom, confidence: f64) -> f64 {
     if relative_error == 0.0 || relative_error.is_infinite() {
         return relative_error;
@@ -154,7 +154,7 @@ mod tests {
 
     /// Tables of Student's distribution.
     #[test]
-    fn intervals_widen_where_few_blocks_tell_the_error() {
+    fn intervals_widen_where_few_blocks_give_the_error() {
         let source = |degrees_of_freedom| ErrorSource { degrees_of_freedom, confidence: 0.95 };
         for (freedom, expected) in [(7, 2.365), (15, 2.131), (31, 2.040)] {
             assert!((source(freedom).reach().unwrap() - expected).abs() < 1e-3, "{freedom}");

@@ -9,7 +9,7 @@
 //! Both have a part that comes from each place by itself, and one that places have in common. What few places have in common is what all
 //! have. But few places have few errors of their own: how many all have follows from the variances of all.
 
-/// Of a film's squared error, and of what the rounds tell of it.
+/// Of a film's squared error, and of what the rounds say of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct DegreesOfFreedom {
     pub error: f64,
@@ -66,7 +66,7 @@ impl DegreesOfFreedom {
         let spread = spread_of(&|round| squares[round], mean_square);
         let spread_alone: f64 =
             variances.iter().enumerate().map(|(place, mean)| spread_of(&|round| squares_of_places[round][place], *mean)).sum();
-        // Relative variances of the square of a round's error: as far as it is normal, and in all. What few rounds tell of them may
+        // Relative variances of the square of a round's error: as far as it is normal, and in all. What few rounds say of them may
         // be too small by chance, so their upper limits are taken.
         let upper = |count: f64| 1.0 + SURE * (2.0 / count).sqrt();
         let of_all =
@@ -121,7 +121,7 @@ mod tests {
 
     /// 240 places of 24 000 are kept: what each has by itself, all have a hundred times as often, and what they have in common no more often.
     #[test]
-    fn few_places_tell_of_all() {
+    fn few_places_stand_for_all() {
         let found = DegreesOfFreedom::of(&rounds(256, 240, 240), 1, 256, 1.0 / 24_000.0);
         assert!((4e3..3e4).contains(&found.error), "{found:?}");
         let found = DegreesOfFreedom::of(&rounds(256, 240, 4), 1, 256, 1.0 / 24_000.0);

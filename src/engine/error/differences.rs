@@ -1,7 +1,7 @@
-//! What a smaller radius would change, from all blocks of a run: sums that tell the bias of the radius ([`super::bias`]).
+//! What a smaller radius would change, from all blocks of a run: sums that give the bias of the radius ([`super::bias`]).
 //!
 //! Each round is also estimated within a share of its radii. Each block b so has a picture D_b of what that changes. The bias follows from
-//! scalar products of different blocks, whose mean is |E D|^2. A picture a block is more than can be kept, so each is kept as a count
+//! scalar products of different blocks, whose mean is |E D|^2. A picture per block is more than can be kept, so each is kept as a count
 //! sketch (Charikar, Chen and Farach-Colton 2002): every pixel goes to one of some sums, with a sign of its own. Scalar products of
 //! sketches have the mean of those of the pictures, and the sketch of a sum is the sum of sketches. Sums are integers, so that shards
 //! add up to the bits of one run.

@@ -1,4 +1,4 @@
-//! How far a result may be from the truth: what its blocks, hits and samples tell of the noise, what smaller radii tell of the bias, and
+//! How far a result may be from the truth: what its blocks, hits and samples say of the noise, what smaller radii say of the bias, and
 //! the bound of both.
 
 pub mod bias;

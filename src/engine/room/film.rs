@@ -110,7 +110,7 @@ impl RoomFilm {
         weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0).map(|point| of_point(point).powi(2)).sum::<f64>().sqrt()
     }
 
-    /// What it tells of its error; `unit` makes W/m2 of flux times weight.
+    /// What it says of its error; `unit` makes W/m2 of flux times weight.
     pub(crate) fn error(&self, weights: &[f64], unit: f64, stop: &Stop) -> FilmError {
         let measure = self.measure(weights, stop.measure);
         let weighted = |point: usize, values: &[f32]| {
@@ -149,7 +149,7 @@ impl RoomFilm {
         unknown.with_relative(f64::sqrt(bounds))
     }
 
-    /// [`RoomFilm::flux_error`], but infinite where few rounds tell it, and where nothing was found on a wall that reflects.
+    /// [`RoomFilm::flux_error`], but infinite where few rounds give it, and where nothing was found on a wall that reflects.
     fn stated_error(&self, point: usize, albedo: f32) -> f64 {
         let is_unknown = self.blocks < LEAST_BLOCKS || albedo > 0.0 && self.is_unreached(point);
         if is_unknown { f64::INFINITY } else { self.flux_error(point) }

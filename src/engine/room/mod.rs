@@ -26,7 +26,7 @@ use crate::engine::room::film::{RoomFilm, irradiance_weights};
 use crate::engine::room::resources::RoomResources;
 use crate::engine::run::identity::{Hash, Identity};
 use crate::engine::run::saved::SavedFilm;
-use crate::engine::run::watch::Keep;
+use crate::engine::run::watch::Checkpointing;
 use crate::engine::run::{self, Task};
 use crate::error::{Result, require};
 use crate::gpu::{DeviceFacts, Gpu};
@@ -92,19 +92,24 @@ fn fates(plan: &RoomPlan) -> Vec<Fates> {
 }
 
 /// What a run of the box computes, where it is kept.
-fn identity(keep: &mut Keep, scene: &RoomScene, plan: &RoomPlan, device: Option<&DeviceFacts>) -> Result<Option<Identity>> {
+fn identity(
+    checkpointing: &mut Checkpointing,
+    scene: &RoomScene,
+    plan: &RoomPlan,
+    device: Option<&DeviceFacts>,
+) -> Result<Option<Identity>> {
     let settings = &plan.settings;
-    let identity = keep.identity(|name| {
+    let identity = checkpointing.identity(|name| {
         let (mut content, mut found) = (Hash::default(), Hash::default());
         content.add_text(&format!("{scene:?}"));
         found.add_text(&format!("{} {} {:?} {:?}", plan.channel_count, plan.film_shift, plan.light_photons, plan.relative_flux));
         Identity::new(name, content, settings, found, device, settings.math)
     })?;
-    let is_kept = identity.is_some() || keep.share.of > 1;
+    let is_kept = identity.is_some() || checkpointing.share.of > 1;
     let allowed = "must be integer with `checkpoint`, `resume` and `shard`, whose sums are the same to the bit in any order";
     require(!is_kept || settings.sums == Sums::Integer, "sums", format!("{:?}", settings.sums).to_lowercase(), allowed)?;
     let (places, channels) = (plan.points.len(), plan.channel_count);
-    keep.check_resumed(|saved| {
+    checkpointing.check_resumed(|saved| {
         matches!(&saved.film, SavedFilm::Room(film) if film.channel_count == channels)
             && saved.has_lengths(&fates(plan), places * channels as usize, kept_count(places))
     })?;

@@ -10,7 +10,7 @@ use crate::engine::Control;
 use crate::engine::nonfinite_values::{NonfiniteValues, What};
 use crate::engine::room::film::RoomFilm;
 use crate::engine::run::saved::WorldFilm;
-use crate::engine::run::watch::Later;
+use crate::engine::run::watch::Lazy;
 use crate::engine::run::{self, RunState, Task, World};
 use crate::error::{Error, Result};
 use crate::ledger::Fates;
@@ -42,10 +42,10 @@ struct RoomOnCpu<'a> {
 /// Runs on the CPU, on `settings.threads` threads.
 pub(crate) fn on_cpu(scene: &RoomScene, settings: &RoomSettings, control: &mut Control) -> Result<RunResult> {
     let clock = HostClock::start("run");
-    let plan = &RoomPlan { is_kept: control.keep.is_used(), ..plan(scene, settings)? };
-    let identity = super::identity(&mut control.keep, scene, plan, None)?;
+    let plan = &RoomPlan { is_kept: control.checkpointing.is_used(), ..plan(scene, settings)? };
+    let identity = super::identity(&mut control.checkpointing, scene, plan, None)?;
     let pool = thread_pool(settings)?;
-    let film = control.keep.resume.as_ref().map_or_else(|| RoomFilm::new(plan), |(_, saved)| RoomFilm::of(&saved.film).clone());
+    let film = control.checkpointing.resume.as_ref().map_or_else(|| RoomFilm::new(plan), |(_, saved)| RoomFilm::of(&saved.film).clone());
     let world = RoomOnCpu {
         tracer: Tracer::new(scene, plan),
         blocks: Vec::new(),
@@ -102,7 +102,7 @@ impl World for RoomOnCpu<'_> {
         Ok(())
     }
 
-    fn film(&mut self, _: &mut HostClock, state: &RunState<RoomFilm>) -> Result<Later<RoomFilm>> {
+    fn film(&mut self, _: &mut HostClock, state: &RunState<RoomFilm>) -> Result<Lazy<RoomFilm>> {
         let mut film = RoomFilm { emitted: state.emitted(), ..self.film.clone() };
         if state.rounds() == 0 {
             self.flush();

@@ -11,7 +11,7 @@ use crate::engine::room::film::RoomFilm;
 use crate::engine::room::resources::{RoomResources, RoundBuffers};
 use crate::engine::room::{Chunk, estimate, index, trace};
 use crate::engine::run::saved::WorldFilm;
-use crate::engine::run::watch::Later;
+use crate::engine::run::watch::Lazy;
 use crate::engine::run::{self, RunState, Task, World};
 use crate::engine::{Control, tallies};
 use crate::error::Result;
@@ -30,14 +30,14 @@ pub(crate) struct RoomOnGpu<'a> {
 /// Runs on the GPU.
 pub(crate) fn on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings, control: &mut Control) -> Result<RunResult> {
     let started = Instant::now();
-    let plan = RoomPlan { is_kept: control.keep.is_used(), ..RoomPlan::new(scene, settings, &engine::limits(gpu.facts()))? };
-    let identity = super::identity(&mut control.keep, scene, &plan, Some(gpu.facts()))?;
+    let plan = RoomPlan { is_kept: control.checkpointing.is_used(), ..RoomPlan::new(scene, settings, &engine::limits(gpu.facts()))? };
+    let identity = super::identity(&mut control.checkpointing, scene, &plan, Some(gpu.facts()))?;
     estimate::check_sums(&plan, gpu.facts())?;
     let mut commands = run::commands(gpu, &modules(&plan, gpu), constants(&plan), settings.math, started)?;
     let resources = commands.scope("set-up", |commands| RoomResources::new(commands, scene, &plan))?;
     commands.warm_up()?;
     commands.submit()?;
-    if let Some((_, saved)) = &control.keep.resume {
+    if let Some((_, saved)) = &control.checkpointing.resume {
         restore(&mut commands, &resources, &plan, RoomFilm::of(&saved.film))?;
     }
     let world = RoomOnGpu { plan: &plan, resources };
@@ -85,7 +85,7 @@ impl<'a> World for RoomOnGpu<'a> {
         Ok(())
     }
 
-    fn film(&mut self, commands: &mut Commands<'a>, state: &RunState<RoomFilm>) -> Result<Later<RoomFilm>> {
+    fn film(&mut self, commands: &mut Commands<'a>, state: &RunState<RoomFilm>) -> Result<Lazy<RoomFilm>> {
         let RoomOnGpu { resources, plan, .. } = self;
         let mut film = RoomFilm { emitted: state.emitted(), ..RoomFilm::new(plan) };
         let count = film.sums.len();

@@ -16,15 +16,20 @@ use crate::engine::tallies;
 use crate::error::Result;
 use crate::gpu::{Commands, Gpu};
 use crate::ledger::fate;
-use crate::path::{self, Path};
 use crate::photon::Photon;
+use crate::photon_state::{self, PhotonState};
 use crate::plan::{EmissionRange, RoomPlan, photons_of};
 use crate::scene::room::RoomScene;
 use crate::settings::RoomSettings;
 use crate::text::counted;
 
 /// One photon of a run, on a device or, without one, on the CPU.
-pub(crate) fn replay(gpu: Option<&Gpu>, scene: &RoomScene, settings: &RoomSettings, name: PhotonName) -> Result<Replayed<Path, Photon>> {
+pub(crate) fn replay(
+    gpu: Option<&Gpu>,
+    scene: &RoomScene,
+    settings: &RoomSettings,
+    name: PhotonName,
+) -> Result<Replayed<PhotonState, Photon>> {
     if name.caustic {
         return Err(name.refused("must be ROUND:PHOTON here: the paper's box has no caustic map"));
     }
@@ -37,7 +42,7 @@ pub(crate) fn replay(gpu: Option<&Gpu>, scene: &RoomScene, settings: &RoomSettin
     }
 }
 
-fn replay_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings, name: PhotonName) -> Result<Replayed<Path, Photon>> {
+fn replay_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings, name: PhotonName) -> Result<Replayed<PhotonState, Photon>> {
     let whole = RoomPlan::new(scene, settings, &engine::limits(gpu.facts()))?;
     let plan = RoomPlan { keeps_origins: true, counters: 1, path_capacity: 1, photon_capacity: settings.bounces, ..whole };
     check_math(gpu, settings.math)?;
@@ -45,7 +50,7 @@ fn replay_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings, name: Ph
     let mut commands = Commands::new(gpu, constants(&plan), Instant::now())?;
     let resources = RoomResources::new(&mut commands, scene, &plan)?;
     trace::emit(&mut commands, &resources, &plan, name.round, &ranges)?;
-    let start = path::unpack(&commands.read(&resources.paths[0], 1)?, 0);
+    let start = photon_state::unpack(&commands.read(&resources.paths[0], 1)?, 0);
     let vertices = stored(&mut commands, &resources, scene, &plan, name.round, &ranges)?;
     let tallies = tallies::read(&mut commands, &resources.tallies, settings.bounces)?;
     let nonfinite_values = NonfiniteValues::found(&mut commands, &resources.nonfinite_values, settings.paranoid)?;
@@ -53,7 +58,7 @@ fn replay_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings, name: Ph
     Ok(Replayed { name, start, vertices, fate: fate(&tallies), nonfinite_values })
 }
 
-fn replay_on_cpu(scene: &RoomScene, settings: &RoomSettings, name: PhotonName) -> Result<Replayed<Path, Photon>> {
+fn replay_on_cpu(scene: &RoomScene, settings: &RoomSettings, name: PhotonName) -> Result<Replayed<PhotonState, Photon>> {
     let plan = on_cpu::plan(scene, settings)?;
     let tracer = Tracer::new(scene, &plan);
     let ranges = [plan.range_of(name.photon)];
@@ -112,7 +117,7 @@ fn stored(
     Ok(stored.filter(|photon| photon.wall != NO_WALL).collect())
 }
 
-impl Replayed<Path, Photon> {
+impl Replayed<PhotonState, Photon> {
     /// A line per place where it is stored: position and weight at the eye.
     pub(crate) fn table(&self, scene: &RoomScene, seed: u64) -> String {
         let name_of = |wall: u32| scene.faces[wall as usize].as_ref().map_or("opening", |wall| wall.name);

@@ -5,8 +5,8 @@ use glam::UVec2;
 use crate::engine::planned::{Planned, buffers};
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, kernels};
-use crate::path::StoredPath;
 use crate::photon::{Origin, StoredPhoton};
+use crate::photon_state::PackedPhotonState;
 use crate::plan::RoomPlan;
 use crate::plan::buffers::{NONFINITE_VALUES, room};
 use crate::records::{DispatchArgs, Search, Tally};
@@ -26,11 +26,11 @@ buffers! {
             planned.filled(commands, room::STREAM_SEEDS, &plan.streams().first_states(plan.path_capacity))?,
         // Photons of the chunk under way.
         /// Paths entering even bounces and odd bounces; one element, for a replay, where no bounce hands paths to the next.
-        paths: [Buffer<StoredPath>; 2] = planned.several(room::PATHS)?,
+        paths: [Buffer<PackedPhotonState>; 2] = planned.several(room::PATHS)?,
         photons: Buffer<StoredPhoton> = planned.one(room::PHOTONS)?,
         /// Which photon each entry of the photon map is; one empty element where nobody asks.
         origins: Buffer<Origin> = planned.one(room::ORIGINS)?,
-        /// Length of the photon map, the paths entering each bounce, and the counters that are taken in turn.
+        /// Length of the photon map, the paths entering each bounce, and the counters that work groups use round-robin.
         counters: Buffer<u32> = planned.one(room::COUNTERS)?,
         dispatch_args: Buffer<DispatchArgs> = planned.one(room::DISPATCH_ARGS)?,
         /// What keeps photons in order; `None` where they come as they do.

@@ -63,7 +63,7 @@ pub(crate) fn chunk(
     })
 }
 
-/// Writes the paths of a chunk as they leave their lights, light after light.
+/// Writes the paths of a chunk as lights emit them, light after light.
 pub(crate) fn emit(
     commands: &mut Commands,
     resources: &RoomResources,

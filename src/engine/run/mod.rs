@@ -29,9 +29,9 @@ use crate::settings::Math;
 use crate::settings::stop::Stop;
 use identity::Identity;
 use saved::WorldFilm;
-use watch::{Control, End, Later};
+use watch::{Control, End, Lazy};
 
-/// What a run of a world is to do, on one device or several, and what its film tells.
+/// What a run of a world is to do, on one device or several, and what its film shows.
 pub(crate) struct Task<'a, Film> {
     /// Of a run that is kept.
     pub identity: Option<Identity>,
@@ -67,7 +67,7 @@ pub(crate) trait World {
     type Recorder: Recorder;
     type Film: WorldFilm;
 
-    /// Records a part of the round under way, and tells `state` of its photons. Fails with [`Error::Interrupted`] where the round
+    /// Records a part of the round under way, and reports its photons to `state`. Fails with [`Error::Interrupted`] where the round
     /// was cut short and nothing of it counts.
     fn trace(&mut self, recorder: &mut Self::Recorder, state: &mut RunState<Self::Film>, part: u32) -> Result<()>;
     /// The round that was recorded is the last of its block: notes what counts of it, as what follows may be cut short.
@@ -78,7 +78,7 @@ pub(crate) trait World {
     fn collect(&mut self, recorder: &mut Self::Recorder, state: &mut RunState<Self::Film>) -> Result<()>;
     /// What all whole blocks have left, or where there is none, all photons so far. It is copied from the device, and made of the copies
     /// when it is wanted, by whom it may be.
-    fn film(&mut self, recorder: &mut Self::Recorder, state: &RunState<Self::Film>) -> Result<Later<Self::Film>>;
+    fn film(&mut self, recorder: &mut Self::Recorder, state: &RunState<Self::Film>) -> Result<Lazy<Self::Film>>;
     /// What `--paranoid` found; `None` without it.
     fn nonfinite_values(&mut self, recorder: &mut Self::Recorder) -> Result<Option<NonfiniteValues>>;
 }
@@ -152,7 +152,7 @@ impl<'a, W: World> Run<'a, W> {
         Ok(self.world.film(&mut self.recorder, &self.state)?())
     }
 
-    /// The same with its error as users are told of it.
+    /// The same with its error as reported to users.
     pub(crate) fn look(&mut self) -> Result<(W::Film, FilmError)> {
         let film = self.film()?;
         let error = (self.state.task.error)(&film).stated();
@@ -169,7 +169,7 @@ impl<'a, W: World> Run<'a, W> {
     fn result<Plan: Clone>(self, plan: &Plan, control: &mut Control) -> Result<RunResult<Plan, W::Film>> {
         let Run { mut world, mut recorder, state } = self;
         let film = world.film(&mut recorder, &state)?();
-        if let Some(save) = control.keep.save.as_mut().filter(|_| !state.done.is_empty()) {
+        if let Some(save) = control.checkpointing.save.as_mut().filter(|_| !state.done.is_empty()) {
             save.save(&Arc::new(state.to_be_saved()(film.clone().into())), true)?;
         }
         let nonfinite_values = world.nonfinite_values(&mut recorder)?;

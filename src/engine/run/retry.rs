@@ -8,8 +8,8 @@ use std::time::Instant;
 
 use super::identity::Identity;
 use super::saved::{SavedRun, WorldFilm};
-use super::several_devices::{NOTED_EVERY, Outcome, RunOnOne, Together};
-use super::watch::{Control, Keep, Later, SaveRun};
+use super::several_devices::{GroupEnd, NOTED_EVERY, RunOnOne, Together};
+use super::watch::{Checkpointing, Control, Lazy, SaveRun};
 use super::{RunResult, Task};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
@@ -34,7 +34,7 @@ pub(crate) fn in_words(gpu: &Gpu, error: &Error, remedy: Remedy) -> String {
     format!("{} {what}: {}", facts.label(), error.what())
 }
 
-/// Told of a device that failed, why, and what is done about it.
+/// Called when a device fails: which one, why, and what is done about it.
 pub(crate) type Failed<'a> = &'a dyn Fn(&Gpu, &Error, Remedy);
 
 /// A device that fails more often without having done anything in between is not worth it.
@@ -49,7 +49,7 @@ fn mend(gpu: &mut Gpu, error: &Error) -> Option<Remedy> {
     }
 }
 
-/// Does what can be done again from its start until a device is fit for it.
+/// Retries what can be done again from its start until a device succeeds.
 pub(crate) fn until_done<T>(gpu: &mut Gpu, failed: Failed, mut work: impl FnMut(&Gpu) -> Result<T>) -> Result<T> {
     for failures in 1.. {
         let error = match work(gpu) {
@@ -90,7 +90,7 @@ impl SaveRun for Notes<'_> {
         self.noted.elapsed() < NOTED_EVERY && self.outer.as_ref().is_some_and(|outer| outer.may_wait())
     }
 
-    fn save_later(&mut self, run: Later<SavedRun>) -> Result<()> {
+    fn save_later(&mut self, run: Lazy<SavedRun>) -> Result<()> {
         match &mut self.outer {
             Some(outer) if self.noted.elapsed() < NOTED_EVERY && outer.may_wait() => outer.save_later(run),
             _ => self.save(&Arc::new(run()), false),
@@ -113,9 +113,9 @@ where
     let blocks = task.rounds.div_ceil(task.rounds_per_block);
     let started = Instant::now();
     // Another scene's file is to be refused; what was noted of this run is known to be its own.
-    let wants_identity = control.keep.save.is_some() || control.keep.resume.is_some();
-    let is_shared = control.keep.share.count(blocks) > 1;
-    let mut base = control.keep.resume.take();
+    let wants_identity = control.checkpointing.save.is_some() || control.checkpointing.resume.is_some();
+    let is_shared = control.checkpointing.share.count(blocks) > 1;
+    let mut base = control.checkpointing.resume.take();
     let mut failures = 0;
     loop {
         let resumed = base.clone();
@@ -127,8 +127,8 @@ where
             alone(|control| run(&gpus[0], stop, control), base, is_shared && task.can_go_on, wants_identity, control)
         };
         let (device, error, so_far) = match outcome {
-            Outcome::Ended(result) => return Ok(*result),
-            Outcome::Failed { device, error, base } => (device, error, base),
+            GroupEnd::Ended(result) => return Ok(*result),
+            GroupEnd::Failed { device, error, base } => (device, error, base),
         };
         let count = |run: &SavedRun| run.done.count();
         let is_further = so_far.as_deref().map_or(0, count) > resumed.as_ref().map_or(0, |(_, run)| count(run));
@@ -137,7 +137,7 @@ where
         base = so_far.map(|run| (file, Arc::unwrap_or_clone(run))).or(resumed);
         let remedy = if failures > MOST_FAILURES { None } else { mend(&mut gpus[device], &error) };
         if remedy.is_none() && gpus.len() == 1 {
-            if let (Some(save), Some((_, run))) = (control.keep.save.as_mut(), base) {
+            if let (Some(save), Some((_, run))) = (control.checkpointing.save.as_mut(), base) {
                 save.save(&Arc::new(run), true)?;
             }
             return Err(error);
@@ -157,16 +157,16 @@ fn alone<Plan, Film>(
     notes_itself: bool,
     wants_identity: bool,
     control: &mut Control,
-) -> Outcome<Plan, Film> {
-    let Keep { scene, share, every, save, .. } = &mut control.keep;
+) -> GroupEnd<Plan, Film> {
+    let Checkpointing { scene, share, every, save, .. } = &mut control.checkpointing;
     let every = if save.is_some() { (*every).min(NOTED_EVERY) } else { NOTED_EVERY };
     let is_used = notes_itself || save.is_some();
     let mut notes =
         Notes { outer: save.as_mut().map(|save| &mut **save as &mut dyn SaveRun), wants_identity, latest: None, noted: Instant::now() };
     let save = is_used.then_some(&mut notes as &mut dyn SaveRun);
-    let keep = Keep { scene, share: *share, resume, every, save, dealt: None };
-    match run(&mut Control { cancelled: control.cancelled, progress: &mut *control.progress, keep }) {
-        Ok(result) => Outcome::Ended(Box::new(result)),
-        Err(error) => Outcome::Failed { device: 0, error, base: notes.latest },
+    let checkpointing = Checkpointing { scene, share: *share, resume, every, save, dealt: None };
+    match run(&mut Control { cancelled: control.cancelled, progress: &mut *control.progress, checkpointing }) {
+        Ok(result) => GroupEnd::Ended(Box::new(result)),
+        Err(error) => GroupEnd::Failed { device: 0, error, base: notes.latest },
     }
 }

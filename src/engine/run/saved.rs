@@ -269,7 +269,7 @@ impl SavedRun {
             },
             SavedFilm::Scene(film) => {
                 arrays.add_sums("surfaces", film.of_surfaces.as_ref().unwrap_or(&BlockSums::default()));
-                arrays.add("one hits", &film.one_hits);
+                arrays.add("one hits", &film.single_hits);
                 arrays.add("part totals", &film.part_totals);
                 arrays.add("class counts", &film.class_counts);
                 arrays.add("differences", &film.differences.0);
@@ -360,7 +360,7 @@ impl SavedRun {
                     plan,
                     of_blocks,
                     latest,
-                    one_hits: reader.next("one hits")?,
+                    single_hits: reader.next("one hits")?,
                     part_totals: reader.next("part totals")?,
                     anomalies: anomalies.try_into().or(Err("holds other counts than this program knows"))?,
                     class_counts: reader.next("class counts")?,
@@ -368,7 +368,7 @@ impl SavedRun {
                     parts: if reader.has(PARTS) { Some(reader.next(PARTS)?) } else { None },
                     stored: stored.try_into().or(Err("holds other counts than this program knows"))?,
                 };
-                if film.one_hits.len() != film.pixels() * crate::constants::HIT_KINDS as usize {
+                if film.single_hits.len() != film.pixels() * crate::constants::HIT_KINDS as usize {
                     return wrong("what one hit would add");
                 }
                 if film.parts.as_ref().is_some_and(|parts| parts.len() != film.pixels() * (PART_VALUES as usize - 3)) {

@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 use super::blocks::Dealer;
 use super::identity::Identity;
 use super::saved::{SavedRun, WorldFilm};
-use super::watch::{Control, End, Keep, Later, Progress, SaveRun, Watch, looks};
+use super::watch::{Checkpointing, Control, End, Lazy, Progress, SaveRun, Watch, looks};
 use super::{RunResult, Task};
 use crate::engine::nonfinite_values::NonfiniteValues;
 use crate::error::{Error, Result};
@@ -44,7 +44,7 @@ struct HandOver<'a, Plan, Film> {
     dealer: &'a Dealer,
     events: Sender<(usize, Event<Plan, Film>)>,
     /// To who makes what is handed over of the copies, and how many looks it is before.
-    later: Sender<(usize, Later<SavedRun>)>,
+    later: Sender<(usize, Lazy<SavedRun>)>,
 }
 
 impl<Plan, Film> SaveRun for HandOver<'_, Plan, Film> {
@@ -60,7 +60,7 @@ impl<Plan, Film> SaveRun for HandOver<'_, Plan, Film> {
         Ok(())
     }
 
-    fn save_later(&mut self, run: Later<SavedRun>) -> Result<()> {
+    fn save_later(&mut self, run: Lazy<SavedRun>) -> Result<()> {
         let _ = self.later.send((self.dealer.looks_behind(self.device), run));
         Ok(())
     }
@@ -77,7 +77,7 @@ struct Known<Plan, Film> {
 }
 
 /// How some devices ended together.
-pub(crate) enum Outcome<Plan, Film> {
+pub(crate) enum GroupEnd<Plan, Film> {
     Ended(Box<RunResult<Plan, Film>>),
     /// One failed; the others were stopped. With what all had done at the last look.
     Failed {
@@ -125,9 +125,9 @@ impl<Plan: Send, Film: WorldFilm> Together<'_, Plan, Film> {
         gpus: &mut [Gpu],
         resume: Option<(std::path::PathBuf, SavedRun)>,
         control: &mut Control,
-    ) -> Result<Outcome<Plan, Film>> {
+    ) -> Result<GroupEnd<Plan, Film>> {
         let Together { task, run, .. } = *self;
-        let share = control.keep.share;
+        let share = control.checkpointing.share;
         let done = resume.as_ref().map(|(_, run)| run.done.clone()).unwrap_or_default();
         let most = task.stop.photons.map_or(self.blocks, |photons| {
             let of_block = (task.photons_per_round * u64::from(task.rounds_per_block)).max(1);
@@ -156,14 +156,14 @@ impl<Plan: Send, Film: WorldFilm> Together<'_, Plan, Film> {
             numbers: gpus.iter().map(|gpu| gpu.facts().index).collect(),
         };
         attempt.watch.go_on(done.count());
-        let scene = control.keep.scene;
+        let scene = control.checkpointing.scene;
         let resume = Mutex::new(resume);
         let no_goal = Stop { error: None, seconds: None, photons: None, ..task.stop };
         std::thread::scope(|scope| {
             for (device, gpu) in gpus.iter_mut().enumerate() {
                 let (dealer, events, cancelled, resume) = (&dealer, events.clone(), &cancelled, &resume);
                 scope.spawn(move || {
-                    let (later, copies) = channel::<(usize, Later<SavedRun>)>();
+                    let (later, copies) = channel::<(usize, Lazy<SavedRun>)>();
                     let saved = events.clone();
                     let maker = scope.spawn(move || {
                         for (looks, make) in copies {
@@ -171,11 +171,11 @@ impl<Plan: Send, Film: WorldFilm> Together<'_, Plan, Film> {
                         }
                     });
                     let mut hand_over = HandOver { device, dealer, events: events.clone(), later };
-                    let tell = |progress: &Progress| drop(events.send((device, Event::Progress(Box::new(progress.clone())))));
+                    let report = |progress: &Progress| drop(events.send((device, Event::Progress(Box::new(progress.clone())))));
                     let resume = if device == 0 { resume.lock().unwrap_or_else(PoisonError::into_inner).take() } else { None };
                     let dealt = Some((dealer.clone(), device));
-                    let keep = Keep { scene, share, resume, every: Duration::MAX, save: Some(&mut hand_over), dealt };
-                    let result = run(gpu, no_goal, &mut Control { cancelled, progress: &mut { tell }, keep });
+                    let checkpointing = Checkpointing { scene, share, resume, every: Duration::MAX, save: Some(&mut hand_over), dealt };
+                    let result = run(gpu, no_goal, &mut Control { cancelled, progress: &mut { report }, checkpointing });
                     // All that was handed over comes before the end.
                     drop(hand_over);
                     maker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
@@ -187,7 +187,7 @@ impl<Plan: Send, Film: WorldFilm> Together<'_, Plan, Film> {
         })?;
         let base = attempt.base.take();
         if let Some((device, error)) = attempt.failed.take() {
-            return Ok(Outcome::Failed { device, error, base });
+            return Ok(GroupEnd::Failed { device, error, base });
         }
         let run = match attempt.end {
             Some(End::Error) => base,
@@ -201,10 +201,10 @@ impl<Plan: Send, Film: WorldFilm> Together<'_, Plan, Film> {
             _ if is_whole => End::Rounds,
             end => end.unwrap_or(End::Cancelled),
         };
-        if let Some(save) = control.keep.save.as_mut() {
+        if let Some(save) = control.checkpointing.save.as_mut() {
             save.save(&run, true)?;
         }
-        Ok(Outcome::Ended(Box::new(self.result(attempt, run, end))))
+        Ok(GroupEnd::Ended(Box::new(self.result(attempt, run, end))))
     }
 
     /// Until all devices are over.
@@ -243,7 +243,7 @@ impl<Plan: Send, Film: WorldFilm> Together<'_, Plan, Film> {
                 // Blocks under way are done, so that none is missing before the last.
                 attempt.end = Some(End::Time);
             }
-            let every = if control.keep.save.is_some() { control.keep.every.min(NOTED_EVERY) } else { NOTED_EVERY };
+            let every = if control.checkpointing.save.is_some() { control.checkpointing.every.min(NOTED_EVERY) } else { NOTED_EVERY };
             if !attempt.saves && attempt.saved.elapsed() >= every {
                 attempt.dealer.look_now();
                 attempt.saves = true;
@@ -271,7 +271,7 @@ impl<Plan: Send, Film: WorldFilm> Together<'_, Plan, Film> {
                 attempt.watch.check_error(self.task.bounces)?;
                 attempt.end = attempt.watch.end(blocks, 0);
             }
-            control.keep.save.iter_mut().try_for_each(|save| save.save(&run, false))?;
+            control.checkpointing.save.iter_mut().try_for_each(|save| save.save(&run, false))?;
             (attempt.saved, attempt.saves) = (Instant::now(), false);
             attempt.base = Some(run);
         }

@@ -52,7 +52,7 @@ const WAITS: u32 = 50;
 impl<'a, Film: WorldFilm> RunState<'a, Film> {
     /// Goes on with what was saved, if anything was.
     pub(super) fn new(task: Task<'a, Film>, recorder: &impl Recorder, control: &mut Control) -> Result<RunState<'a, Film>> {
-        let share = control.keep.share;
+        let share = control.checkpointing.share;
         let mut state = RunState {
             watch: Watch::new(task.stop, task.alpha, task.rounds_per_block, Instant::now()),
             fates_of_blocks: task.fates.clone(),
@@ -66,7 +66,7 @@ impl<'a, Film: WorldFilm> RunState<'a, Film> {
             rounds_of_block: 0,
             kept: BTreeMap::new(),
             share,
-            dealt: control.keep.dealt.take(),
+            dealt: control.checkpointing.dealt.take(),
             hands_over: false,
             saved: Instant::now(),
             saving: Duration::ZERO,
@@ -81,7 +81,7 @@ impl<'a, Film: WorldFilm> RunState<'a, Film> {
             );
             return Err(Error::setting("shard", share, allowed));
         }
-        if let Some((_, saved)) = control.keep.resume.take() {
+        if let Some((_, saved)) = control.checkpointing.resume.take() {
             state.emitted = saved.fates.iter().map(|fates| fates.emitted).sum();
             state.emitted_of_blocks = state.emitted;
             state.kept = saved.film.latest().iter().map(|block| (block.number % KEPT_BLOCKS, block.number)).collect();
@@ -228,8 +228,8 @@ impl<'a, Film: WorldFilm> RunState<'a, Film> {
     ) -> Result<bool> {
         let waited = self.saved.elapsed();
         let least = |save: &&mut dyn SaveRun| if save.may_wait() { self.saving * WAITS } else { Duration::ZERO };
-        let is_due = self.hands_over || waited >= control.keep.every;
-        let saves = self.is_between_blocks() && is_due && control.keep.save.as_ref().is_some_and(|save| waited >= least(save));
+        let is_due = self.hands_over || waited >= control.checkpointing.every;
+        let saves = self.is_between_blocks() && is_due && control.checkpointing.save.as_ref().is_some_and(|save| waited >= least(save));
         if !saves && !self.is_due(world, recorder) {
             return Ok(self.end.is_some());
         }
@@ -245,7 +245,7 @@ impl<'a, Film: WorldFilm> RunState<'a, Film> {
                 self.watch.check_error(self.task.bounces)?;
                 film = Box::new(|| made);
             }
-            if let Some(save) = control.keep.save.as_mut().filter(|_| saves) {
+            if let Some(save) = control.checkpointing.save.as_mut().filter(|_| saves) {
                 let saved_run = self.to_be_saved();
                 save.save_later(Box::new(move || saved_run(film().into())))?;
                 self.saved = Instant::now();

@@ -20,13 +20,13 @@ use serde::Serialize;
 pub(crate) struct Control<'a> {
     /// Set from outside to end the run after the photons, or the round, under way.
     pub cancelled: &'a AtomicBool,
-    /// Told from time to time how far the run has come.
+    /// Called from time to time with how far the run has come.
     pub progress: &'a mut dyn FnMut(&Progress),
-    pub keep: Keep<'a>,
+    pub checkpointing: Checkpointing<'a>,
 }
 
-/// Made when it is wanted.
-pub(crate) type Later<T> = Box<dyn FnOnce() -> T + Send>;
+/// Computed on demand.
+pub(crate) type Lazy<T> = Box<dyn FnOnce() -> T + Send>;
 
 /// Takes a run as far as whole blocks are done.
 pub(crate) trait SaveRun {
@@ -35,7 +35,7 @@ pub(crate) trait SaveRun {
         true
     }
 
-    /// Told once what the run computes, before its first block.
+    /// Called once with what the run computes, before its first block.
     fn begins(&mut self, _: &Identity) {}
 
     /// `is_last`: the run has ended. An error ends it.
@@ -47,14 +47,14 @@ pub(crate) trait SaveRun {
     }
 
     /// The same while the run is under way, which may go on before it is saved.
-    fn save_later(&mut self, run: Later<SavedRun>) -> Result<()> {
+    fn save_later(&mut self, run: Lazy<SavedRun>) -> Result<()> {
         self.save(&Arc::new(run()), false)
     }
 }
 
 /// What of a run is kept, gone on with, and shared.
 #[derive(Default)]
-pub(crate) struct Keep<'a> {
+pub(crate) struct Checkpointing<'a> {
     /// What the scene is called.
     pub scene: &'a str,
     /// The part of the run that is to be done.
@@ -72,11 +72,11 @@ impl<'a> Control<'a> {
     /// Watches nothing but `cancelled`.
     pub(crate) fn quiet(cancelled: &'a AtomicBool) -> Control<'a> {
         // A closure without captures takes no memory, so none is lost.
-        Control { cancelled, progress: Box::leak(Box::new(|_: &Progress| {})), keep: Keep::default() }
+        Control { cancelled, progress: Box::leak(Box::new(|_: &Progress| {})), checkpointing: Checkpointing::default() }
     }
 }
 
-impl Keep<'_> {
+impl Checkpointing<'_> {
     /// Whether more than the result is asked for.
     pub(crate) fn is_used(&self) -> bool {
         self.save.is_some() || self.resume.is_some() || self.share.of > 1
@@ -219,7 +219,7 @@ impl Watch {
         self.stop.seconds.map(|seconds| self.started + Duration::from_secs_f64(seconds))
     }
 
-    /// Takes what a film tells, and what limits kept from it.
+    /// Takes what a film shows, and what limits kept from it.
     pub(crate) fn look(&mut self, error: FilmError, losses: Losses) {
         self.next_look = next_look(error.blocks);
         self.looked = Instant::now();
@@ -270,7 +270,7 @@ impl Watch {
         Ok(())
     }
 
-    /// The bias after so many rounds and its bound: of the first round's radius as extra runs told it, which is a bound, or as the film did
+    /// The bias after so many rounds and its bound: of the first round's radius as extra runs gave it, which is a bound, or as the film did
     /// at a look.
     fn bias(&self, look: &Look, rounds: f64) -> [f64; 2] {
         let square = |rounds: f64| mean_squared_radius(self.alpha, rounds as u32);

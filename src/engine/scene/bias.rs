@@ -2,7 +2,7 @@
 
 use std::sync::atomic::AtomicBool;
 
-use super::{View, light};
+use super::{Viewpoint, light};
 use crate::engine;
 use crate::engine::error::bias::Bias;
 use crate::engine::error::bias_batches::{Batch, Batches};
@@ -33,7 +33,7 @@ pub(crate) fn check(stop: &Stop, bias: BiasPlan) -> Result<()> {
 pub(crate) fn measure(
     gpu: &Gpu,
     scene: &Scene,
-    view: &View,
+    viewpoint: &Viewpoint,
     plan: &ScenePlan,
     (factor, rounds): (f64, u32),
     cancelled: &AtomicBool,
@@ -48,19 +48,19 @@ pub(crate) fn measure(
     let room = plan.maps().map(|map| ROOM_BELOW * RADIUS_RANGE.0 / map.radius).fold(0.0, f64::max);
     let factor = factor.max(room);
     Batches { seed: plan.settings.seed, measure: plan.settings.stop.measure, confidence, rounds, cancelled }
-        .measure(|of, control| batch(gpu, scene, view, plan, &Batch { factor: factor * of.factor, ..*of }, control))
+        .measure(|of, control| batch(gpu, scene, viewpoint, plan, &Batch { factor: factor * of.factor, ..*of }, control))
 }
 
 /// Radiance or irradiance of a batch, three channels a pixel, at the first round's radii times a factor.
 pub(crate) fn batch(
     gpu: &Gpu,
     scene: &Scene,
-    view: &View,
+    viewpoint: &Viewpoint,
     plan: &ScenePlan,
     &Batch { factor, rounds, seed, stop }: &Batch,
     control: &mut Control,
 ) -> Result<(End, Vec<f64>)> {
-    let given = |map: &MapPlan| (map.radius_from != RadiusFrom::Trial).then_some(factor * map.radius * view.geometry.unit);
+    let given = |map: &MapPlan| (map.radius_from != RadiusFrom::Trial).then_some(factor * map.radius * viewpoint.geometry.unit);
     let settings = SceneSettings {
         rounds,
         block: Some(1),
@@ -73,7 +73,7 @@ pub(crate) fn batch(
     };
     // Radii of the trial's keep their classes.
     let trial = plan.trial.as_ref().map(|trial| Trial { factor: Some(factor), ..trial.clone() });
-    let plan = ScenePlan::with_trial(scene, view.geometry, &settings, plan.sensor, &engine::limits(gpu.facts()), trial)?;
-    let lit = light(gpu, view, plan, control)?;
-    Ok((lit.end, lit.film.surface_means().flat_map(|mean| mean.to_array()).collect()))
+    let plan = ScenePlan::with_trial(scene, viewpoint.geometry, &settings, plan.sensor, &engine::limits(gpu.facts()), trial)?;
+    let result = light(gpu, viewpoint, plan, control)?;
+    Ok((result.end, result.film.surface_means().flat_map(|mean| mean.to_array()).collect()))
 }

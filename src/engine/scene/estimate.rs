@@ -10,12 +10,12 @@ use super::resources::{PhotonBuffers, SceneResources};
 use crate::constants::MAX_GROUPS;
 use crate::error::Result;
 use crate::gpu::kernels::{
-    CrowdSize, DiscCuts, EndDifference, FluxToRadiance, GatherVisiblePointsTwoWords, GatherVisiblePointsU64, Resolve,
+    DensePointsSize, DiscCuts, EndDifference, FluxToRadiance, GatherVisiblePointsTwoWords, GatherVisiblePointsU64, Resolve,
 };
 use crate::gpu::{Commands, Extent, dispatch_by_sums};
 use crate::plan::differences::row_length;
 use crate::plan::scene::MapPlan;
-use crate::records::{CellPush, CrowdSizePush, DiscCutsPush, EndDifferencePush, FluxToRadiancePush, ResolvePush, SceneGatherPush};
+use crate::records::{CellPush, DensePointsSizePush, DiscCutsPush, EndDifferencePush, FluxToRadiancePush, ResolvePush, SceneGatherPush};
 use crate::timings::Handled;
 
 /// Finds the walls at which each visible point's density estimates from a map end.
@@ -45,7 +45,7 @@ pub(crate) fn cut_discs(commands: &mut Commands, round: Round, map: &MapPlan) ->
 pub(crate) fn gather(commands: &mut Commands, round: Round, map: &MapPlan, classes: Range<u32>, cells_push: CellPush) -> Result<()> {
     let PhotonBuffers { cells, sorted_map, crowded_points, dispatch_args, .. } = round.photons();
     let Round { resources, plan, number: round, .. } = round;
-    let SceneResources { scene, visible_points, matt_lobes, matt_covers, estimates, near_sums, .. } = resources;
+    let SceneResources { scene, visible_points, rough_lobes, rough_covers, estimates, near_sums, .. } = resources;
     let SceneResources { radius_classes, disc_cuts, nonfinite_values, .. } = resources;
     let point_count = plan.visible_points();
     let lanes = map.lanes;
@@ -55,7 +55,7 @@ pub(crate) fn gather(commands: &mut Commands, round: Round, map: &MapPlan, class
             commands,
             commands.facts().int64_atomics,
             [GatherVisiblePointsU64, GatherVisiblePointsTwoWords] {
-                scene, visible_points, matt_lobes, matt_covers, film: estimates, near_sums, cells, sorted_map, crowded_points,
+                scene, visible_points, rough_lobes, rough_covers, film: estimates, near_sums, cells, sorted_map, crowded_points,
                 radius_classes, disc_cuts, nonfinite_values,
             },
             push,
@@ -86,8 +86,8 @@ pub(crate) fn gather(commands: &mut Commands, round: Round, map: &MapPlan, class
         commands.fill(crowded_points, 0, 2, 0);
         let groups = ((end_point - first_point) * lanes).div_ceil(plan.settings.group_size);
         dispatch(commands, &push, Extent::Groups(groups, 1))?;
-        let size = CrowdSizePush { items_per_group: plan.settings.group_size / lanes, max_groups: MAX_GROUPS };
-        commands.dispatch(CrowdSize { crowded_points, dispatch_args }, &size, Extent::Groups(1, 1))?;
+        let size = DensePointsSizePush { items_per_group: plan.settings.group_size / lanes, max_groups: MAX_GROUPS };
+        commands.dispatch(DensePointsSize { crowded_points, dispatch_args }, &size, Extent::Groups(1, 1))?;
         dispatch(commands, &SceneGatherPush { first_slice: 1, ..push }, Extent::Indirect(dispatch_args))
     })
 }
@@ -107,7 +107,7 @@ pub(crate) fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u
         film,
         ..
     } = resources;
-    let FilmBuffers { differences, one_hits, part_totals, anomalies, .. } = film;
+    let FilmBuffers { differences, single_hits, part_totals, anomalies, .. } = film;
     let radius = |map: &Option<MapPlan>| map.as_ref().map_or(1.0, |map| plan.widest_radius(map, round.number)) as f32;
     let flux =
         |map: &Option<MapPlan>| map.as_ref().map_or(0.0, |map| map.photon_flux_of(geometry, traced[usize::from(map.caustic_only)])) as f32;
@@ -142,7 +142,7 @@ pub(crate) fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u
             differences,
             radius_classes,
             disc_cuts,
-            one_hits,
+            single_hits,
             part_totals,
             nonfinite_values,
             extra_samples,

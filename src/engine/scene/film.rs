@@ -24,11 +24,11 @@ use crate::settings::stop::LEAST_BLOCKS;
 /// Names of the kinds of `HIT_...`, but for those of light that no error counts.
 const KINDS: [&str; 3] = ["shadow ray", "photon of the caustic map", GLOBAL_PHOTON];
 pub(super) const GLOBAL_PHOTON: &str = "photon of the global map";
-/// In place of a bound: something has hit (`glsl/world/scene/one_hit.glsl`).
+/// In place of a bound: something has hit (`glsl/world/scene/single_hit.glsl`).
 const REACHED: u32 = u32::MAX;
 /// Of a pixel's light, what bright photons may add that is worth counting.
 const WORTH_COUNTING: f64 = 0.1;
-/// Of all pixels, those that are told of as the worst.
+/// Of all pixels, those that are reported as the worst.
 const WORST: f64 = 0.01;
 /// Hits from which on one more, of another colour than all of these, is less and less likely.
 const FEW_HITS: f64 = 16.0;
@@ -42,11 +42,11 @@ pub struct SceneFilm {
     pub of_surfaces: Option<BlockSums>,
     /// Parts of that light at some pixels.
     pub(crate) latest: LatestBlocks,
-    /// What a smaller radius would change; empty where blocks do not tell the bias.
+    /// What a smaller radius would change; empty where blocks do not give the bias.
     pub(crate) differences: Differences,
     /// For each pixel and kind of light what one hit would have added to a round, or that something has hit
-    /// (`glsl/world/scene/one_hit.glsl`).
-    pub one_hits: Vec<u32>,
+    /// (`glsl/world/scene/single_hit.glsl`).
+    pub single_hits: Vec<u32>,
     /// Light of each part (direct, specular, caustic, indirect) over all pixels and channels, film units.
     pub part_totals: Vec<u64>,
     /// Specular, caustic and indirect light of each pixel, three channels each, film units; direct light is the rest. `None` where
@@ -86,7 +86,7 @@ impl SceneFilm {
         self.latest.merge(&other.latest);
         self.differences.merge(&other.differences);
         // The most that one hit would have added, and what has hit is more than any.
-        self.one_hits.iter_mut().zip(&other.one_hits).for_each(|(most, other)| *most = (*most).max(*other));
+        self.single_hits.iter_mut().zip(&other.single_hits).for_each(|(most, other)| *most = (*most).max(*other));
         add_all(&mut self.part_totals, &other.part_totals, u64::checked_add)?;
         self.parts = match (self.parts.take(), &other.parts) {
             (Some(mut parts), Some(others)) => {
@@ -223,7 +223,7 @@ impl SceneFilm {
     }
 
     fn kinds(&self, pixel: usize) -> &[u32] {
-        &self.one_hits[HIT_KINDS as usize * pixel..][..KINDS.len()]
+        &self.single_hits[HIT_KINDS as usize * pixel..][..KINDS.len()]
     }
 
     /// Whether a pixel asked for light and nothing has reached it: its spread of 0 is no error.
@@ -232,7 +232,7 @@ impl SceneFilm {
         self.sums[3 * pixel..][..3] == [0; 3] && kinds.iter().any(|kind| *kind != 0) && !kinds.contains(&REACHED)
     }
 
-    /// The errors to be shown, by pixel: infinite where too few blocks tell it, where nothing has reached the pixel, and where a
+    /// The errors to be shown, by pixel: infinite where too few blocks give it, where nothing has reached the pixel, and where a
     /// value may have been clamped. Few hits say little of the others: the next one may have in any channel what those had in the
     /// brightest, so that much is part of the error, and less of it the more hits there were. What no ray or photon has met is not: see
     /// [`SceneFilm::unseen_bounds`].
@@ -244,10 +244,10 @@ impl SceneFilm {
             }
             let (mean, error) = (self.mean(pixel), self.standard_error(pixel));
             // Of n hits the relative variance of the mean is about 1 / n.
-            let one_hit = |mean: f64, error: f64| error * error / mean * (FEW_HITS * (error / mean).powi(2)).min(1.0);
-            let hits = [0, 1, 2].map(|channel| one_hit(mean[channel], error[channel]));
-            let one_hit = hits.into_iter().filter(|hit| hit.is_finite()).fold(0.0, f64::max);
-            error.map(|error| error.hypot(one_hit))
+            let single_hit = |mean: f64, error: f64| error * error / mean * (FEW_HITS * (error / mean).powi(2)).min(1.0);
+            let hits = [0, 1, 2].map(|channel| single_hit(mean[channel], error[channel]));
+            let single_hit = hits.into_iter().filter(|hit| hit.is_finite()).fold(0.0, f64::max);
+            error.map(|error| error.hypot(single_hit))
         }
     }
 
@@ -276,7 +276,7 @@ impl SceneFilm {
         let of_kind = [(HIT_UNSEEN_LIGHT, per_ray), (HIT_BRIGHT_PHOTON, scales[HIT_GLOBAL_PHOTON as usize])];
         // Hits of all kinds together are as few as those of one: if all that were expected missed, the brightest kind adds most.
         move |pixel| {
-            let others = of_kind.map(|(kind, scale)| match self.one_hits[HIT_KINDS as usize * pixel + kind as usize] {
+            let others = of_kind.map(|(kind, scale)| match self.single_hits[HIT_KINDS as usize * pixel + kind as usize] {
                 REACHED => 0.0,
                 bits => scale * f64::from(f32::from_bits(bits)),
             });
@@ -287,7 +287,7 @@ impl SceneFilm {
     /// Whether it is a point on no surface, in a scene some of whose light only photons bring.
     fn lacks_photons(&self, pixel: usize) -> bool {
         self.plan.lost_off_surfaces != LostOffSurfaces::Nothing
-            && self.one_hits[HIT_KINDS as usize * pixel + HIT_OFF_SURFACE as usize] == REACHED
+            && self.single_hits[HIT_KINDS as usize * pixel + HIT_OFF_SURFACE as usize] == REACHED
     }
 
     /// All of these.
@@ -338,7 +338,7 @@ impl SceneFilm {
         scales
     }
 
-    /// The most light of a kind at a pixel, as far as no hit tells; 0 where there was one.
+    /// The most light of a kind at a pixel, as far as no hit says; 0 where there was one.
     fn most_light(&self, pixel: usize, kind: usize, scales: &[f64]) -> f64 {
         match self.kinds(pixel)[kind] {
             REACHED => 0.0,
@@ -348,7 +348,7 @@ impl SceneFilm {
 
     /// What one hit of a kind of light that no error counts would have added to each pixel that it has not hit.
     fn missed(&self, kind: u32) -> impl Iterator<Item = (usize, f64)> {
-        let of_pixel = move |pixel: usize| (pixel, self.one_hits[HIT_KINDS as usize * pixel + kind as usize]);
+        let of_pixel = move |pixel: usize| (pixel, self.single_hits[HIT_KINDS as usize * pixel + kind as usize]);
         let is_missed = |(_, bits): &(usize, u32)| *bits != 0 && *bits != REACHED;
         (0..self.pixels()).map(of_pixel).filter(is_missed).map(|(pixel, bits)| (pixel, f64::from(f32::from_bits(bits))))
     }
@@ -446,7 +446,7 @@ impl SceneFilm {
         self.measure().relative_to_mean(most_hits(confidence) * hit)
     }
 
-    /// What it tells of its error, that of what surfaces scatter.
+    /// What it says of its error, that of what surfaces scatter.
     pub fn error(&self, confidence: f64) -> FilmError {
         let measure = self.measure();
         let value = |place: usize, parts: &[f32]| {
@@ -474,7 +474,7 @@ impl SceneFilm {
         }
     }
 
-    /// The bias of the radii; `None` where only extra runs can tell it, or there is no whole block.
+    /// The bias of the radii; `None` where only extra runs can give it, or there is no whole block.
     fn bias(&self, confidence: f64, measure: &ErrorMeasure) -> Option<Bias> {
         match self.plan.bias {
             BiasPlan::NoMap => Some(Bias::none(confidence)),

@@ -1,4 +1,4 @@
-//! The film on the device: sums and squares of blocks, what tells the errors of these, and what a block that is cut short must not change.
+//! The film on the device: sums and squares of blocks, what gives the errors of these, and what a block that is cut short must not change.
 
 use rayon::prelude::*;
 
@@ -8,7 +8,7 @@ use crate::engine::error::differences::Differences;
 use crate::engine::film::{BlockSums, KeptBlock, LatestBlocks, halves, wide};
 use crate::engine::planned::{Planned, buffers};
 use crate::engine::run::RunState;
-use crate::engine::run::watch::Later;
+use crate::engine::run::watch::Lazy;
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands};
 use crate::plan::buffers::{ANOMALY_WORDS, PART_VALUES, scene};
@@ -31,14 +31,14 @@ buffers! {
         /// What a smaller radius would change.
         differences: Buffer<u64> = planned.zeroed(commands, scene::DIFFERENCES)?,
         latest_blocks: Buffer<f32> = planned.zeroed(commands, scene::LATEST_BLOCKS)?,
-        /// What is known of pixels that some kind of light has not reached; see `glsl/world/scene/one_hit.glsl`.
-        one_hits: Buffer<u32> = planned.zeroed(commands, scene::ONE_HITS)?,
+        /// What is known of pixels that some kind of light has not reached; see `glsl/world/scene/single_hit.glsl`.
+        single_hits: Buffer<u32> = planned.zeroed(commands, scene::SINGLE_HITS)?,
         part_totals: Buffer<u64> = planned.zeroed(commands, scene::PART_TOTALS)?,
         part_sums: Buffer<u64> = planned.zeroed(commands, scene::PART_SUMS)?,
         anomalies: Buffer<u32> = planned.zeroed(commands, scene::ANOMALIES)?,
         class_counts: Buffer<u32> = planned.zeroed(commands, scene::CLASS_COUNTS)?,
         /// Counts as the latest whole block left them: a block that is cut short leaves nothing in the result.
-        one_hits_of_blocks: Buffer<u32> = planned.one(scene::ONE_HITS_OF_BLOCKS)?,
+        one_hits_of_blocks: Buffer<u32> = planned.one(scene::SINGLE_HITS_OF_BLOCKS)?,
         part_totals_of_blocks: Buffer<u64> = planned.one(scene::PART_TOTALS_OF_BLOCKS)?,
         anomalies_of_blocks: Buffer<u32> = planned.one(scene::ANOMALIES_OF_BLOCKS)?,
     }
@@ -59,14 +59,14 @@ impl FilmBuffers {
 
     /// Forgets what was counted while points were seen.
     pub(super) fn forget_seen(&self, commands: &mut Commands) {
-        commands.clear(&self.one_hits);
+        commands.clear(&self.single_hits);
         commands.clear(&self.part_totals);
         commands.clear(&self.anomalies);
     }
 
     /// Notes what the block that ends leaves of the counts.
     pub(super) fn end_block(&self, commands: &mut Commands) {
-        commands.copy(&self.one_hits, &self.one_hits_of_blocks, self.one_hits.count());
+        commands.copy(&self.single_hits, &self.one_hits_of_blocks, self.single_hits.count());
         commands.copy(&self.part_totals, &self.part_totals_of_blocks, PART_COUNT.into());
         commands.copy(&self.anomalies, &self.anomalies_of_blocks, self.anomalies.count());
     }
@@ -86,8 +86,8 @@ impl FilmBuffers {
             values[(block.number % KEPT_BLOCKS) as usize * kept..][..kept].copy_from_slice(&block.values);
         }
         commands.upload(latest_blocks, &values)?;
-        for one_hits in [&self.one_hits, &self.one_hits_of_blocks] {
-            commands.upload(one_hits, &film.one_hits)?;
+        for single_hits in [&self.single_hits, &self.one_hits_of_blocks] {
+            commands.upload(single_hits, &film.single_hits)?;
         }
         if let Some(parts) = &film.parts {
             commands.upload(&self.part_sums, parts)?;
@@ -109,7 +109,7 @@ impl FilmBuffers {
         plan: &ScenePlan,
         state: &RunState<SceneFilm>,
         is_cut: bool,
-    ) -> Result<Later<SceneFilm>> {
+    ) -> Result<Lazy<SceneFilm>> {
         let pixels = plan.sensor.pixels() as usize;
         // Where a block is whole, nothing counts of the one under way.
         let is_whole = state.blocks() > 0;
@@ -125,16 +125,16 @@ impl FilmBuffers {
         };
         let FilmBuffers { sums_of_block, film_sums, film_squares, surface_sums_of_block, surface_sums, surface_squares, .. } = self;
         let (film_sums, surface_sums) = if is_whole { (film_sums, surface_sums) } else { (sums_of_block, surface_sums_of_block) };
-        let (one_hits, part_totals, anomalies) = match is_whole {
+        let (single_hits, part_totals, anomalies) = match is_whole {
             true => (&self.one_hits_of_blocks, &self.part_totals_of_blocks, &self.anomalies_of_blocks),
-            false => (&self.one_hits, &self.part_totals, &self.anomalies),
+            false => (&self.single_hits, &self.part_totals, &self.anomalies),
         };
         let seen = if plan.film.sees_light { pixels } else { 0 };
         let all = (commands.copy_out(film_sums, 3 * pixels)?, commands.copy_out(film_squares, 6 * pixels)?);
         let surfaces = (commands.copy_out(surface_sums, 3 * seen)?, commands.copy_out(surface_squares, 6 * seen)?);
         let kept = PART_VALUES as usize * kept_count(pixels);
         let latest = commands.copy_out(&self.latest_blocks, self.latest_blocks.count() as usize)?;
-        let one_hits = commands.copy_out(one_hits, HIT_KINDS as usize * pixels)?;
+        let single_hits = commands.copy_out(single_hits, HIT_KINDS as usize * pixels)?;
         let part_totals = commands.copy_out(part_totals, PART_COUNT as usize)?;
         let anomalies = commands.copy_out(anomalies, ANOMALY_WORDS)?;
         let class_counts = commands.copy_out(&self.class_counts, 2 * RADIUS_CLASSES as usize)?;
@@ -166,7 +166,7 @@ impl FilmBuffers {
                 plan,
                 latest,
                 differences: Differences(differences.take()),
-                one_hits: one_hits.take(),
+                single_hits: single_hits.take(),
                 part_totals: part_totals.take(),
                 parts: parts.map(|(values, first)| values.take().split_off(first)),
                 anomalies: anomalies.take().try_into().expect("so many words were read"),

@@ -1,6 +1,6 @@
 //! What a run on a scene computes: the scene as the kernels read it, who looks at it, and what the trial found.
 
-use super::View;
+use super::Viewpoint;
 use crate::engine::run::identity::{Hash, Identity};
 use crate::gpu::DeviceFacts;
 use crate::plan::scene::{MapPlan, ScenePlan};
@@ -9,8 +9,8 @@ use crate::scene::geometry::Geometry;
 /// Specialization constants that change no bit of a block.
 const WITHOUT_EFFECT: [&str; 4] = ["HAS_SLOTS", "HAS_PARTS", "CHAIN_STEPS", "PARANOID"];
 
-pub(crate) fn identity(scene: &str, view: &View, plan: &ScenePlan, map: Option<&str>, facts: &DeviceFacts) -> Identity {
-    Identity::new(scene, content(view, plan, map), &plan.settings, found(plan), Some(facts), plan.settings.math)
+pub(crate) fn identity(scene: &str, viewpoint: &Viewpoint, plan: &ScenePlan, map: Option<&str>, facts: &DeviceFacts) -> Identity {
+    Identity::new(scene, content(viewpoint, plan, map), &plan.settings, found(plan), Some(facts), plan.settings.math)
 }
 
 /// Of a scene as the kernels read it.
@@ -38,12 +38,12 @@ pub(crate) fn scene_hash(geometry: &Geometry) -> String {
     hash.finish()
 }
 
-fn content(view: &View, plan: &ScenePlan, map: Option<&str>) -> Hash {
+fn content(viewpoint: &Viewpoint, plan: &ScenePlan, map: Option<&str>) -> Hash {
     let mut hash = Hash::default();
-    add_scene(&mut hash, view.geometry);
-    hash.add_text(&format!("{:?} {:?}", plan.sensor, view.camera));
+    add_scene(&mut hash, viewpoint.geometry);
+    hash.add_text(&format!("{:?} {:?}", plan.sensor, viewpoint.camera));
     map.iter().for_each(|map| hash.add_text(map));
-    view.phases.iter().for_each(|phase| hash.add(phase));
+    viewpoint.phases.iter().for_each(|phase| hash.add(phase));
     hash
 }
 

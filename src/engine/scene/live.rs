@@ -6,7 +6,7 @@ use std::time::Instant;
 use glam::DVec3;
 
 use super::film_buffers::FilmBuffers;
-use super::kept_maps::KeptMaps;
+use super::map_cache::MapCache;
 use super::on_gpu::{SceneOnGpu, constants, modules, task};
 use super::resources::SceneResources;
 use crate::constants::{SHOW_ALL, SHOW_ERROR};
@@ -58,7 +58,7 @@ impl<'a> LiveScene<'a> {
         commands.submit()?;
         let most_bytes = gpu.facts().usable_memory_bytes.saturating_sub(plan.bytes) / SHARE_FOR_KEPT_MAPS;
         let mut world = SceneOnGpu::new(geometry, Some(camera.clone()), plan, resources, cancelled);
-        world.kept = Some(KeptMaps::new(most_bytes));
+        world.cache = Some(MapCache::new(most_bytes));
         let run = Run::new(world, commands, task(geometry, plan), &mut Control::quiet(cancelled))?;
         Ok(LiveScene { run, geometry, plan, cancelled, camera: camera.clone() })
     }
@@ -77,8 +77,8 @@ impl<'a> LiveScene<'a> {
     }
 
     /// Rounds whose photons are kept, and the bytes of these.
-    pub(crate) fn kept(&self) -> (usize, u64) {
-        self.run.world.kept.as_ref().map_or((0, 0), |kept| (kept.rounds(), kept.bytes()))
+    pub(crate) fn cached(&self) -> (usize, u64) {
+        self.run.world.cache.as_ref().map_or((0, 0), |cache| (cache.rounds(), cache.bytes()))
     }
 
     /// Records what is shown of the film: light or its error, of which `mean` is the mean of the picture.
@@ -104,12 +104,12 @@ impl<'a> LiveScene<'a> {
     pub(crate) fn show_photons(&mut self, colours: [u32; 2], place: DotPlace, window_pixels: &Buffer<u32>) -> Result<()> {
         let Run { world, recorder, .. } = &mut self.run;
         let Sensor::Picture { width, height } = self.plan.sensor else { return Ok(()) };
-        let Some(kept) = &world.kept else { return Ok(()) };
+        let Some(cache) = &world.cache else { return Ok(()) };
         let is_orthographic = matches!(self.camera.projection, Projection::Orthographic { .. });
         let half_height = self.camera.half_height() / if is_orthographic { self.geometry.unit } else { 1.0 };
         let across = |length: f64, direction: DVec3| (length * direction).as_vec3();
         for map in self.plan.maps() {
-            for part in kept.parts(map) {
+            for part in cache.parts(map) {
                 let push = ShowPhotonsPush {
                     photon_count: part.count() as u32,
                     width: place.window[0],

@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
-use super::kept_maps::KeptMaps;
+use super::map_cache::MapCache;
 use super::map_file::MapFile;
 use super::{Round, SceneFilm, estimate, index, radius_class, trace};
 use crate::engine::run::RunState;
@@ -67,7 +67,7 @@ pub(super) fn one_map(
     in_round: &MapInRound,
     deadline: Option<Instant>,
     timed_chunk: &mut u32,
-    mut kept: Option<&mut KeptMaps>,
+    mut cache: Option<&mut MapCache>,
     state: &mut RunState<SceneFilm>,
 ) -> Result<u32> {
     let map = in_round.map;
@@ -81,7 +81,7 @@ pub(super) fn one_map(
         let count = most.min(map.chunk_photons).min(map.photons - traced);
         state.hand_out(usize::from(map.caustic_only), count);
         trace::trace(commands, round, map, (traced, count), &mut |commands, stored| {
-            kept.as_mut().map_or(Ok(()), |kept| kept.keep(commands, round, map))?;
+            cache.as_mut().map_or(Ok(()), |cache| cache.store(commands, round, map))?;
             gather_in_grids(commands, round, in_round, stored)
         })?;
         traced += count;
@@ -95,16 +95,16 @@ pub(super) fn one_map(
 }
 
 /// The photons of a map that was kept; says how many were emitted for them.
-pub(super) fn one_kept_map(
+pub(super) fn one_cached_map(
     commands: &mut Commands,
     round: Round,
     in_round: &MapInRound,
-    kept: &KeptMaps,
+    cache: &MapCache,
     state: &mut RunState<SceneFilm>,
 ) -> Result<u32> {
     let (map, photons) = (in_round.map, round.photons());
     state.hand_out(usize::from(map.caustic_only), map.photons);
-    for part in kept.parts(map) {
+    for part in cache.parts(map) {
         commands.copy(part, &photons.map, part.count());
         commands.fill(&photons.counters, 0, 1, part.count() as u32);
         gather_in_grids(commands, round, in_round, Some(part.count() as u32))?;

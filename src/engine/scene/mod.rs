@@ -1,7 +1,7 @@
 //! Lighting a scene of triangles: rounds of photons, maps and visible points, on the GPU.
 //!
 //! Each round is independent: its own photons, its own paths from the camera, its own radius (Knaus and
-//! Zwicker 2011). So the mean over rounds converges to the right answer, its variance tells the error, and
+//! Zwicker 2011). So the mean over rounds converges to the right answer, its variance gives the error, and
 //! any round could run anywhere.
 //!
 //! ```text
@@ -20,10 +20,10 @@ pub mod film;
 pub(crate) mod film_buffers;
 mod identity;
 pub(crate) mod index;
-mod kept_maps;
 mod light_trial;
 pub(crate) mod live;
 pub(crate) mod losses;
+mod map_cache;
 pub(crate) mod map_file;
 mod map_in_round;
 mod on_gpu;
@@ -60,7 +60,7 @@ use resources::{PhotonBuffers, SceneResources};
 pub type RunResult = run::RunResult<ScenePlan, SceneFilm>;
 
 impl RunResult {
-    /// What its film tells of its error, unknown of few blocks, with the bias that extra runs found.
+    /// What its film says of its error, unknown of few blocks, with the bias that extra runs found.
     pub fn error(&self) -> FilmError {
         let error = self.film.error(self.film.plan.confidence);
         FilmError { bias: self.bias.or(error.bias), ..error }.stated()
@@ -68,11 +68,11 @@ impl RunResult {
 }
 
 /// What is lit and what looks at it.
-pub(crate) struct View<'a> {
+pub(crate) struct Viewpoint<'a> {
     pub geometry: &'a Geometry,
     /// For a picture.
     pub camera: Option<&'a Camera>,
-    /// Sets of receivers of equal length, one a round in turn; none for a picture.
+    /// Sets of receivers of equal length, one per round in turn; none for a picture.
     pub phases: &'a [Vec<Receiver>],
 }
 
@@ -94,34 +94,34 @@ impl<'a> Round<'a> {
 
 /// What light is asked of.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Target<'a> {
+pub(crate) enum Receivers<'a> {
     /// A camera's picture, so many pixels wide and high: radiance, W/m2/sr.
-    Picture(&'a Camera, [u32; 2]),
+    Image(&'a Camera, [u32; 2]),
     /// Points with the normals of their surfaces, in metres: irradiance, W/m2.
     Points(&'a [(DVec3, DVec3)]),
 }
 
-impl<'a> Target<'a> {
+impl<'a> Receivers<'a> {
     pub(crate) fn sensor(self) -> Sensor {
         match self {
-            Target::Picture(_, [width, height]) => Sensor::Picture { width, height },
-            Target::Points(points) => Sensor::Receivers { count: points.len() as u32 },
+            Receivers::Image(_, [width, height]) => Sensor::Picture { width, height },
+            Receivers::Points(points) => Sensor::Receivers { count: points.len() as u32 },
         }
     }
 
     #[cfg(test)]
     pub(crate) fn camera(self) -> Option<&'a Camera> {
         match self {
-            Target::Picture(camera, _) => Some(camera),
-            Target::Points(_) => None,
+            Receivers::Image(camera, _) => Some(camera),
+            Receivers::Points(_) => None,
         }
     }
 
     /// Its points, the same in all rounds; none for a picture.
     pub(crate) fn phases(self, geometry: &Geometry) -> Vec<Vec<Receiver>> {
         match self {
-            Target::Picture(..) => Vec::new(),
-            Target::Points(points) => vec![points.iter().map(|point| receiver(geometry, *point)).collect()],
+            Receivers::Image(..) => Vec::new(),
+            Receivers::Points(points) => vec![points.iter().map(|point| receiver(geometry, *point)).collect()],
         }
     }
 }

@@ -6,16 +6,16 @@ use std::time::{Duration, Instant};
 
 use super::film::SceneFilm;
 use super::identity::identity;
-use super::kept_maps::KeptMaps;
 use super::losses::losses;
+use super::map_cache::MapCache;
 use super::map_file::MapFile;
-use super::map_in_round::{FIRST_TIMED_CHUNK, MapInRound, StoredPhotons, one_kept_map, one_map, one_stored_map};
+use super::map_in_round::{FIRST_TIMED_CHUNK, MapInRound, StoredPhotons, one_cached_map, one_map, one_stored_map};
 use super::resources::SceneResources;
-use super::{Round, RunResult, View, estimate, index, points, radius_class, trace};
+use super::{Round, RunResult, Viewpoint, estimate, index, points, radius_class, trace};
 use crate::constants::{PART_COUNT, TALLY_COPIES};
 use crate::engine::nonfinite_values::NonfiniteValues;
 use crate::engine::run::saved::{SavedFilm, SavedRun, WorldFilm};
-use crate::engine::run::watch::Later;
+use crate::engine::run::watch::Lazy;
 use crate::engine::run::{self, RunState, Task, World};
 use crate::engine::{Control, tallies, totals};
 use crate::error::Result;
@@ -42,11 +42,11 @@ pub(crate) fn modules(plan: &ScenePlan, facts: &DeviceFacts) -> Vec<Module> {
 fn of_film(plan: &ScenePlan, facts: &DeviceFacts) -> Vec<Module> {
     let mut modules = vec![Resolve::MODULE];
     modules.push(match plan.sensor {
-        Sensor::Picture { .. } => crate::gpu::kernels::View::MODULE,
+        Sensor::Picture { .. } => CameraPaths::MODULE,
         Sensor::Receivers { .. } => Receive::MODULE,
     });
     if plan.maps().next().is_some() {
-        modules.extend([CrowdSize::MODULE, FluxToRadiance::MODULE]);
+        modules.extend([DensePointsSize::MODULE, FluxToRadiance::MODULE]);
         modules.extend(index::modules());
         modules.push(if facts.int64_atomics { GatherVisiblePointsU64::MODULE } else { GatherVisiblePointsTwoWords::MODULE });
         if plan.film.bias == BiasPlan::Blocks {
@@ -82,7 +82,7 @@ pub(crate) struct SceneOnGpu<'a> {
     /// Photons that are not traced but read; `None` where they are traced.
     stored: Option<StoredPhotons<'a>>,
     /// Maps of this run that are kept to be looked at again; `None` where nobody does.
-    pub(super) kept: Option<KeptMaps>,
+    pub(super) cache: Option<MapCache>,
     /// Photons that a chunk of the global and of the caustic map may have where time may be up.
     timed_chunks: [u32; 2],
     /// A round was cut short, of which parts of light may have come to that of the block under way.
@@ -91,12 +91,18 @@ pub(crate) struct SceneOnGpu<'a> {
 }
 
 /// Runs all rounds of a plan; progress is reported in rounds.
-pub(crate) fn light(gpu: &Gpu, view: &View, plan: ScenePlan, control: &mut Control) -> Result<RunResult> {
-    light_from(gpu, view, plan, None, control)
+pub(crate) fn light(gpu: &Gpu, viewpoint: &Viewpoint, plan: ScenePlan, control: &mut Control) -> Result<RunResult> {
+    light_from(gpu, viewpoint, plan, None, control)
 }
 
 /// The same with photons from a file, for which the plan must be made ([`MapFile::plan`]).
-pub(crate) fn light_from(gpu: &Gpu, view: &View, plan: ScenePlan, map: Option<&MapFile>, control: &mut Control) -> Result<RunResult> {
+pub(crate) fn light_from(
+    gpu: &Gpu,
+    viewpoint: &Viewpoint,
+    plan: ScenePlan,
+    map: Option<&MapFile>,
+    control: &mut Control,
+) -> Result<RunResult> {
     let started = Instant::now();
     let modules = if map.is_some() { of_film(&plan, gpu.facts()) } else { modules(&plan, gpu.facts()) };
     let mut commands = run::commands(gpu, &modules, constants(&plan), plan.settings.math, started)?;
@@ -105,19 +111,21 @@ pub(crate) fn light_from(gpu: &Gpu, view: &View, plan: ScenePlan, map: Option<&M
         commands.timings().count(name);
         commands.timings().add(Span::of_host(name, Duration::ZERO, duration));
     }
-    let resources = commands.scope("set-up", |commands| SceneResources::new(commands, view.geometry, &plan, view.phases))?;
+    let resources = commands.scope("set-up", |commands| SceneResources::new(commands, viewpoint.geometry, &plan, viewpoint.phases))?;
     commands.warm_up()?;
     commands.submit()?;
-    let identity = control.keep.identity(|name| identity(name, view, &plan, map.map(|map| map.hash.as_str()), gpu.facts()))?;
-    let task = Task { identity, ..task(view.geometry, &plan) };
-    control.keep.check_resumed(|saved| can_go_on(saved, &plan, &task))?;
+    let identity =
+        control.checkpointing.identity(|name| identity(name, viewpoint, &plan, map.map(|map| map.hash.as_str()), gpu.facts()))?;
+    let task = Task { identity, ..task(viewpoint.geometry, &plan) };
+    control.checkpointing.check_resumed(|saved| can_go_on(saved, &plan, &task))?;
     let none = || [Fates::of_scene(plan.settings.bounces), Fates::of_scene(plan.settings.bounces)];
     let stored = map.map(|file| StoredPhotons { file, open: none(), open_of_blocks: none() });
-    let mut world = SceneOnGpu { stored, ..SceneOnGpu::new(view.geometry, view.camera.cloned(), &plan, resources, control.cancelled) };
-    if plan.has_classes() && control.keep.begins_later() {
+    let mut world =
+        SceneOnGpu { stored, ..SceneOnGpu::new(viewpoint.geometry, viewpoint.camera.cloned(), &plan, resources, control.cancelled) };
+    if plan.has_classes() && control.checkpointing.begins_later() {
         world.find_radii(&mut commands)?;
     }
-    if let Some((_, saved)) = &control.keep.resume {
+    if let Some((_, saved)) = &control.checkpointing.resume {
         world.resources.film.restore(&mut commands, SceneFilm::of(&saved.film))?;
     }
     run::run(world, commands, &plan, task, control)
@@ -218,8 +226,8 @@ impl<'a> World for SceneOnGpu<'a> {
         for which in self.plan.maps().map(|map| usize::from(map.caustic_only)) {
             let (all, of_blocks) = (counted.next().expect("each map is read"), counted.next().expect("each map is read twice"));
             let counted = [all, of_blocks];
-            let [all, of_blocks] = match &mut self.kept {
-                Some(kept) => kept.fates(which, counted),
+            let [all, of_blocks] = match &mut self.cache {
+                Some(cache) => cache.fates(which, counted),
                 None => counted,
             };
             state.count(which, all, of_blocks);
@@ -227,7 +235,7 @@ impl<'a> World for SceneOnGpu<'a> {
         Ok(())
     }
 
-    fn film(&mut self, commands: &mut Commands<'a>, state: &RunState<SceneFilm>) -> Result<Later<SceneFilm>> {
+    fn film(&mut self, commands: &mut Commands<'a>, state: &RunState<SceneFilm>) -> Result<Lazy<SceneFilm>> {
         self.resources.film.read(commands, self.plan, state, self.is_cut)
     }
 
@@ -247,7 +255,7 @@ impl<'a> SceneOnGpu<'a> {
     ) -> SceneOnGpu<'a> {
         let grids = (!plan.has_classes()).then(|| [radius_class::one_grid(), radius_class::one_grid()]);
         let timed_chunks = [FIRST_TIMED_CHUNK; 2];
-        SceneOnGpu { geometry, camera, plan, resources, grids, stored: None, kept: None, timed_chunks, is_cut: false, cancelled }
+        SceneOnGpu { geometry, camera, plan, resources, grids, stored: None, cache: None, timed_chunks, is_cut: false, cancelled }
     }
 
     /// Looks from somewhere else, at the light of round 0 first: the film is empty, and the photons that are kept stay.
@@ -275,7 +283,7 @@ impl<'a> SceneOnGpu<'a> {
 
     /// One round. When its time is up, it takes no further chunk of photons.
     fn one_round(&mut self, commands: &mut Commands, deadline: Option<Instant>, state: &mut RunState<SceneFilm>) -> Result<()> {
-        let SceneOnGpu { geometry, camera, plan, resources, grids, stored, kept, timed_chunks, .. } = self;
+        let SceneOnGpu { geometry, camera, plan, resources, grids, stored, cache, timed_chunks, .. } = self;
         let camera = camera.as_ref();
         let round = Round { resources, geometry, plan, number: state.round() };
         commands.scope("visible points", |commands| points::see(commands, round, camera))?;
@@ -294,17 +302,17 @@ impl<'a> SceneOnGpu<'a> {
             let mut traced = [0; 2];
             for map in plan.traced_maps() {
                 let in_round = MapInRound { map, grids: &grids[usize::from(map.caustic_only)] };
-                let is_kept = kept.as_mut().is_some_and(|kept| kept.begin(round.number, map));
+                let is_cached = cache.as_mut().is_some_and(|cache| cache.begin(round.number, map));
                 let of_map = commands.scope(map.name, |commands| {
                     if plan.cuts_discs() {
                         commands.scope("cuts", |commands| estimate::cut_discs(commands, round, map))?;
                     }
-                    match (&mut *stored, &mut *kept) {
+                    match (&mut *stored, &mut *cache) {
                         (Some(stored), _) => one_stored_map(commands, round, &in_round, stored, state),
-                        (_, Some(kept)) if is_kept => one_kept_map(commands, round, &in_round, kept, state),
-                        (_, kept) => {
+                        (_, Some(cache)) if is_cached => one_cached_map(commands, round, &in_round, cache, state),
+                        (_, cache) => {
                             let timed_chunk = &mut timed_chunks[usize::from(map.caustic_only)];
-                            one_map(commands, round, &in_round, deadline, timed_chunk, kept.as_mut(), state)
+                            one_map(commands, round, &in_round, deadline, timed_chunk, cache.as_mut(), state)
                         }
                     }
                 })?;

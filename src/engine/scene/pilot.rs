@@ -1,15 +1,15 @@
-//! A pilot: a few rounds, which tell how a picture's work is best divided ([`crate::plan::work_division`]). Nothing of it is in the
+//! A pilot: a few rounds, which show how a picture's work is best divided ([`crate::plan::work_division`]). Nothing of it is in the
 //! picture, and it depends on no seed.
 //!
-//! A few pixels come first, spread over the picture and as small as the picture's own. They tell how much each part of the light varies
+//! A few pixels come first, spread over the picture and as small as the picture's own. They show how much each part of the light varies
 //! from path to path, from shadow ray to shadow ray, and with the photons. Where the run takes long enough, all pixels follow: they show
 //! rare light, and which tiles vary most.
 
 use std::cell::Cell;
 use std::sync::atomic::AtomicBool;
 
-use super::pilot_rounds::{FEW_SAMPLES, MANY_SAMPLES, OfPicture, OfTile, PIXELS_OF_MAP, Parts, PilotRounds, SAMPLES};
-use super::{View, trial};
+use super::pilot_rounds::{FEW_SAMPLES, MANY_SAMPLES, OfImage, OfTile, PIXELS_OF_MAP, Parts, PilotRounds, SAMPLES};
+use super::{Viewpoint, trial};
 use crate::constants::PART_COUNT;
 use crate::engine;
 use crate::error::Result;
@@ -20,7 +20,8 @@ use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
 use crate::plan::work_cost::{Cost, Counted, cost, pilot_size};
 use crate::plan::work_division::{
-    Division, FOUND_BIAS, Free, MOST_PHOTONS, MOST_SAMPLES, MapVariance, Rounds, USUAL_BIAS, USUAL_UNCERTAINTY, Variance, best, of_samples,
+    Division, FOUND_BIAS, MOST_PHOTONS, MOST_SAMPLES, MapVariance, Rounds, TunableSettings, USUAL_BIAS, USUAL_UNCERTAINTY, Variance, best,
+    of_samples,
 };
 use crate::scene::Scene;
 use crate::settings::scene::{SAMPLES_PER_BLOCK, SceneSettings};
@@ -65,42 +66,49 @@ impl Pilot {
 pub(crate) fn choose_for(
     gpu: &Gpu,
     scene: &Scene,
-    view: &View,
+    viewpoint: &Viewpoint,
     settings: &SceneSettings,
     sensor: Sensor,
-    free: Free,
+    tunable: TunableSettings,
     cancelled: &AtomicBool,
 ) -> Result<Option<Pilot>> {
-    if free == Free::default() || !settings.stop.has_goal() {
+    if tunable == TunableSettings::default() || !settings.stop.has_goal() {
         return Ok(None);
     }
-    choose(gpu, scene, view, &trial::plan(gpu, scene, view, settings, sensor)?, free, cancelled)
+    choose(gpu, scene, viewpoint, &trial::plan(gpu, scene, viewpoint, settings, sensor)?, tunable, cancelled)
 }
 
 /// Chooses the division of a picture's work, for whose settings there is a plan. `None` where nothing is to be chosen, or nothing varies.
-pub(crate) fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, free: Free, cancelled: &AtomicBool) -> Result<Option<Pilot>> {
+pub(crate) fn choose(
+    gpu: &Gpu,
+    scene: &Scene,
+    viewpoint: &Viewpoint,
+    plan: &ScenePlan,
+    tunable: TunableSettings,
+    cancelled: &AtomicBool,
+) -> Result<Option<Pilot>> {
     let settings = &plan.settings;
-    if free == Free::default() {
+    if tunable == TunableSettings::default() {
         return Ok(None);
     }
-    let many = if free.shadow_rays { MANY_SHADOW_RAYS } else { settings.shadow_rays };
+    let many = if tunable.shadow_rays { MANY_SHADOW_RAYS } else { settings.shadow_rays };
     let kind = gpu.facts().kind;
-    let looks = PilotRounds { gpu, scene, view, run: plan, size: pilot_size(kind), cancelled, spent: Cell::new(0.0) };
+    let looks = PilotRounds { gpu, scene, viewpoint, run: plan, size: pilot_size(kind), cancelled, spent: Cell::new(0.0) };
     let of_many = looks.of_few(many)?;
     let Some((parts, mut rounds)) = known(&looks, &of_many, None, kind) else { return Ok(None) };
-    // Of a run that takes little longer than another look, paths are not told apart from shadow rays.
+    // Of a run that takes little longer than another look, paths are not distinguished from shadow rays.
     let before = Division::of(settings);
-    let usual_choice = best(&rounds, before, free, &settings.stop, (MOST_SAMPLES, MOST_PHOTONS));
+    let usual_choice = best(&rounds, before, tunable, &settings.stop, (MOST_SAMPLES, MOST_PHOTONS));
     let goal = goal_nanoseconds(&rounds, usual_choice, &settings.stop);
-    if free.shadow_rays && plan.shadow_rays() != 0 && goal > LEAST_LOOKS * looks.cost_of_few(&rounds, many) {
+    if tunable.shadow_rays && plan.shadow_rays() != 0 && goal > LEAST_LOOKS * looks.cost_of_few(&rounds, many) {
         let of_one = looks.of_few(1)?;
         let Some(found) = known(&looks, &of_many, Some(&of_one), kind) else { return Ok(None) };
         rounds = found.1;
     }
-    let choice = Choice::new(&looks, free);
+    let choice = Choice::new(&looks, tunable);
     let mut tiles = None;
     // What is to name each pixel knows of no tiles.
-    if free.samples && !settings.paranoid && matches!(plan.sensor, Sensor::Picture { .. }) {
+    if tunable.samples && !settings.paranoid && matches!(plan.sensor, Sensor::Picture { .. }) {
         let found = choice.look_at_all(&mut rounds)?;
         if let Some((better, found)) = found.and_then(|found| choice.tiles(&rounds, &found)) {
             (rounds, tiles) = (better, Some(found));
@@ -122,17 +130,17 @@ pub(crate) fn choose(gpu: &Gpu, scene: &Scene, view: &View, plan: &ScenePlan, fr
 struct Choice<'a> {
     looks: &'a PilotRounds<'a>,
     before: Division,
-    free: Free,
+    tunable: TunableSettings,
     /// As many photons as are traced at once.
     most_photons: u32,
 }
 
 impl<'a> Choice<'a> {
-    fn new(looks: &'a PilotRounds<'a>, free: Free) -> Choice<'a> {
+    fn new(looks: &'a PilotRounds<'a>, tunable: TunableSettings) -> Choice<'a> {
         let before = Division::of(&looks.run.settings);
         let all = Division { photons: MOST_PHOTONS, caustic_photons: MOST_PHOTONS, ..before };
         let at_once = |plan: ScenePlan| plan.maps().map(|map| map.chunk_photons).min().unwrap_or(before.photons);
-        Choice { looks, before, free, most_photons: plan_of(looks, all).map_or(before.photons, at_once) }
+        Choice { looks, before, tunable, most_photons: plan_of(looks, all).map_or(before.photons, at_once) }
     }
 
     fn stop(&self) -> &Stop {
@@ -140,7 +148,7 @@ impl<'a> Choice<'a> {
     }
 
     fn best(&self, rounds: &Rounds, most_samples: u32) -> Division {
-        best(rounds, self.before, self.free, self.stop(), (most_samples, self.most_photons))
+        best(rounds, self.before, self.tunable, self.stop(), (most_samples, self.most_photons))
     }
 
     fn least_loss(&self, rounds: &Rounds) -> f64 {
@@ -170,7 +178,7 @@ impl<'a> Choice<'a> {
         while least <= MOST_PICTURE_ROUNDS {
             let first = self.best(rounds, MOST_SAMPLES);
             let fits = picture_rounds(self.looks.run, first, rounds, self.looks.size.photons);
-            // What few pixels have told may be far off.
+            // What few pixels have shown may be far off.
             let (times, most) = if found.is_none() { (LEAST_PICTURE, FIRST_PICTURE_ROUNDS) } else { (1.0, MOST_PICTURE_ROUNDS) };
             if fits * times < f64::from(least) {
                 break;
@@ -202,13 +210,13 @@ impl<'a> Choice<'a> {
 
 /// The plan of the run with this division.
 fn plan_of(looks: &PilotRounds, division: Division) -> Result<ScenePlan> {
-    let PilotRounds { gpu, scene, view, run, .. } = looks;
+    let PilotRounds { gpu, scene, viewpoint, run, .. } = looks;
     let limits = engine::limits(gpu.facts());
-    ScenePlan::with_trial(scene, view.geometry, &division.set(&run.settings), run.sensor, &limits, run.trial.clone())
+    ScenePlan::with_trial(scene, viewpoint.geometry, &division.set(&run.settings), run.sensor, &limits, run.trial.clone())
 }
 
 /// Takes over what all pixels have shown with so many shadow rays.
-fn learn(known: &mut Variance, seen: &OfPicture, shadow_rays: u32) {
+fn learn(known: &mut Variance, seen: &OfImage, shadow_rays: u32) {
     let of_rays = of_samples(shadow_rays);
     known.shadow_ray = known.shadow_ray.min(seen.paths / of_rays);
     known.path = seen.paths - known.shadow_ray * of_rays;
@@ -224,7 +232,7 @@ fn learn(known: &mut Variance, seen: &OfPicture, shadow_rays: u32) {
     }
 }
 
-/// What a few pixels tell with many shadow rays, and with one: the parts of the noise, as shares of its square, and rounds. `None` where
+/// What a few pixels show with many shadow rays, and with one: the parts of the noise, as shares of its square, and rounds. `None` where
 /// nothing varies.
 fn known(looks: &PilotRounds, of_many: &Parts, of_one: Option<&Parts>, kind: &str) -> Option<([f64; PART_COUNT as usize], Rounds)> {
     let plan = looks.run;
@@ -304,7 +312,7 @@ const LEAST_COST: f64 = 0.1;
 const PICTURE_ROUNDS: u32 = 4;
 const FIRST_PICTURE_ROUNDS: u32 = 8;
 const MOST_PICTURE_ROUNDS: u32 = 64;
-/// The share of the run that they may take. The first look may take several times as much, as few pixels may have told too little of the run.
+/// The share of the run that they may take. The first look may take several times as much, as few pixels may have shown too little of the run.
 const PICTURE_SHARE: f64 = 0.05;
 const LEAST_PICTURE: f64 = 6.0;
 /// Of the mean, what a tile is taken to have that showed nothing.
@@ -380,7 +388,7 @@ fn smooth(values: &[f64], columns: usize) -> Vec<f64> {
 /// The square of the widest first radius of a map over that of the usual photons and neighbours.
 fn widest(plan: &ScenePlan, map: &MapPlan) -> f64 {
     let reach = plan.trial.as_ref().map_or(TrialRadius::default(), |trial| trial.reach[usize::from(map.caustic_only)]);
-    // Without a trial the scene's area tells.
+    // Without a trial the scene's area gives them.
     let (wanted, widest) = if reach.wanted > 0.0 { (reach.wanted, reach.widest) } else { (map.radius, MAX_DEFAULT_RADIUS) };
     let before = Division::of(&plan.settings);
     let of = if map.caustic_only { before.caustic() } else { before.global() };

@@ -1,4 +1,4 @@
-//! The rounds of a pilot, and what they tell of how a picture's light varies.
+//! The rounds of a pilot, and what they say of how a picture's light varies.
 
 use std::cell::Cell;
 use std::sync::atomic::AtomicBool;
@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use super::film::GLOBAL_PHOTON;
 use super::trial::few_points;
-use super::{RunResult, SceneFilm, View, light};
+use super::{RunResult, SceneFilm, Viewpoint, light};
 use crate::constants::PART_COUNT;
 use crate::engine::error::bias_batches;
 use crate::engine::{self, Control};
@@ -27,13 +27,13 @@ use crate::settings::tile_samples::TILE;
 /// Paths through each, as many as a block of a run has at least: they are even over it, and vary less than if each was alone.
 pub(crate) const SAMPLES: u32 = SAMPLES_PER_BLOCK;
 const SEED: u64 = 0x0070_696c_6f74;
-/// Pixels that tell enough of a map, whose light varies little from one to the next; and paths through each, to tell what varies from path
+/// Pixels that show enough of a map, whose light varies little from one to the next; and paths through each, to show what varies from path
 /// to path from what varies with the photons.
 pub(crate) const PIXELS_OF_MAP: u32 = 4096;
 pub(crate) const FEW_SAMPLES: u32 = 1;
 pub(crate) const MANY_SAMPLES: u32 = 8;
 
-/// Paths of a pixel that look a map up at places of their own tell as much as so many photons, and lie evenly.
+/// Paths of a pixel that look a map up at places of their own show as much as so many photons, and lie evenly.
 const MOST_POWER: f64 = 1.35;
 /// A longer run knows its bias better for its noise than these rounds.
 const STEADIER: f64 = 0.6;
@@ -52,8 +52,8 @@ pub(crate) struct Parts {
     pub shadow_rays: u32,
 }
 
-/// What all pixels tell, relative to all light.
-pub(crate) struct OfPicture {
+/// What all pixels show, relative to all light.
+pub(crate) struct OfImage {
     /// The variance of a path, and that of each tile over their mean.
     pub paths: f64,
     pub tiles: Vec<OfTile>,
@@ -85,7 +85,7 @@ pub(crate) struct OfMap {
 pub(crate) struct PilotRounds<'a> {
     pub gpu: &'a Gpu,
     pub scene: &'a Scene,
-    pub view: &'a View<'a>,
+    pub viewpoint: &'a Viewpoint<'a>,
     pub run: &'a ScenePlan,
     pub size: PilotSize,
     pub cancelled: &'a AtomicBool,
@@ -96,35 +96,35 @@ pub(crate) struct PilotRounds<'a> {
 impl PilotRounds<'_> {
     /// A few pixels, spread over the picture, with a path through each and so many shadow rays.
     pub(super) fn of_few(&self, shadow_rays: u32) -> Result<Parts> {
-        let PilotRounds { view, run, .. } = *self;
+        let PilotRounds { viewpoint, run, .. } = *self;
         let seed = bias_batches::seed(SEED, 0);
         let settings = SceneSettings { samples: SAMPLES, shadow_rays, rounds: self.size.rounds, seed, ..self.settings() };
-        let (sensor, phases) = few_points(view, run.sensor, self.size.pixels);
-        let view = View { phases: &phases, ..*view };
-        let plan = self.plan(&view, &settings, sensor)?;
+        let (sensor, phases) = few_points(viewpoint, run.sensor, self.size.pixels);
+        let viewpoint = Viewpoint { phases: &phases, ..*viewpoint };
+        let plan = self.plan(&viewpoint, &settings, sensor)?;
         let samples = plan.samples();
         let paths = f64::from(plan.paths()) * f64::from(self.size.rounds);
-        let lit = self.light(&view, plan)?;
-        let error = lit.film.error(settings.stop.confidence);
-        let of_round = error.noise * error.noise * f64::from(lit.film.rounds);
+        let result = self.light(&viewpoint, plan)?;
+        let error = result.film.error(settings.stop.confidence);
+        let of_round = error.noise * error.noise * f64::from(result.film.rounds);
         let [direct, specular, caustic, indirect] = error.places.map_or([0.0; PART_COUNT as usize], |places| places.of_parts);
         let of_path = f64::from(samples) * of_round;
-        let of_unseen = f64::from(samples) * f64::from(lit.film.rounds) * (lit.film.pixels() as f64).sqrt();
+        let of_unseen = f64::from(samples) * f64::from(result.film.rounds) * (result.film.pixels() as f64).sqrt();
         let is_dark = error.unknown.absent.contains(&GLOBAL_PHOTON) && error.unknown.relative.is_finite();
-        let photons = f64::from(lit.film.rounds) * f64::from(settings.photons);
+        let photons = f64::from(result.film.rounds) * f64::from(settings.photons);
         let unreached = if is_dark { error.unknown.relative * photons } else { 0.0 };
-        let light: Vec<f64> = lit.film.part_totals.iter().map(|total| *total as f64).collect();
+        let light: Vec<f64> = result.film.part_totals.iter().map(|total| *total as f64).collect();
         // Without lamps and sky that are seen straight.
-        let surfaces = lit.film.of_surfaces.as_ref().unwrap_or(&lit.film.of_blocks);
+        let surfaces = result.film.of_surfaces.as_ref().unwrap_or(&result.film.of_blocks);
         let all = surfaces.sums.iter().map(|sum| *sum as f64).sum::<f64>().max(1.0);
-        let [nodes, triangles] = lit.film.visited().map(|count| count as f64 / paths);
+        let [nodes, triangles] = result.film.visited().map(|count| count as f64 / paths);
         Ok(Parts {
             variance: [direct * of_path, specular * of_path, caustic * of_round, indirect * of_round],
             light: std::array::from_fn(|part| light[part] / all),
             unseen: error.unseen * of_unseen,
             unreached,
             shadow_rays,
-            counted: Counted { nodes, nodes_of_ray: 0.0, triangles, flights: [0, 1].map(|map| flights(&lit.fates[map])) },
+            counted: Counted { nodes, nodes_of_ray: 0.0, triangles, flights: [0, 1].map(|map| flights(&result.fates[map])) },
         })
     }
 
@@ -137,13 +137,13 @@ impl PilotRounds<'_> {
     }
 
     /// All pixels. `None` where nothing varies.
-    pub(super) fn of_all(&self, shadow_rays: u32, rounds: u32) -> Result<Option<OfPicture>> {
-        let PilotRounds { view, run, .. } = *self;
+    pub(super) fn of_all(&self, shadow_rays: u32, rounds: u32) -> Result<Option<OfImage>> {
+        let PilotRounds { viewpoint, run, .. } = *self;
         let look = |light_of: LightOf, samples: u32| {
             let settings = SceneSettings { samples, shadow_rays, rounds, seed: bias_batches::seed(SEED, 1), ..self.settings() };
-            let sensor = if light_of == LightOf::Paths { run.sensor } else { few_points(view, run.sensor, PIXELS_OF_MAP).0 };
-            let plan = ScenePlan { light_of, ..self.plan(view, &settings, sensor)? };
-            Ok(self.light(view, plan)?.film)
+            let sensor = if light_of == LightOf::Paths { run.sensor } else { few_points(viewpoint, run.sensor, PIXELS_OF_MAP).0 };
+            let plan = ScenePlan { light_of, ..self.plan(viewpoint, &settings, sensor)? };
+            Ok(self.light(viewpoint, plan)?.film)
         };
         let mean = |film: &SceneFilm| film.surface_means().map(DVec3::element_sum).sum::<f64>() / film.pixels() as f64;
         // Of a round's light.
@@ -194,7 +194,7 @@ impl PilotRounds<'_> {
             variance: variance / f64::from(count) / sum,
             met: f64::from(met) / f64::from(count),
         };
-        Ok(Some(OfPicture {
+        Ok(Some(OfImage {
             paths: f64::from(SAMPLES) * relative(square(&of_paths)),
             tiles: tiles.into_iter().map(of_tile).collect(),
             maps: maps.map(|map| OfMap { of_round: relative(map.of_round), light: map.light / all, ..map }),
@@ -219,7 +219,7 @@ impl PilotRounds<'_> {
     }
 
     /// With what the run's own trial has found. Pixels keep their size, however far apart they are.
-    fn plan(&self, view: &View, settings: &SceneSettings, sensor: Sensor) -> Result<ScenePlan> {
+    fn plan(&self, viewpoint: &Viewpoint, settings: &SceneSettings, sensor: Sensor) -> Result<ScenePlan> {
         let of_run = &self.run.settings;
         let apart = |neighbours: u32, photons: u32, caustic_only: bool| over_usual(neighbours, caustic_only) / f64::from(photons);
         let times = [
@@ -228,15 +228,15 @@ impl PilotRounds<'_> {
                 / apart(of_run.caustic_neighbours, of_run.caustic_photons, true),
         ];
         let trial = self.run.trial.as_ref().map(|trial| trial.scaled(times.map(f64::sqrt)));
-        let plan = ScenePlan::with_trial(self.scene, view.geometry, settings, sensor, &engine::limits(self.gpu.facts()), trial)?;
+        let plan = ScenePlan::with_trial(self.scene, viewpoint.geometry, settings, sensor, &engine::limits(self.gpu.facts()), trial)?;
         let columns = |sensor: Sensor| f64::from(sensor.size().0.max(1));
         Ok(ScenePlan { footprint: columns(sensor) / columns(self.run.sensor), ..plan })
     }
 
-    fn light(&self, view: &View, plan: ScenePlan) -> Result<RunResult> {
-        let lit = light(self.gpu, view, plan, &mut Control::quiet(self.cancelled))?.finished()?;
-        self.spent.set(self.spent.get() + lit.timings.row("round").and_then(|row| row.gpu_ms).unwrap_or(0.0));
-        Ok(lit)
+    fn light(&self, viewpoint: &Viewpoint, plan: ScenePlan) -> Result<RunResult> {
+        let result = light(self.gpu, viewpoint, plan, &mut Control::quiet(self.cancelled))?.finished()?;
+        self.spent.set(self.spent.get() + result.timings.row("round").and_then(|row| row.gpu_ms).unwrap_or(0.0));
+        Ok(result)
     }
 }
 

@@ -5,11 +5,11 @@ use super::film_buffers::FilmBuffers;
 use super::resources::SceneResources;
 use crate::constants::{DOMAIN_CAMERA, DOMAIN_RECEIVERS};
 use crate::error::Result;
-use crate::gpu::kernels::{GoOn, Receive, View};
+use crate::gpu::kernels::{CameraPaths, GoOn, Receive};
 use crate::gpu::{Commands, Extent};
 use crate::plan::scene::ScenePlan;
 use crate::plan::sensor::Sensor;
-use crate::records::{Draws, GoOnPush, ReceivePush, ViewPush};
+use crate::records::{CameraPathsPush, Draws, GoOnPush, ReceivePush};
 use crate::rng::{mix32, words};
 use crate::scene::geometry::Geometry;
 use crate::scene::{Camera, Lens, Projection};
@@ -52,11 +52,11 @@ pub(super) fn rounding(plan: &ScenePlan, round: u32) -> u32 {
 /// A kernel that follows camera paths: what all of these write to, and its own buffers.
 macro_rules! camera_kernel {
     ($kernel:ident, $resources:ident, $($own:ident: $buffer:expr),*) => {{
-        let SceneResources { scene, visible_points, matt_lobes, matt_covers, pass_sums, film, nonfinite_values, .. } = $resources;
-        let FilmBuffers { one_hits, part_totals, anomalies, .. } = film;
+        let SceneResources { scene, visible_points, rough_lobes, rough_covers, pass_sums, film, nonfinite_values, .. } = $resources;
+        let FilmBuffers { single_hits, part_totals, anomalies, .. } = film;
         let camera_path_counts = &$resources.camera_path_counts;
         $kernel {
-            scene, visible_points, matt_lobes, matt_covers, pass_sums, one_hits, part_totals, anomalies, nonfinite_values,
+            scene, visible_points, rough_lobes, rough_covers, pass_sums, single_hits, part_totals, anomalies, nonfinite_values,
             camera_path_counts, $($own: $buffer),*
         }
     }};
@@ -82,7 +82,7 @@ pub(crate) fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>
                 let half_height = camera.half_height() / if is_orthographic { geometry.unit } else { 1.0 };
                 let lens = camera.lens.unwrap_or(Lens { radius: 0.0, focus: 1.0 });
                 let half_width = half_height * f64::from(width) / f64::from(height);
-                let push = ViewPush {
+                let push = CameraPathsPush {
                     draws: draws(DOMAIN_CAMERA),
                     work: plan.work(),
                     rounding: rounding(plan, round),
@@ -102,7 +102,8 @@ pub(crate) fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>
                     film_scale: plan.film.scale as f32,
                     film_limit: plan.film.limit as f32,
                 };
-                let kernel = camera_kernel!(View, resources, next_camera_paths: camera_paths, extra_samples: &resources.extra_samples);
+                let kernel =
+                    camera_kernel!(CameraPaths, resources, next_camera_paths: camera_paths, extra_samples: &resources.extra_samples);
                 commands.dispatch(kernel, &push, Extent::Items(u64::from(end - first)))?;
             }
             Sensor::Receivers { .. } => {

@@ -14,11 +14,11 @@ use crate::error::Result;
 use crate::gpu::{Commands, Extent, Gpu};
 use crate::ledger::fate;
 use crate::plan::scene::{MapPlan, ScenePlan};
-use crate::records::{LightPath, Tally};
+use crate::records::{PhotonState, Tally};
 use crate::scene::geometry::Geometry;
 
 /// The photon as it left its light source and then each surface, normalised as in the kernels.
-pub(crate) fn replay(gpu: &Gpu, geometry: &Geometry, plan: &ScenePlan, name: PhotonName) -> Result<Replayed<LightPath, LightPath>> {
+pub(crate) fn replay(gpu: &Gpu, geometry: &Geometry, plan: &ScenePlan, name: PhotonName) -> Result<Replayed<PhotonState, PhotonState>> {
     let (domain, kind) = if name.caustic { (DOMAIN_CAUSTIC_PHOTONS, "caustic") } else { (DOMAIN_PHOTONS, "global") };
     name.check_round(plan.settings.rounds)?;
     let map = plan.maps().find(|map| map.domain == domain).ok_or_else(|| name.refused(format!("this run has no {kind} map")))?;
@@ -33,7 +33,7 @@ pub(crate) fn replay(gpu: &Gpu, geometry: &Geometry, plan: &ScenePlan, name: Pho
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Flights {
     /// As they leave the lights, then those that are left after each flight.
-    pub paths: Vec<Vec<LightPath>>,
+    pub paths: Vec<Vec<PhotonState>>,
     /// Their fates in each flight.
     pub tallies: Vec<Tally>,
     /// Nonfinite values that `--paranoid` found; `None` without it.
@@ -80,12 +80,12 @@ pub(crate) fn light_paths(
     Ok(Flights { paths, tallies, nonfinite_values })
 }
 
-impl Replayed<LightPath, LightPath> {
+impl Replayed<PhotonState, PhotonState> {
     /// A line per vertex: position, direction and flux after the vertex.
     pub(crate) fn table(&self, geometry: &Geometry, plan: &ScenePlan) -> String {
         let flux = plan.maps().find(|map| map.caustic_only == self.name.caustic).map_or(0.0, |map| map.photon_flux(geometry));
         let watts = flux * geometry.unit * geometry.unit;
-        let row = |(bounce, vertex): (usize, &LightPath)| {
+        let row = |(bounce, vertex): (usize, &PhotonState)| {
             let p = geometry.to_world(vertex.position);
             let (d, flux) = (vertex.direction, vertex.flux.as_dvec3() * watts);
             format!(

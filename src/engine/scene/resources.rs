@@ -31,7 +31,7 @@ buffers! {
             materials: planned.filled(commands, scene::MATERIALS, &geometry.materials)?,
             layered_materials: planned.filled(commands, scene::LAYERED_MATERIALS, &geometry.layered_materials)?,
             triangle_layers: planned.filled(commands, scene::TRIANGLE_LAYERS, &geometry.triangle_layers)?,
-            albedos: planned.filled(commands, scene::ALBEDOS, if plan.keeps(Effect::Layers) { &albedo::TABLE } else { &[] })?,
+            albedos: planned.filled(commands, scene::ALBEDOS, if plan.simulates(Effect::Layers) { &albedo::TABLE } else { &[] })?,
             textures: planned.filled(commands, scene::TEXTURES, &geometry.textures)?,
             texels,
             texels_1,
@@ -54,8 +54,8 @@ buffers! {
         visible_points: Buffer<VisiblePoint> = planned.one(scene::VISIBLE_POINTS)?,
         /// Written once.
         extra_samples: Buffer<u32> = planned.filled(commands, scene::EXTRA_SAMPLES, &plan.extra_samples.table)?,
-        matt_lobes: Buffer<MattLobes> = planned.one(scene::MATT_LOBES)?,
-        matt_covers: Buffer<MattCover> = planned.one(scene::MATT_COVERS)?,
+        rough_lobes: Buffer<RoughLobes> = planned.one(scene::ROUGH_LOBES)?,
+        rough_covers: Buffer<RoughCover> = planned.one(scene::ROUGH_COVERS)?,
         pass_sums: Buffer<u64> = planned.one(scene::PASS_SUMS)?,
         /// Camera paths that one dispatch leaves to the next, which leaves its own in the other; and how many.
         camera_paths: [Buffer<CameraPath>; 2] = planned.several(scene::CAMERA_PATHS)?,
@@ -85,7 +85,7 @@ buffers! {
     /// Photons in flight and their map; both maps of a round use the same ones in turn.
     pub(crate) struct PhotonBuffers(planned: &Planned, commands: &mut Commands, plan: &ScenePlan) {
         /// Paths entering even bounces and odd bounces.
-        paths: [Buffer<LightPath>; 2] = planned.several(scene::PATHS)?,
+        paths: [Buffer<PhotonState>; 2] = planned.several(scene::PATHS)?,
         map: Buffer<MapPhoton> = planned.one(scene::MAP)?,
         sorted_map: Buffer<MapPhoton> = planned.one(scene::SORTED_MAP)?,
         /// Length of the map, then the paths entering each bounce.
@@ -98,7 +98,7 @@ buffers! {
         sums_of_cells: Vec<Buffer<u32>> = planned.all(scene::SUMS_OF_CELLS)?,
         /// Points with so many candidates that several invocations share them: how many, the most candidates, and each one
         /// with its candidates.
-        crowded_points: Buffer<u32> = planned.one(scene::CROWDED_POINTS)?,
+        crowded_points: Buffer<u32> = planned.one(scene::DENSE_POINTS)?,
         /// What keeps photons in order; `None` where they come as they do.
         order: Option<OrderBuffers> = (plan.builder() == Builder::Scan).then(|| OrderBuffers::made(planned)).transpose()?,
         /// Fates of the submission under way, one tally a bounce: of the global map's photons, and of the

@@ -15,7 +15,7 @@ use glam::Vec4;
 use rayon::prelude::*;
 
 use super::resources::SceneResources;
-use super::{Round, View, constants, light_trial, modules, points, trace, trial_rays};
+use super::{Round, Viewpoint, constants, light_trial, modules, points, trace, trial_rays};
 use crate::engine;
 use crate::engine::error::bias_batches;
 use crate::error::Result;
@@ -38,7 +38,7 @@ use crate::settings::stop::Stop;
 const PHOTONS: u32 = 1 << 14;
 /// Points at most.
 const POINTS: u32 = 1 << 10;
-/// Nearest photons whose distance tells the density at a point.
+/// Nearest photons whose distance gives the density at a point.
 const NEAREST: usize = 8;
 /// Steps of a radius in a factor of 2.
 const STEPS: f64 = 4.0;
@@ -56,37 +56,38 @@ pub(super) fn photons_wanted(map: &MapPlan, share: f64) -> f64 {
 }
 
 /// The plan of a run, its default radii and its choice of lights by a trial round.
-pub(crate) fn plan(gpu: &Gpu, scene: &Scene, view: &View, settings: &SceneSettings, sensor: Sensor) -> Result<ScenePlan> {
+pub(crate) fn plan(gpu: &Gpu, scene: &Scene, viewpoint: &Viewpoint, settings: &SceneSettings, sensor: Sensor) -> Result<ScenePlan> {
     let limits = engine::limits(gpu.facts());
-    let trial = find(gpu, scene, view, settings, sensor)?;
-    ScenePlan::with_trial(scene, view.geometry, settings, sensor, &limits, trial)
+    let trial = find(gpu, scene, viewpoint, settings, sensor)?;
+    ScenePlan::with_trial(scene, viewpoint.geometry, settings, sensor, &limits, trial)
 }
 
 /// What a trial finds, where one is needed. The run itself need not fit on the device.
-pub(crate) fn find(gpu: &Gpu, scene: &Scene, view: &View, settings: &SceneSettings, sensor: Sensor) -> Result<Option<Trial>> {
+pub(crate) fn find(gpu: &Gpu, scene: &Scene, viewpoint: &Viewpoint, settings: &SceneSettings, sensor: Sensor) -> Result<Option<Trial>> {
     let limits = engine::limits(gpu.facts());
     let boundless = Limits { buffer_bytes: u64::MAX, memory_bytes: u64::MAX, ..limits };
-    let plan = ScenePlan::new(scene, view.geometry, settings, sensor, &boundless)?;
+    let plan = ScenePlan::new(scene, viewpoint.geometry, settings, sensor, &boundless)?;
     // Whatever part of the picture is asked for, so that all parts have the same photons.
-    let chooses_lights = !light_tree::is_one_lamp(view.geometry);
+    let chooses_lights = !light_tree::is_one_lamp(viewpoint.geometry);
     if plan.maps().all(|map| map.radius_from == RadiusFrom::User) && !chooses_lights && plan.openings().is_empty() {
         return Ok(None);
     }
-    let lights = chooses_lights.then(|| LightTree::new(view.geometry));
-    run(gpu, scene, view, &plan, lights, &limits).map(Some)
+    let lights = chooses_lights.then(|| LightTree::new(viewpoint.geometry));
+    run(gpu, scene, viewpoint, &plan, lights, &limits).map(Some)
 }
 
-fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, lights: Option<LightTree>, limits: &Limits) -> Result<Trial> {
+fn run(gpu: &Gpu, scene: &Scene, viewpoint: &Viewpoint, run: &ScenePlan, lights: Option<LightTree>, limits: &Limits) -> Result<Trial> {
     let settings = settings_of_trial(&run.settings);
     // Parts of a picture have the points of the whole.
     let points_per_path = match run.settings.part {
         Part::All => run.points_per_path,
-        _ => ScenePlan::new(scene, view.geometry, &settings, run.sensor, limits)?.points_per_path,
+        _ => ScenePlan::new(scene, viewpoint.geometry, &settings, run.sensor, limits)?.points_per_path,
     };
-    let (sensor, phases) = few_points(view, run.sensor, POINTS / points_per_path);
-    let by_power =
-        lights.clone().map(|lights| Trial { lights: Some(Arc::new(LightChoice::by_power(view.geometry, lights))), ..Trial::default() });
-    let plan = ScenePlan::with_trial(scene, view.geometry, &settings, sensor, limits, by_power)?;
+    let (sensor, phases) = few_points(viewpoint, run.sensor, POINTS / points_per_path);
+    let by_power = lights
+        .clone()
+        .map(|lights| Trial { lights: Some(Arc::new(LightChoice::by_power(viewpoint.geometry, lights))), ..Trial::default() });
+    let plan = ScenePlan::with_trial(scene, viewpoint.geometry, &settings, sensor, limits, by_power)?;
 
     let casts_rays = lights.is_some() || !plan.openings().is_empty();
     let rays_of_trial = if casts_rays { vec![TrialRays::MODULE] } else { Vec::new() };
@@ -97,12 +98,12 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, lights: Option<Li
     )?;
     let began = Instant::now();
     let mut commands = Commands::new(gpu, constants(&plan), began)?;
-    let resources = SceneResources::new(&mut commands, view.geometry, &plan, &phases)?;
-    let round = Round { resources: &resources, geometry: view.geometry, plan: &plan, number: 0 };
-    let seen = see(&mut commands, round, view.camera)?;
+    let resources = SceneResources::new(&mut commands, viewpoint.geometry, &plan, &phases)?;
+    let round = Round { resources: &resources, geometry: viewpoint.geometry, plan: &plan, number: 0 };
+    let seen = see(&mut commands, round, viewpoint.camera)?;
 
     let mut trial = Trial::default();
-    let points = light_trial::points(&phases, &seen.points, &view.geometry.planes);
+    let points = light_trial::points(&phases, &seen.points, &viewpoint.geometry.planes);
     let rays = if casts_rays { trial_rays::cast(&mut commands, round, &points)? } else { Vec::new() };
     if !plan.openings().is_empty() {
         trial.openings = openings(&rays);
@@ -139,7 +140,7 @@ fn settings_of_trial(of_run: &SceneSettings) -> SceneSettings {
 }
 
 /// What sees at most so many points of those that a run asks about, evenly spread: a smaller picture, or some of the receivers.
-pub(super) fn few_points(view: &View, sensor: Sensor, most: u32) -> (Sensor, Vec<Vec<Receiver>>) {
+pub(super) fn few_points(viewpoint: &Viewpoint, sensor: Sensor, most: u32) -> (Sensor, Vec<Vec<Receiver>>) {
     match sensor {
         Sensor::Picture { width, height } => {
             let smaller = (f64::from(most) / (f64::from(width) * f64::from(height))).sqrt().min(1.0);
@@ -147,7 +148,7 @@ pub(super) fn few_points(view: &View, sensor: Sensor, most: u32) -> (Sensor, Vec
             (Sensor::Picture { width: length(width), height: length(height) }, Vec::new())
         }
         Sensor::Receivers { .. } => {
-            let all = &view.phases[0];
+            let all = &viewpoint.phases[0];
             let some: Vec<_> = all.iter().step_by(all.len().div_ceil(most as usize)).copied().collect();
             (Sensor::Receivers { count: some.len() as u32 }, vec![some])
         }
@@ -205,7 +206,7 @@ fn find_radii(commands: &mut Commands, round: Round, run: &ScenePlan, seen: &See
 }
 
 /// The radius around a point within which a round of so many photons is to leave `wanted`; infinite where too few photons are
-/// about to tell.
+/// about to show.
 fn own_radius(point: &VisiblePoint, photons: &[MapPhoton], planes: &[Vec4], photons_of_run: u32, wanted: f64) -> f64 {
     // Squared distances, ascending.
     let mut nearest = [f32::INFINITY; NEAREST];

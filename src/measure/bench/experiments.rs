@@ -109,12 +109,12 @@ const MOST_COMPACTED: u32 = 1 << 28;
 
 fn compaction(lab: &mut Lab) -> Result<Map> {
     let left = lab.deadline.saturating_duration_since(Instant::now());
-    let all = compaction::Request::up_to(lab.choose(FEW, 1 << 16, MOST_COMPACTED), left);
+    let all = compaction::CompactionRequest::up_to(lab.choose(FEW, 1 << 16, MOST_COMPACTED), left);
     let request = match lab.size {
-        Size::Small => compaction::Request { survivals: vec![0.25, 0.75], turns: 1, ..all },
+        Size::Small => compaction::CompactionRequest { survivals: vec![0.25, 0.75], turns: 1, ..all },
         Size::Full => all,
     };
-    compaction::measure(lab.gpu, &request, lab.scene, lab.cancelled, lab.tell)
+    compaction::measure(lab.gpu, &request, lab.scene, lab.cancelled, lab.report)
 }
 
 /// By the paper's builder, and by the one that wins at this size. The rounds of one run are as many samples as anybody needs.

@@ -42,7 +42,7 @@ pub(crate) enum Size {
 
 /// What is asked for.
 #[derive(Debug, Clone, Serialize)]
-pub(crate) struct Request {
+pub(crate) struct BenchRequest {
     /// What repeats it.
     pub command: String,
     pub size: Size,
@@ -63,7 +63,7 @@ pub(crate) struct Request {
 #[derive(Debug, Serialize)]
 pub(crate) struct Bench {
     pub photonmill: &'static str,
-    pub request: Request,
+    pub request: BenchRequest,
     pub device: String,
     pub driver: String,
     pub vulkan: String,
@@ -84,7 +84,7 @@ pub(crate) struct Lab<'a> {
     pub size: Size,
     pub deadline: Instant,
     pub cancelled: &'a AtomicBool,
-    pub tell: &'a mut dyn FnMut(&str),
+    pub report: &'a mut dyn FnMut(&str),
 }
 
 impl Lab<'_> {
@@ -119,13 +119,13 @@ impl Lab<'_> {
 
 /// Measures the device, then the experiments that are asked for. Experiments that were complete when it was
 /// interrupted are kept.
-pub(crate) fn run(gpu: &Gpu, request: Request, cancelled: &AtomicBool, tell: &mut dyn FnMut(&str)) -> Result<Bench> {
+pub(crate) fn run(gpu: &Gpu, request: BenchRequest, cancelled: &AtomicBool, report: &mut dyn FnMut(&str)) -> Result<Bench> {
     room::check_clock(gpu)?;
     let deadline = Instant::now() + request.budget;
-    tell("limits of the device");
+    report("limits of the device");
     let rates = rates::measure(gpu, request.size)?;
     let scene = request.scene.clone();
-    let mut lab = Lab { gpu, rates, scene: scene.as_ref(), size: request.size, deadline, cancelled, tell };
+    let mut lab = Lab { gpu, rates, scene: scene.as_ref(), size: request.size, deadline, cancelled, report };
     let facts = gpu.facts();
     let mut bench = Bench {
         photonmill: env!("CARGO_PKG_VERSION"),
@@ -157,7 +157,7 @@ fn measure(lab: &mut Lab, bench: &mut Bench) -> Result<()> {
             bench.left_out.push(format!("{}: no --time left", experiment.name));
             continue;
         }
-        (lab.tell)(&format!("[{}/{}] {}", number + 1, bench.request.experiments.len(), experiment.title));
+        (lab.report)(&format!("[{}/{}] {}", number + 1, bench.request.experiments.len(), experiment.title));
         match experiment.run(lab, bench) {
             Ok(()) => {}
             // What this device cannot do is no reason to end.

@@ -26,11 +26,11 @@ pub(crate) struct Rates {
     pub integer_products: Spread,
     /// Reads of 32 bytes at random places of a buffer far larger than caches.
     pub random_reads: Spread,
-    /// Atomic additions whose answer is used, at 2^20 counters in turn without order.
+    /// Atomic additions whose answer is used, at 2^20 counters in random order.
     pub spread_atomics: Spread,
     /// The same at one counter.
     pub single_atomics: Spread,
-    /// Additions to one counter, one a subgroup for all its invocations.
+    /// Additions to one counter, one per subgroup for all its invocations.
     pub counter_additions: Spread,
 }
 
@@ -136,7 +136,7 @@ pub(crate) fn measure(gpu: &Gpu, size: Size) -> Result<Rates> {
         commands.dispatch(MeasureGather { blocks: copies, sums }, &push(accesses, ACCESSES, mask), Extent::Items(u64::from(accesses)))
     })?;
     let found = bench.commands.read(sums, accesses as usize)?;
-    // The copy as a whole is held against what it should be by this, at random places.
+    // The copy as a whole is checked against what it should be by this, at random places.
     bench.check("copied blocks", accesses, |index| found[index as usize] == read_sum(index, ACCESSES, mask))?;
 
     let spread_atomics = bench.atomics(counts, sums, accesses, COUNTERS - 1)?;

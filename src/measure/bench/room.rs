@@ -10,8 +10,8 @@ use crate::engine::run;
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, HeldMemory};
 use crate::ledger::Fates;
-use crate::path::StoredPath;
 use crate::photon::StoredPhoton;
+use crate::photon_state::PackedPhotonState;
 use crate::plan::RoomPlan;
 use crate::plan::buffers::group_count;
 use crate::records::Point;
@@ -56,7 +56,7 @@ pub(crate) struct Timed {
     pub dispatches: f64,
     pub memory: HeldMemory,
     pub stated_bytes: u64,
-    /// Counters that places were taken from in turn; 1 but in the paper's atomic builder.
+    /// Counters that places were taken from round-robin; 1 but in the paper's atomic builder.
     pub counters: u32,
 }
 
@@ -105,24 +105,24 @@ pub(crate) fn run_once(gpu: &Gpu, settings: &RoomSettings, cancelled: &AtomicBoo
 pub(crate) fn time(gpu: &Gpu, rates: &Rates, settings: &RoomSettings, cancelled: &AtomicBool) -> Result<Timed> {
     let rounds = DROPPED + REPEATS;
     gpu.forget_peaks();
-    let outcome = run_once(gpu, &RoomSettings { rounds, ..settings.clone() }, cancelled)?;
-    Ok(timed(gpu, rates, &outcome, rounds, DROPPED))
+    let result = run_once(gpu, &RoomSettings { rounds, ..settings.clone() }, cancelled)?;
+    Ok(timed(gpu, rates, &result, rounds, DROPPED))
 }
 
 /// Times a run as it is, all rounds; a first one is dropped.
 pub(crate) fn time_run(gpu: &Gpu, rates: &Rates, settings: &RoomSettings, cancelled: &AtomicBool) -> Result<Timed> {
     run_once(gpu, settings, cancelled)?;
     gpu.forget_peaks();
-    let outcome = run_once(gpu, settings, cancelled)?;
-    Ok(timed(gpu, rates, &outcome, settings.rounds, 0))
+    let result = run_once(gpu, settings, cancelled)?;
+    Ok(timed(gpu, rates, &result, settings.rounds, 0))
 }
 
-fn timed(gpu: &Gpu, rates: &Rates, outcome: &RunResult, rounds: u32, first: u32) -> Timed {
-    let plan = &outcome.plan;
-    let counts = Counts::of(&outcome.fates[0], rounds);
-    let found = photons_per_point(outcome) / f64::from(rounds);
+fn timed(gpu: &Gpu, rates: &Rates, result: &RunResult, rounds: u32, first: u32) -> Timed {
+    let plan = &result.plan;
+    let counts = Counts::of(&result.fates[0], rounds);
+    let found = photons_per_point(result) / f64::from(rounds);
     let work = |pass: &str| work(pass, plan, &counts, found);
-    let timed = Timed::of(outcome, (rounds, first), &workload(plan), rates, work, gpu.held_memory());
+    let timed = Timed::of(result, (rounds, first), &workload(plan), rates, work, gpu.held_memory());
     Timed { stated_bytes: plan.bytes(), counters: plan.counters, ..timed }
 }
 
@@ -133,9 +133,9 @@ fn workload(plan: &RoomPlan) -> String {
 }
 
 /// Photons within the radius of a point, of all rounds: without Phong weights the first sum of a point counts them.
-fn photons_per_point(outcome: &RunResult) -> f64 {
-    let plan = &outcome.plan;
-    let sums = outcome.film.sums.iter().step_by(plan.channel_count as usize);
+fn photons_per_point(result: &RunResult) -> f64 {
+    let plan = &result.plan;
+    let sums = result.film.sums.iter().step_by(plan.channel_count as usize);
     sums.map(|sum| *sum as f64).sum::<f64>() / plan.film_scale() / plan.points.len() as f64
 }
 
@@ -160,7 +160,7 @@ fn products(rng: Rng, draws: f64) -> f64 {
     }
 }
 
-/// What a pass of the paper's line cannot do without in a round.
+/// What a pass in the paper's room cannot do without in a round.
 ///
 /// `found` photons lie within the radius of a point; `None` for what nobody has counted.
 pub(crate) fn work(pass: &str, plan: &RoomPlan, counts: &Counts, found: f64) -> Option<Work> {
@@ -170,7 +170,7 @@ pub(crate) fn work(pass: &str, plan: &RoomPlan, counts: &Counts, found: f64) -> 
     // Entries of the map that the index reads: the naive builder's with the empty ones.
     let entries = if plan.has_slots() { slots } else { counts.survivors };
     // Where an invocation keeps a photon to its end, no path is written and read again.
-    let path = if settings.builder == Builder::Persistent { 0.0 } else { bytes::<StoredPath>() };
+    let path = if settings.builder == Builder::Persistent { 0.0 } else { bytes::<PackedPhotonState>() };
     let emit = Cost {
         bytes: counts.emitted * (path + if settings.rng == Rng::Rand48 { 8.0 } else { 0.0 }),
         float_operations: counts.emitted * EMISSION_OPERATIONS,

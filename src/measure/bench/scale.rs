@@ -89,7 +89,7 @@ fn steps(
             left_out.push(format!("{size} {over}: no --time left"));
             continue;
         }
-        (lab.tell)(&format!("{size} {over}"));
+        (lab.report)(&format!("{size} {over}"));
         steps.push(measure(lab, size)?);
     }
     Ok(steps)
@@ -162,8 +162,8 @@ fn of_photons(lab: &Lab, size: u64) -> Result<Step> {
         ..RoomSettings::default()
     };
     lab.gpu.forget_peaks();
-    let outcome = room::run_once(lab.gpu, &settings, lab.cancelled)?;
-    let scopes = rounds_of(&outcome.timings, all, DROPPED);
+    let result = room::run_once(lab.gpu, &settings, lab.cancelled)?;
+    let scopes = rounds_of(&result.timings, all, DROPPED);
     let pass = |name: &str| {
         let (_, ms) = scopes.iter().find(|(scope, _)| scope == name)?;
         let sums = ms.chunks_exact(rounds as usize).map(|rounds| rounds.iter().sum()).collect();
@@ -173,7 +173,7 @@ fn of_photons(lab: &Lab, size: u64) -> Result<Step> {
         size,
         passes: ["build", "index", "gather"].into_iter().filter_map(pass).collect(),
         peak_bytes: lab.gpu.held_memory().peak_device_bytes,
-        stated_bytes: outcome.plan.bytes(),
+        stated_bytes: result.plan.bytes(),
     })
 }
 

@@ -10,14 +10,14 @@ use super::pass::{Cost, SLOW_OPERATION, Work, bytes, scan_dispatches};
 use super::rates::{PHILOX_PRODUCTS, Rates};
 use super::room::{Counts, DROPPED, REPEATS, Timed};
 use crate::engine::scene::resources::SceneResources;
-use crate::engine::scene::{self, Round, Target, points, trace};
+use crate::engine::scene::{self, Receivers, Round, points, trace};
 use crate::engine::{self, Control};
 use crate::error::Result;
 use crate::gpu::{Commands, Gpu};
 use crate::photon::MapPhoton;
 use crate::plan::film::BiasPlan;
 use crate::plan::scene::{MapPlan, ScenePlan};
-use crate::records::{LightPath, VisiblePoint};
+use crate::records::{PhotonState, VisiblePoint};
 use crate::render::{Prepared, PreparedScene};
 use crate::scene::built_in;
 use crate::scene::geometry::Geometry;
@@ -40,7 +40,7 @@ pub(crate) struct Job<'a> {
 impl Job<'_> {
     /// What the first camera sees, and how that is found without a trial round: radii are those by the scene's area.
     pub(crate) fn prepare(&self, gpu: &Gpu, settings: &SceneSettings) -> Result<(Prepared, ScenePlan)> {
-        let prepared = self.scene.prepare_with(settings, Target::Picture(&self.scene.scene.first_camera(), self.size.into()))?;
+        let prepared = self.scene.prepare_with(settings, Receivers::Image(&self.scene.scene.first_camera(), self.size.into()))?;
         let plan = prepared.plan_within(&engine::limits(gpu.facts()))?;
         Ok((prepared, plan))
     }
@@ -110,15 +110,15 @@ fn time_once(gpu: &Gpu, rates: &Rates, job: &Job, cancelled: &AtomicBool) -> Res
     let rounds = DROPPED + REPEATS;
     let (prepared, plan) = job.prepare(gpu, &SceneSettings { alpha: 1.0, rounds, ..job.settings.clone() })?;
     gpu.forget_peaks();
-    let lit = prepared.light(gpu, plan, &mut Control::quiet(cancelled))?.finished()?;
+    let result = prepared.light(gpu, plan, &mut Control::quiet(cancelled))?.finished()?;
     let memory = gpu.held_memory();
     let surveys = [survey(gpu, job, |plan| plan.global.as_ref())?, survey(gpu, job, |plan| plan.caustic.as_ref())?];
-    let counts = [0, 1].map(|map: usize| Counts::of(&lit.fates[map], rounds));
+    let counts = [0, 1].map(|map: usize| Counts::of(&result.fates[map], rounds));
     let triangles = prepared.geometry.triangles.len();
-    let model = Model { triangles, plan: &lit.plan, counts, surveys };
-    let workload = format!("{}, {}, {} triangles", job.name, lit.plan.builder().name(), triangles);
-    let timed = Timed::of(&lit, (rounds, DROPPED), &workload, rates, |pass| model.work(pass), memory);
-    Ok(Timed { stated_bytes: lit.plan.bytes, ..timed })
+    let model = Model { triangles, plan: &result.plan, counts, surveys };
+    let workload = format!("{}, {}, {} triangles", job.name, result.plan.builder().name(), triangles);
+    let timed = Timed::of(&result, (rounds, DROPPED), &workload, rates, |pass| model.work(pass), memory);
+    Ok(Timed { stated_bytes: result.plan.bytes, ..timed })
 }
 
 /// A node of the hierarchy: six planes of eight children, a product and a sum each, and the nearest and farthest of them.
@@ -148,7 +148,7 @@ impl Model<'_> {
     /// A ray that meets one leaf of a hierarchy as full as can be; nodes and triangles are taken to stay in caches.
     fn ray_operations(&self) -> f64 {
         let triangles = self.triangles as f64;
-        if !self.plan.keeps(Effect::Bvh) {
+        if !self.plan.simulates(Effect::Bvh) {
             return triangles * TRIANGLE_OPERATIONS;
         }
         (triangles / 3.0).log(8.0).ceil().max(1.0) * NODE_OPERATIONS + TRIANGLE_OPERATIONS
@@ -195,7 +195,7 @@ impl Model<'_> {
         let buckets = f64::from(map.bucket_count);
         let persistent = self.plan.builder() == Builder::Persistent;
         // Where an invocation keeps a photon to its end, no path is written and read again.
-        let path = if persistent { 0.0 } else { bytes::<LightPath>() };
+        let path = if persistent { 0.0 } else { bytes::<PhotonState>() };
         let trace = Cost {
             bytes: (counts.emitted + counts.flights + counts.survivors) * path + survey.stored * bytes::<MapPhoton>(),
             float_operations: counts.emitted * EMISSION_OPERATIONS

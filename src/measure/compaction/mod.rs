@@ -32,7 +32,7 @@ use crate::timings::Spread;
 
 /// What is asked for.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Request {
+pub(crate) struct CompactionRequest {
     /// Shares of the paths that every bounce in a closed room lets go on.
     pub survivals: Vec<f32>,
     /// Photons, fewest first.
@@ -44,11 +44,11 @@ pub(crate) struct Request {
     pub budget: Duration,
 }
 
-impl Request {
+impl CompactionRequest {
     /// Powers of four from 2^12 up to `most` photons, survival from 5 to 95 %.
-    pub(crate) fn up_to(most: u32, budget: Duration) -> Request {
+    pub(crate) fn up_to(most: u32, budget: Duration) -> CompactionRequest {
         let sizes = (6..=14).map(|power| 1 << (2 * power)).filter(|photons| *photons <= most.max(1 << 12)).collect();
-        Request { survivals: vec![0.05, 0.25, 0.5, 0.75, 0.95], sizes, bounces: 15, turns: 3, budget }
+        CompactionRequest { survivals: vec![0.05, 0.25, 0.5, 0.75, 0.95], sizes, bounces: 15, turns: 3, budget }
     }
 }
 
@@ -111,10 +111,10 @@ enum Place<'a> {
 /// Measures all builders at all sizes, in a closed room of each survival and in a scene.
 pub(crate) fn measure(
     gpu: &Gpu,
-    request: &Request,
+    request: &CompactionRequest,
     scene: Option<&Scene>,
     cancelled: &AtomicBool,
-    tell: &mut dyn FnMut(&str),
+    report: &mut dyn FnMut(&str),
 ) -> Result<Map> {
     let began = Instant::now();
     let facts = gpu.facts();
@@ -140,7 +140,7 @@ pub(crate) fn measure(
                 map.cells.truncate(complete);
                 return if complete == 0 { Err(Error::Interrupted) } else { Ok(map) };
             }
-            tell(&format!("compaction: {} photons, {}", count(u64::from(photons)), place.label()));
+            report(&format!("compaction: {} photons, {}", count(u64::from(photons)), place.label()));
             map.cells.push(Trial { gpu, request, photons, place }.cell()?);
         }
         (before, last) = (last, (photons, size_began.elapsed()));
@@ -160,7 +160,7 @@ impl Place<'_> {
 /// One cell under measurement.
 struct Trial<'a> {
     gpu: &'a Gpu,
-    request: &'a Request,
+    request: &'a CompactionRequest,
     photons: u32,
     place: &'a Place<'a>,
 }

@@ -82,23 +82,23 @@ impl<'a> Bench<'a> {
     /// clock that drifts touches all alike. A case that is slow is repeated less, and one whose first run alone is slow
     /// keeps that.
     pub(crate) fn repeat_interleaved(&self, cases: &[RoomSettings], repeats: usize) -> Result<Vec<Vec<RunResult>>> {
-        let mut outcomes = vec![Vec::new(); cases.len()];
+        let mut results = vec![Vec::new(); cases.len()];
         let mut spent = vec![Duration::ZERO; cases.len()];
         for turn in 0..=repeats {
             for (case, settings) in cases.iter().enumerate() {
                 if spent[case] < PATIENCE {
                     let began = Instant::now();
-                    let outcome = self.run(settings)?;
+                    let result = self.run(settings)?;
                     spent[case] += began.elapsed();
                     // The first stands until a later one has come.
                     if turn == 1 {
-                        outcomes[case].clear();
+                        results[case].clear();
                     }
-                    outcomes[case].push(outcome);
+                    results[case].push(result);
                 }
             }
         }
-        Ok(outcomes)
+        Ok(results)
     }
 }
 
@@ -130,7 +130,7 @@ mod tests {
         let bench_settings = RoomSettings { builder: Builder::Cpu, photons: 10, mesh: 2, ..RoomSettings::default() };
         let mut silent = |_: &str| {};
         let bench = Bench::new(None, &cancelled, &mut silent);
-        let outcomes = bench.repeat_interleaved(&[bench_settings.clone(), bench_settings], 3).unwrap();
-        assert_eq!(outcomes.iter().map(Vec::len).collect::<Vec<_>>(), [3, 3]);
+        let results = bench.repeat_interleaved(&[bench_settings.clone(), bench_settings], 3).unwrap();
+        assert_eq!(results.iter().map(Vec::len).collect::<Vec<_>>(), [3, 3]);
     }
 }

@@ -2,7 +2,7 @@
 //! photon count (table 1).
 
 use super::bench::Bench;
-use super::{Reproduction, Request, published};
+use super::{PaperRequest, Reproduction, published};
 use crate::engine::room::RunResult;
 use crate::error::Result;
 use crate::output::words::{self, lower_case};
@@ -123,7 +123,7 @@ pub(crate) const LARGE_REPEATS: usize = 3;
 const BOUNCES: [u32; 2] = [published::BOUNCES, 15];
 
 /// Experiments that [`running_times`] and [`totals`] will announce, unless some are left out.
-pub(crate) fn count(bench: &Bench, request: &Request) -> usize {
+pub(crate) fn count(bench: &Bench, request: &PaperRequest) -> usize {
     cases(bench, request).len() + series(request).len() * published::TABLE_1.len()
 }
 
@@ -152,8 +152,8 @@ pub(crate) fn command(request: &RenderRequest) -> String {
 }
 
 /// Small before large, as the small ones predict the large.
-fn cases(bench: &Bench, request: &Request) -> Vec<Case> {
-    // The paper's two, and its second with one atomic a subgroup.
+fn cases(bench: &Bench, request: &PaperRequest) -> Vec<Case> {
+    // The paper's two, and its second with one atomic per subgroup.
     let on_gpu = [Builder::Naive, Builder::Atomic, Builder::Ballot].map(Implementation::of);
     let mut implementations = if bench.has_gpu() { on_gpu.to_vec() } else { Vec::new() };
     implementations.push(Implementation::of(Builder::Cpu));
@@ -173,7 +173,7 @@ fn cases(bench: &Bench, request: &Request) -> Vec<Case> {
 }
 
 /// (photons, bounces) of all cases, in order.
-fn sizes(request: &Request) -> [(u32, u32); 4] {
+fn sizes(request: &PaperRequest) -> [(u32, u32); 4] {
     let [few, many] = BOUNCES;
     let (small, large) = (published::PHOTONS, request.large);
     [(small, few), (small, many), (large, few), (large, many)]
@@ -198,28 +198,28 @@ pub(crate) fn running_times(bench: &mut Bench, found: &mut Reproduction) -> Resu
         let is_large = group[0].photons == found.request.large;
         let repeats = if is_large { found.request.repeats.min(LARGE_REPEATS) } else { found.request.repeats };
         let settings: Vec<RoomSettings> = measured.iter().map(|case| case.request().room_settings()).collect();
-        let outcomes = bench.repeat_interleaved(&settings, repeats)?;
-        for (case, outcomes) in measured.iter().zip(&outcomes) {
+        let results = bench.repeat_interleaved(&settings, repeats)?;
+        for (case, results) in measured.iter().zip(&results) {
             let command = command(&case.request());
             // The map does not depend on the gather, and is timed where the gather disturbs least.
             let map = (case.gather == Gather::Grid).then_some(Pass::Map);
             let passes = map.into_iter().chain([Pass::Rendering(case.gather)]);
-            found.running_times.extend(passes.filter_map(|pass| running_time(case, pass, outcomes, &command)));
+            found.running_times.extend(passes.filter_map(|pass| running_time(case, pass, results, &command)));
         }
     }
     Ok(())
 }
 
 /// `None` on a device without timestamps: passes inside a submission are not seen by the host.
-fn running_time(case: &Case, pass: Pass, outcomes: &[RunResult], command: &str) -> Option<RunningTime> {
+fn running_time(case: &Case, pass: Pass, results: &[RunResult], command: &str) -> Option<RunningTime> {
     // Brute force has no index, nor has the CPU builder's splatting.
     let scopes: &[&str] = if pass == Pass::Map { &["round/build"] } else { &["round/index", "round/gather"] };
-    let sum = |outcome: &RunResult| {
-        let has_run = |scope: &&&str| outcome.timings.row(scope).is_some();
-        scopes.iter().filter(has_run).map(|scope| outcome.timings.best_ms(scope)).sum::<Option<f64>>()
+    let sum = |result: &RunResult| {
+        let has_run = |scope: &&&str| result.timings.row(scope).is_some();
+        scopes.iter().filter(has_run).map(|scope| result.timings.best_ms(scope)).sum::<Option<f64>>()
     };
-    let first = outcomes.first()?;
-    let runs_ms = outcomes.iter().map(sum).collect::<Option<Vec<f64>>>()?;
+    let first = results.first()?;
+    let runs_ms = results.iter().map(sum).collect::<Option<Vec<f64>>>()?;
     Some(RunningTime {
         photons: case.photons,
         bounces: case.bounces,
@@ -241,7 +241,7 @@ fn predicted(case: &Case, found: &Reproduction) -> Option<f64> {
 }
 
 /// (photons of a round, gather) of the rows of table 1.
-pub(crate) fn series(request: &Request) -> [(u32, Gather); 3] {
+pub(crate) fn series(request: &PaperRequest) -> [(u32, Gather); 3] {
     [(published::PHOTONS, Gather::Brute), (published::PHOTONS, Gather::Grid), (request.large, Gather::Grid)]
 }
 
@@ -274,8 +274,8 @@ pub(crate) fn totals(bench: &mut Bench, found: &mut Reproduction) -> Result<()> 
                 // It makes pipelines.
                 bench.run(&settings)?;
             }
-            let outcome = bench.run(&settings)?;
-            let row = |name: &str| outcome.timings.row(name);
+            let result = bench.run(&settings)?;
+            let row = |name: &str| result.timings.row(name);
             let wall_ms = row("run").and_then(|row| row.wall_ms).expect("a run has its wall time");
             let gpu_ms = row("round").and_then(|row| row.gpu_ms);
             a_round = Some(wall_ms / f64::from(rounds));

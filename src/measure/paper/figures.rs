@@ -134,8 +134,8 @@ fn frame(bench: &Bench, (label, request): &(String, RenderRequest), seed: u64) -
     let builder = bench.available(request.room_settings().builder);
     let request = RenderRequest { variant: Some(Variant::Of(builder)), seed: Some(seed), ..request.clone() };
     let settings = request.room_settings();
-    let outcome = bench.run(&settings)?;
-    let walls = estimate_walls(&outcome.film, &open_box(&settings), &outcome.plan);
+    let result = bench.run(&settings)?;
+    let walls = estimate_walls(&result.film, &open_box(&settings), &result.plan);
     Ok(Frame { label: label.clone(), command: command(&request), settings, walls })
 }
 

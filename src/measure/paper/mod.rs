@@ -20,7 +20,7 @@ use figures::{Figure, Panel};
 
 /// What is measured besides the paper's own settings.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Request {
+pub(crate) struct PaperRequest {
     /// Photons of a round at the size that fills the device.
     pub large: u32,
     /// Runs that count, at most.
@@ -37,7 +37,7 @@ pub(crate) struct Reproduction {
     pub device: Option<Device>,
     /// The host's processor.
     pub cpu: String,
-    pub request: Request,
+    pub request: PaperRequest,
     pub figures: Vec<Figure>,
     pub running_times: Vec<RunningTime>,
     pub totals: Vec<TotalTime>,
@@ -49,7 +49,7 @@ pub(crate) struct Reproduction {
 }
 
 /// Runs every experiment; one that is ended from outside leaves what was finished before it.
-pub(crate) fn reproduce(bench: &mut Bench, request: Request) -> Result<Reproduction> {
+pub(crate) fn reproduce(bench: &mut Bench, request: PaperRequest) -> Result<Reproduction> {
     let mut found = Reproduction {
         device: bench.device(),
         cpu: bench::processor(),

@@ -3,7 +3,7 @@
 use super::bench::Device;
 use super::experiments::{Implementation, LeftOut, Pass, RunningTime, TotalTime, command, row_of_table_1};
 use super::figures::{Figure, Panel};
-use super::{Reproduction, Request, published};
+use super::{PaperRequest, Reproduction, published};
 use crate::settings::{Builder, Gather};
 use crate::timings::{Clock, Spread};
 
@@ -13,7 +13,7 @@ pub(crate) fn reproduction() -> Reproduction {
     Reproduction {
         device: Some(Device { name: "a device".to_owned(), driver: "its driver".to_owned(), has_timestamps: true, is_cpu: true }),
         cpu: "a processor".to_owned(),
-        request: Request { large: LARGE, repeats: 7, threads: 1, longest_ms: 90e3 },
+        request: PaperRequest { large: LARGE, repeats: 7, threads: 1, longest_ms: 90e3 },
         figures: vec![Figure {
             number: 1,
             title: "a figure",

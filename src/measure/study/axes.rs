@@ -137,7 +137,7 @@ fn bounce_counts<const COUNT: usize>(bounces: [u32; COUNT]) -> [(String, u32); C
     bounces.map(|bounces| (format!("{bounces} bounces"), bounces))
 }
 
-/// Irradiance of the walls by the paper's line.
+/// Irradiance of the walls of the paper's room.
 pub(crate) fn of_paper(mesh: u32, photons: u32) -> Vec<Group> {
     let (radius, bounces, rng) = (Some(0.025), Some(30), Some(Rng::Philox));
     let base = RenderRequest { mesh: Some(mesh), photons: Some(photons), radius, bounces, rng, ..RenderRequest::default() };

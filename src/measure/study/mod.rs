@@ -6,6 +6,7 @@
 //! where it ended.
 
 pub(crate) mod axes;
+pub(crate) mod case;
 pub(crate) mod chart;
 pub(crate) mod details;
 pub(crate) mod findings;
@@ -15,7 +16,6 @@ pub(crate) mod point;
 pub(crate) mod reference;
 pub(crate) mod store;
 pub(crate) mod strip;
-pub(crate) mod subject;
 pub(crate) mod summary;
 
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -30,20 +30,20 @@ use crate::output::destination::{Folder, write_all};
 use crate::render::names::{as_option, spelled};
 use crate::scene::Scene;
 use axes::{Axis, Group};
+use case::StudyCase;
 use peers::Peer;
 use point::{Curve, Point};
 use store::Store;
 use strip::Strip;
-use subject::Subject;
 
 /// What is asked for.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Request {
+pub struct StudyRequest {
     /// As the user names it.
     pub scene: String,
     /// Options of its light and its camera, as of `photonmill render`.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub view: Vec<String>,
+    #[serde(rename = "view", skip_serializing_if = "Vec::is_empty")]
+    pub scene_options: Vec<String>,
     /// Pixels along the longer side of the picture, or texels along each wall of the paper's box.
     pub size: u32,
     /// Photons of a round, from which the axis of photons goes up and down.
@@ -72,12 +72,12 @@ pub(crate) const MAX_SEED: u64 = u32::MAX as u64 - 1000;
 /// Of all runs of a choice, a gigabyte in all.
 const MAX_HELD: u64 = 1 << 27;
 
-impl Request {
+impl StudyRequest {
     /// Of a scene, on a CPU or a GPU.
-    pub fn usual(scene: &str, is_cpu: bool) -> Request {
-        Request {
+    pub fn usual(scene: &str, is_cpu: bool) -> StudyRequest {
+        StudyRequest {
             scene: scene.to_owned(),
-            view: Vec::new(),
+            scene_options: Vec::new(),
             size: match (scene == "open-box", is_cpu) {
                 (true, true) => 24,
                 (false, false) => 128,
@@ -121,7 +121,7 @@ pub struct Study {
     pub photonmill: &'static str,
     /// The scene's own name.
     pub title: String,
-    pub request: Request,
+    pub request: StudyRequest,
     pub device: String,
     pub driver: String,
     /// A software device, whose 'GPU' is the CPU.
@@ -161,10 +161,10 @@ pub(crate) struct Comparison {
 pub fn run(
     gpu: &Gpu,
     scene: &Scene,
-    request: Request,
+    request: StudyRequest,
     folder: &Folder,
     cancelled: &AtomicBool,
-    tell: &mut dyn FnMut(&str),
+    report: &mut dyn FnMut(&str),
 ) -> Result<Study> {
     let mut store = Store::open(folder, scene, &request, gpu.facts())?;
     let mut study = Study {
@@ -178,42 +178,42 @@ pub fn run(
         complete: false,
         request,
     };
-    let subjects = Subject::all(gpu, scene, &study.request, cancelled, tell)?;
-    for points in subjects.iter().filter_map(Subject::points_file).take(1) {
-        write_all([(folder.file(subject::POINTS), points.into_bytes())])?;
+    let cases = StudyCase::all(gpu, scene, &study.request, cancelled, report)?;
+    for points in cases.iter().filter_map(StudyCase::points_file).take(1) {
+        write_all([(folder.file(case::POINTS), points.into_bytes())])?;
     }
-    let count: usize = subjects.iter().flat_map(|subject| &subject.groups).map(|group| group.configurations.len()).sum();
-    let is_of_paper = subjects.iter().any(Subject::is_of_paper);
+    let count: usize = cases.iter().flat_map(|case| &case.groups).map(|group| group.configurations.len()).sum();
+    let is_of_paper = cases.iter().any(StudyCase::is_of_paper);
     let of_builders = study.request.budget / COMPACTION_SHARE;
     let of_defaults = study.request.budget / DEFAULTS_SHARE;
     let start = Instant::now();
-    let with_default = subjects.iter().filter(|subject| subject.has_default()).count().max(1) as u32;
+    let with_default = cases.iter().filter(|case| case.has_default()).count().max(1) as u32;
     clock::warm_up(gpu, FIRST_WARM_UP)?;
     let mut begun = 0;
-    for subject in &subjects {
+    for case in &cases {
         study.parts.push(Part {
-            quantity: subject.quantity.clone(),
-            reference: subject.reference.method.clone(),
-            reference_error: subject.reference.relative_error,
-            least_error: subject.reference.least_error(),
+            quantity: case.quantity.clone(),
+            reference: case.reference.method.clone(),
+            reference_error: case.reference.relative_error,
+            least_error: case.reference.least_error(),
             comparisons: Vec::new(),
             default: None,
             strip: None,
         });
-        if subject.has_default() {
-            tell(&format!("{}: default settings, to an error of 20, 10, 5, 2 and 1 %", subject.quantity));
-            match strip::measure_defaults(gpu, subject, &study.request, of_defaults / with_default, cancelled, &mut store) {
+        if case.has_default() {
+            report(&format!("{}: default settings, to an error of 20, 10, 5, 2 and 1 %", case.quantity));
+            match strip::measure_defaults(gpu, case, &study.request, of_defaults / with_default, cancelled, &mut store) {
                 Err(Error::Interrupted) => return Ok(study),
                 found => study.parts.last_mut().expect("pushed above").default = Some(found?),
             }
         }
-        for group in &subject.groups {
+        for group in &case.groups {
             begun += group.configurations.len();
-            tell(&format!("[{begun}/{count}] {}: {}", subject.quantity, group.axis.name()));
+            report(&format!("[{begun}/{count}] {}: {}", case.quantity, group.axis.name()));
             // What is left is shared out evenly: pipelines and what the others did not use count.
             let left = (study.request.budget - of_builders).saturating_sub(start.elapsed());
             let share = left / (count + group.configurations.len() - begun).max(1) as u32;
-            let mut measuring = Measuring { gpu, subject, group, request: &study.request, share, cancelled, store: &mut store };
+            let mut measuring = Measuring { gpu, case, group, request: &study.request, share, cancelled, store: &mut store };
             let mut curves: Vec<Curve> = group.configurations.iter().map(|configuration| Curve::new(&configuration.label)).collect();
             let ended = measuring.climb(&mut curves);
             study.parts.last_mut().expect("pushed above").comparisons.push(Comparison { axis: group.axis, curves });
@@ -223,24 +223,24 @@ pub fn run(
             }
         }
     }
-    if let Some((subject, part)) = subjects.iter().zip(&mut study.parts).next() {
-        tell("the pictures");
-        match strip::strip(gpu, subject, part, &study.request, cancelled) {
+    if let Some((case, part)) = cases.iter().zip(&mut study.parts).next() {
+        report("the pictures");
+        match strip::strip(gpu, case, part, &study.request, cancelled) {
             Err(Error::Interrupted) => return Ok(study),
             found => part.strip = found?,
         }
     }
     let most = study.request.photons.saturating_mul(study.request.most_rounds).min(MOST_COMPACTED);
-    let mut wanted = compaction::Request::up_to(most, of_builders);
+    let mut wanted = compaction::CompactionRequest::up_to(most, of_builders);
     // The paper's box has rooms of every survival beside it, a scene stands for itself.
     let alone = if is_of_paper { None } else { Some(scene) };
     if alone.is_some() {
         wanted.survivals.clear();
     }
-    match compaction::measure(gpu, &wanted, alone, cancelled, tell) {
+    match compaction::measure(gpu, &wanted, alone, cancelled, report) {
         Ok(map) => study.compaction = Some(map),
         // What was measured before is worth its page.
-        Err(error) => tell(&format!("the comparison of builders was not measured: {error}")),
+        Err(error) => report(&format!("the comparison of builders was not measured: {error}")),
     }
     study.complete = !cancelled.load(Ordering::Relaxed);
     Ok(study)
@@ -249,9 +249,9 @@ pub fn run(
 /// A group under measurement.
 struct Measuring<'a> {
     gpu: &'a Gpu,
-    subject: &'a Subject,
+    case: &'a StudyCase,
     group: &'a Group,
-    request: &'a Request,
+    request: &'a StudyRequest,
     /// Time for each configuration.
     share: Duration,
     cancelled: &'a AtomicBool,
@@ -284,8 +284,8 @@ impl Measuring<'_> {
 
     /// Adds a point to each of these curves, their runs in turn.
     fn level(&mut self, going: &[usize], rounds: u32, curves: &mut [Curve]) -> Result<()> {
-        let Measuring { gpu, subject, group, request, cancelled, share, .. } = *self;
-        let command = |which: usize| subject.command(&group.configurations[which], rounds, request.seed);
+        let Measuring { gpu, case, group, request, cancelled, share, .. } = *self;
+        let command = |which: usize| case.command(&group.configurations[which], rounds, request.seed);
         let known: Option<Vec<Point>> = going.iter().map(|which| self.store.find(group.axis, &command(*which))).collect();
         if let Some(known) = known {
             going.iter().zip(known).for_each(|(which, point)| curves[*which].points.push(point));
@@ -301,7 +301,7 @@ impl Measuring<'_> {
                 }
                 let began = Instant::now();
                 let (rounds, seed) = if turn == 0 { (1, request.seed) } else { (rounds, request.seed + turn - 1) };
-                match subject.run(gpu, &group.configurations[which], rounds, seed, cancelled) {
+                match case.run(gpu, &group.configurations[which], rounds, seed, cancelled) {
                     Ok(shot) if turn == 0 => {
                         let seconds = 1e-3 * shot.wall_ms;
                         if seconds > PATIENCE.max(2 * share).as_secs_f64() {
@@ -318,8 +318,8 @@ impl Measuring<'_> {
             }
         }
         for which in going.iter().copied().filter(|which| !shots[*which].is_empty()) {
-            let point = Point::of(&shots[which], &subject.reference, command(which), rounds);
-            self.store.keep(group.axis, &point)?;
+            let point = Point::of(&shots[which], &case.reference, command(which), rounds);
+            self.store.add(group.axis, &point)?;
             curves[which].points.push(point);
         }
         Ok(())
@@ -340,7 +340,7 @@ const DEFAULTS_SHARE: u32 = 4;
 const COMPACTION_SHARE: u32 = 8;
 const MOST_COMPACTED: u32 = 1 << 26;
 
-/// Most that [`Request::most_rounds`] may be.
+/// Most that [`StudyRequest::most_rounds`] may be.
 pub(crate) const MOST_ROUNDS: u32 = 1 << 20;
 
 /// Writes the page and its data.

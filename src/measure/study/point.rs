@@ -81,7 +81,7 @@ impl Point {
         root(self.squared_noise)
     }
 
-    /// What all runs have in common. Below its upper end nothing can be told from noise.
+    /// What all runs have in common. Below its upper end nothing can be distinguished from noise.
     pub(crate) fn bias(&self) -> Interval {
         Interval::of_squares(&self.squared_errors).map(|square| root(square - self.squared_noise))
     }
@@ -246,7 +246,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn curves_tell_the_prices_that_were_put_into_them() {
+    fn curves_recover_the_prices_that_were_put_into_them() {
         let base = curve(0.4, 0.0, 2.0);
         // 0.4 / sqrt(16) = 0.1.
         let time = base.time_to(0.1).unwrap();
@@ -260,7 +260,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn noise_and_bias_are_told_apart() {
+    fn noise_and_bias_are_separated() {
         let last = curve(0.4, 0.03, 1.0).points.pop().unwrap();
         assert!((last.bias().value - 0.03).abs() < 1e-3, "{:?}", last.bias());
         assert!(last.error().value > last.noise() && last.bias().low > 0.02);

@@ -116,7 +116,7 @@ impl Reference {
         (width, height): (u32, u32),
         samples: u32,
         cancelled: &AtomicBool,
-        tell: &mut dyn FnMut(&str),
+        report: &mut dyn FnMut(&str),
     ) -> Result<Reference> {
         let key = digest(format_args!("{JUDGE_VERSION} {scene:?} {camera:?} {width} {height} {samples}"));
         cached(&format!("picture {key}"), || {
@@ -128,7 +128,7 @@ impl Reference {
                 if cancelled.load(Ordering::Relaxed) {
                     return Err(Error::Interrupted);
                 }
-                tell(&format!("reference: {} of {samples} samples per pixel", number * batch));
+                report(&format!("reference: {} of {samples} samples per pixel", number * batch));
                 let image = judge.image(camera, width, height, batch, SEED + u64::from(number));
                 for (place, (value, variance)) in values.iter_mut().zip(&mut variances).enumerate() {
                     let pixel = &image.pixels[place / 3];
@@ -136,12 +136,12 @@ impl Reference {
                     *variance += (pixel.total_standard_error[place % 3] / f64::from(batches)).powi(2);
                 }
             }
-            let shining = Judge::new(scene, 0).image(camera, width, height, 64, SEED);
+            let emitted = Judge::new(scene, 0).image(camera, width, height, 64, SEED);
             let reference = Reference {
                 method: String::new(),
                 values,
                 standard_errors: variances.into_iter().map(f64::sqrt).collect(),
-                counts: (0..places).map(|place| shining.pixels[place / 3].mean.direct == DVec3::ZERO).collect(),
+                counts: (0..places).map(|place| emitted.pixels[place / 3].mean.direct == DVec3::ZERO).collect(),
                 relative_error: 0.0,
             };
             Ok(reference.with_own_error())

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use super::Request;
+use super::StudyRequest;
 use super::axes::Axis;
 use super::point::Point;
 use super::reference;
@@ -36,7 +36,7 @@ const NAME: &str = "points.jsonl";
 const LOCK: &str = "study.lock";
 
 impl Store {
-    pub(crate) fn open(folder: &Folder, scene: &Scene, request: &Request, device: &DeviceFacts) -> Result<Store> {
+    pub(crate) fn open(folder: &Folder, scene: &Scene, request: &StudyRequest, device: &DeviceFacts) -> Result<Store> {
         let path = folder.path().join(NAME);
         let refuse = |error: io::Error| refused(&path, error.kind().to_string());
         std::fs::create_dir_all(folder.path()).map_err(refuse)?;
@@ -80,7 +80,7 @@ impl Store {
         self.points.get(&(axis, command.to_owned())).cloned()
     }
 
-    pub(crate) fn keep(&mut self, axis: Axis, point: &Point) -> Result<()> {
+    pub(crate) fn add(&mut self, axis: Axis, point: &Point) -> Result<()> {
         let line = serde_json::to_string(&(axis, point)).expect("a point is plain data") + "\n";
         let written = self.file.write_all(line.as_bytes()).and_then(|()| self.file.flush());
         written.map_err(|error| refused(&self.path, error.kind().to_string()))

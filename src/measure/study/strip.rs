@@ -7,13 +7,13 @@ use std::time::{Duration, Instant};
 use glam::Vec3;
 
 use super::axes::Axis;
+use super::case::StudyCase;
 use super::point::{Curve, Point};
 use super::store::Store;
-use super::subject::Subject;
-use super::{Part, Request};
+use super::{Part, StudyRequest};
 use crate::error::Result;
 use crate::gpu::Gpu;
-use crate::output::colour::{ColourPicture, Format, Tone};
+use crate::output::colour::{ColourImage, Format, Tone};
 
 /// Errors that runs are ended by, the largest first.
 pub(crate) const ASKED: [f64; 5] = [0.2, 0.1, 0.05, 0.02, 0.01];
@@ -44,8 +44,8 @@ pub(crate) struct Strip {
 /// Curve of the runs that each error ends, as far as the time goes.
 pub(crate) fn measure_defaults(
     gpu: &Gpu,
-    subject: &Subject,
-    request: &Request,
+    case: &StudyCase,
+    request: &StudyRequest,
     share: Duration,
     cancelled: &AtomicBool,
     store: &mut Store,
@@ -53,34 +53,34 @@ pub(crate) fn measure_defaults(
     let mut curve = Curve::new("default settings");
     let began = Instant::now();
     for &asked in &request.asked {
-        let command = subject.command_to(asked, request.seed);
+        let command = case.command_to(asked, request.seed);
         if let Some(point) = store.find(Axis::Default, &command) {
             curve.points.push(point);
             continue;
         }
         let left = share.saturating_sub(began.elapsed());
-        let chosen = subject.choose(gpu, asked, cancelled)?;
+        let chosen = case.choose(gpu, asked, cancelled)?;
         if !curve.points.is_empty() && chosen.expected * request.repeats > left {
             break;
         }
         let most = 2 * (left / request.repeats).max(LEAST_TIME);
         // The first makes pipelines, and is dropped.
         if curve.points.is_empty() {
-            subject.run_to_error(gpu, &chosen, request.seed, most, cancelled)?;
+            case.run_to_error(gpu, &chosen, request.seed, most, cancelled)?;
         }
         let mut shots = Vec::new();
         let mut rounds = 0;
         for seed in request.seed..request.seed + u64::from(request.repeats) {
             let start = Instant::now();
-            let Some((shot, taken)) = subject.run_to_error(gpu, &chosen, seed, most, cancelled)? else { break };
+            let Some((shot, taken)) = case.run_to_error(gpu, &chosen, seed, most, cancelled)? else { break };
             rounds = if shots.is_empty() { taken } else { rounds };
             shots.push((shot, start.elapsed()));
         }
         if shots.len() < request.repeats as usize {
             break;
         }
-        let point = Point::of(&shots, &subject.reference, command, rounds);
-        store.keep(Axis::Default, &point)?;
+        let point = Point::of(&shots, &case.reference, command, rounds);
+        store.add(Axis::Default, &point)?;
         curve.points.push(point);
     }
     Ok(curve)
@@ -90,46 +90,46 @@ pub(crate) fn measure_defaults(
 const LEAST_TIME: Duration = Duration::from_secs(2);
 
 /// The pictures of a part: of its runs with default settings, else of its base. Their runs are repeated, as no point holds its picture.
-pub(crate) fn strip(gpu: &Gpu, subject: &Subject, part: &Part, request: &Request, cancelled: &AtomicBool) -> Result<Option<Strip>> {
-    let reference = &subject.reference;
-    let right = subject.picture(&reference.values);
+pub(crate) fn strip(gpu: &Gpu, case: &StudyCase, part: &Part, request: &StudyRequest, cancelled: &AtomicBool) -> Result<Option<Strip>> {
+    let reference = &case.reference;
+    let right = case.picture(&reference.values);
     let stops = right.usual_exposure();
     let mean = reference.mean_over(|place| reference.values[place]).abs();
     let mut found: Vec<(f64, &Point, Vec<f64>)> = Vec::new();
     if let Some(curve) = &part.default {
         for (point, asked) in curve.points.iter().zip(request.asked.iter().copied()) {
-            let chosen = subject.choose(gpu, asked, cancelled)?;
-            let Some((shot, _)) = subject.run_to_error(gpu, &chosen, request.seed, LONGEST, cancelled)? else { continue };
+            let chosen = case.choose(gpu, asked, cancelled)?;
+            let Some((shot, _)) = case.run_to_error(gpu, &chosen, request.seed, LONGEST, cancelled)? else { continue };
             // Few rounds may do for several errors.
             if found.last().is_some_and(|(.., values)| *values == shot.values) {
                 found.pop();
             }
             found.push((asked, point, shot.values));
         }
-    } else if let Some((configuration, curve)) = subject.groups.first().map(|group| &group.configurations[0]).zip(part.base()) {
+    } else if let Some((configuration, curve)) = case.groups.first().map(|group| &group.configurations[0]).zip(part.base()) {
         for &asked in &request.asked {
             let Some(point) = curve.points.iter().find(|point| point.error().value <= asked) else { break };
             if found.last().is_some_and(|(_, last, _)| last.rounds == point.rounds) {
                 found.pop();
             }
-            found.push((asked, point, subject.run(gpu, configuration, point.rounds, request.seed, cancelled)?.values));
+            found.push((asked, point, case.run(gpu, configuration, point.rounds, request.seed, cancelled)?.values));
         }
     }
     let Some((_, loosest, _)) = found.first() else { return Ok(None) };
     let scale = round_up(2.0 * loosest.error().value);
-    let png = |picture: &ColourPicture| picture.encode(Format::Png, stops, Tone::default(), None);
+    let png = |picture: &ColourImage| picture.encode(Format::Png, stops, Tone::default(), None);
     let frame = |(asked, point, values): (f64, &Point, Vec<f64>)| {
         let of = |place: usize| if reference.counts[place] { (values[place] - reference.values[place]) / mean } else { f64::NAN };
         let differences: Vec<f64> = (0..values.len()).map(of).collect();
-        let shown = subject.picture(&differences);
+        let shown = case.picture(&differences);
         let colours = shown.pixels.iter().map(|pixel| false_colour(pixel.element_sum() / 3.0 / scale as f32)).collect();
         Frame {
             asked,
             rounds: point.rounds,
             ms: point.ms().value,
             error: point.error().value,
-            picture: png(&subject.picture(&values)),
-            difference: ColourPicture { pixels: colours, ..shown }.encode(Format::Png, 0.0, Tone::Linear, None),
+            picture: png(&case.picture(&values)),
+            difference: ColourImage { pixels: colours, ..shown }.encode(Format::Png, 0.0, Tone::Linear, None),
             size: (right.width, right.height),
         }
     };
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn false_colours_tell_darker_from_brighter() {
+    fn false_colours_distinguish_darker_from_brighter() {
         assert_eq!(false_colour(0.0), Vec3::ONE);
         let (darker, brighter) = (false_colour(-0.5), false_colour(0.5));
         assert!(darker.z > darker.x && brighter.x > brighter.z);

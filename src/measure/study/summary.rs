@@ -24,7 +24,7 @@ fn cost(study: &Study, part: &Part) -> String {
     points.retain(|point| point.1 >= part.least_error);
     points.dedup_by(|next, before| next.1 >= before.1);
     let reach = |&(ms, error): &(f64, f64)| format!("an error of {} takes {}", percent(error), duration(ms));
-    let told = match points.as_slice() {
+    let phrases = match points.as_slice() {
         [] => format!("every error measured is below {}, the least that can be judged here.", percent(part.least_error)),
         [only] => format!("{}.", reach(only)),
         [first, .., last] => {
@@ -33,7 +33,7 @@ fn cost(study: &Study, part: &Part) -> String {
             format!("{}, and {}.{}", reach(first), reach(last), if last.1 < 0.8 * first.1 { &halving } else { "" })
         }
     };
-    format!("On {device}, {how}, {told}")
+    format!("On {device}, {how}, {phrases}")
 }
 
 fn first_change(part: &Part) -> String {

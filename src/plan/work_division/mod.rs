@@ -1,6 +1,6 @@
 //! How a picture divides its work between paths, shadow rays, photons and the radius, so that its error falls fastest.
 //!
-//! After n rounds of S paths a pixel with R shadow rays each, the squared error relative to the light is taken for
+//! After n rounds of S paths per pixel with R shadow rays each, the squared error relative to the light is taken for
 //!
 //! ```text
 //! noise of paths   (path + shadow ray / R^p) / (S^p n)
@@ -79,7 +79,7 @@ const USUAL_PHOTONS: f64 = 131_072.0;
 
 /// What is to be chosen, as nobody has set it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Free {
+pub(crate) struct TunableSettings {
     pub samples: bool,
     pub shadow_rays: bool,
     pub photons: bool,
@@ -88,8 +88,14 @@ pub(crate) struct Free {
     pub caustic_neighbours: bool,
 }
 
-impl Free {
+impl TunableSettings {
     #[cfg(test)]
-    pub(crate) const ALL: Free =
-        Free { samples: true, shadow_rays: true, photons: true, caustic_photons: true, neighbours: true, caustic_neighbours: true };
+    pub(crate) const ALL: TunableSettings = TunableSettings {
+        samples: true,
+        shadow_rays: true,
+        photons: true,
+        caustic_photons: true,
+        neighbours: true,
+        caustic_neighbours: true,
+    };
 }

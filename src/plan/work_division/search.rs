@@ -4,10 +4,10 @@ use rayon::prelude::*;
 
 use super::rounds::Rounds;
 use super::variance::Variance;
-use super::{Division, Free};
+use super::{Division, TunableSettings};
 use crate::settings::stop::Stop;
 
-/// More shadow rays of one path tell little that other paths do not.
+/// More shadow rays of one path show little that other paths do not.
 const MOST_SHADOW_RAYS: u32 = 16;
 pub(crate) const MOST_SAMPLES: u32 = 256;
 const LEAST_PHOTONS: u32 = 1 << 12;
@@ -19,18 +19,25 @@ const BEGINS_APART: usize = 3;
 const CHOICE_OF_CAUSTIC_NEIGHBOURS: [u32; 9] = [1, 2, 3, 6, 12, 24, 48, 96, 192];
 
 /// The division whose loss is least: what is free in powers of two, up to so many samples and photons.
-pub(crate) fn best(rounds: &Rounds, before: Division, free: Free, stop: &Stop, (most_samples, most_photons): (u32, u32)) -> Division {
+pub(crate) fn best(
+    rounds: &Rounds,
+    before: Division,
+    tunable: TunableSettings,
+    stop: &Stop,
+    (most_samples, most_photons): (u32, u32),
+) -> Division {
     let powers = |is_free: bool, least: u32, most: u32, own: u32| match is_free {
         true => std::iter::successors(Some(least), |power| Some(2 * power)).take_while(|power| *power <= most).collect(),
         false => vec![own],
     };
     let Variance { global, caustic, .. } = rounds.variance;
-    let photons = powers(free.photons && global.has_photons(), LEAST_PHOTONS, most_photons, before.photons);
-    let caustic_photons = powers(free.caustic_photons && caustic.has_photons(), LEAST_PHOTONS, most_photons, before.caustic_photons);
-    let neighbours = if free.neighbours { CHOICE_OF_NEIGHBOURS.to_vec() } else { vec![before.neighbours] };
-    let caustic_neighbours = if free.caustic_neighbours { CHOICE_OF_CAUSTIC_NEIGHBOURS.to_vec() } else { vec![before.caustic_neighbours] };
-    let samples = powers(free.samples, 1, most_samples, before.samples);
-    let shadow_rays = powers(free.shadow_rays, 1, MOST_SHADOW_RAYS, before.shadow_rays);
+    let photons = powers(tunable.photons && global.has_photons(), LEAST_PHOTONS, most_photons, before.photons);
+    let caustic_photons = powers(tunable.caustic_photons && caustic.has_photons(), LEAST_PHOTONS, most_photons, before.caustic_photons);
+    let neighbours = if tunable.neighbours { CHOICE_OF_NEIGHBOURS.to_vec() } else { vec![before.neighbours] };
+    let caustic_neighbours =
+        if tunable.caustic_neighbours { CHOICE_OF_CAUSTIC_NEIGHBOURS.to_vec() } else { vec![before.caustic_neighbours] };
+    let samples = powers(tunable.samples, 1, most_samples, before.samples);
+    let shadow_rays = powers(tunable.shadow_rays, 1, MOST_SHADOW_RAYS, before.shadow_rays);
     let pairs = |some: &[u32], others: &[u32]| -> Vec<(u32, u32)> {
         some.iter().flat_map(|one| others.iter().map(move |other| (*one, *other))).collect()
     };
@@ -85,7 +92,8 @@ mod tests {
         neighbours: NEIGHBOURS,
         caustic_neighbours: CAUSTIC_NEIGHBOURS,
     };
-    const OF_PATHS: Free = Free { photons: false, caustic_photons: false, neighbours: false, caustic_neighbours: false, ..Free::ALL };
+    const OF_PATHS: TunableSettings =
+        TunableSettings { photons: false, caustic_photons: false, neighbours: false, caustic_neighbours: false, ..TunableSettings::ALL };
 
     fn rounds(variance: Variance, cost: Cost) -> Rounds {
         Rounds { variance, cost, alpha: 2.0 / 3.0, counts_bias: true, unseen: 0.0, least_samples: 1.0, unreached: 0.0 }
@@ -109,7 +117,7 @@ mod tests {
         assert_eq!(best(&dear_rounds, BEFORE, OF_PATHS, &goal(0.01), (2, MOST_PHOTONS)).samples, 2);
         // What is set stays, a power of two or none.
         let set = Division { shadow_rays: 3, ..BEFORE };
-        assert_eq!(best(&of_rays, set, Free { shadow_rays: false, ..OF_PATHS }, &goal(0.001), all).shadow_rays, 3);
+        assert_eq!(best(&of_rays, set, TunableSettings { shadow_rays: false, ..OF_PATHS }, &goal(0.001), all).shadow_rays, 3);
     }
 
     #[test]
@@ -118,7 +126,7 @@ mod tests {
         let of_map = |of_round: f64, share: f64| MapVariance { of_round, share, widest: Some(100.0), ..map };
         let variance = Variance { path: 0.1, global: of_map(0.05, 0.5), caustic: of_map(1e-4, 0.01), ..Variance::default() };
         let found = rounds(variance, Cost { round: 1e6, paths: 1e6, shadow_rays: 1e5, photons: [5.0; 2], ..Cost::default() });
-        let of = |error: f64| best(&found, BEFORE, Free::ALL, &goal(error), (MOST_SAMPLES, MOST_PHOTONS));
+        let of = |error: f64| best(&found, BEFORE, TunableSettings::ALL, &goal(error), (MOST_SAMPLES, MOST_PHOTONS));
         assert!(of(0.02).photons > of(0.02).caustic_photons, "{:?}", of(0.02));
         let [chosen, usual] = [of(0.01), BEFORE].map(|division| found.until(division, 0.01).1);
         assert!(chosen < 0.5 * usual, "{chosen} {usual}");
@@ -138,7 +146,8 @@ mod tests {
         let variance = Variance { path: 1e-3, global, ..Variance::default() };
         let known = rounds(variance, Cost { round: 1e6, paths: 1e6, photons: [5.0; 2], ..Cost::default() });
         let dark = Rounds { unreached: 0.5 * USUAL_PHOTONS, ..known };
-        let [few, many] = [known, dark].map(|rounds| best(&rounds, BEFORE, Free::ALL, &goal(0.002), (MOST_SAMPLES, MOST_PHOTONS)));
+        let [few, many] =
+            [known, dark].map(|rounds| best(&rounds, BEFORE, TunableSettings::ALL, &goal(0.002), (MOST_SAMPLES, MOST_PHOTONS)));
         assert!(many.global().over_usual() * f64::from(many.photons) > 4.0 * few.global().over_usual() * f64::from(few.photons));
         assert!(dark.until(many, 0.002).1 < 0.5 * dark.until(few, 0.002).1, "{many:?} {few:?}");
     }

@@ -1,4 +1,4 @@
-//! How much the light of a round varies, and what the radius adds to it: what a pilot tells of paths, shadow rays and maps.
+//! How much the light of a round varies, and what the radius adds to it: what a pilot says of paths, shadow rays and maps.
 
 use super::{Division, PhotonsOfMap};
 use crate::settings::scene::SAMPLES_PER_BLOCK;
@@ -96,7 +96,7 @@ pub(crate) const USUAL_BIAS: [f64; 2] = [0.015, 0.12];
 const USUAL_SPREAD: f64 = 2.0;
 /// The square of a run's bias over that of a pilot's, whose radii fit the density of a caustic's photons worse.
 pub(crate) const FOUND_BIAS: [f64; 2] = [1.0, 0.5];
-/// How well its square is known, over the variance of the light: a Student's quantile of what some 1000 discs tell that have no photon in
+/// How well its square is known, over the variance of the light: a Student's quantile of what some 1000 discs show that have no photon in
 /// common, at two radii.
 pub(crate) const USUAL_UNCERTAINTY: f64 = 0.2;
 /// The power of the squared radius that it goes by: 1 where light is smooth, less along edges and in corners.
@@ -110,7 +110,7 @@ mod tests {
     use crate::plan::work_division::USUAL_PHOTONS;
 
     #[test]
-    fn variances_are_told_apart_by_the_shadow_rays() {
+    fn variances_are_separated_by_the_shadow_rays() {
         let found = Variance::of_paths(5.0, 1.0 + 4.0 * of_samples(4), 4);
         assert_eq!((found.path, found.shadow_ray), (1.0, 4.0));
         // Chance may turn them round: then all of it is the paths'.

@@ -1,4 +1,4 @@
-//! What emits light: shining triangles and lights without geometry, each with the probability that a photon starts there.
+//! What emits light: emissive triangles and lights without geometry, each with the probability that a photon starts there.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::{PI, TAU};
@@ -6,7 +6,7 @@ use std::f64::consts::{PI, TAU};
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::lamp_pieces::{Brightness, Cut, Lamp, Piece, Shining, cut};
+use super::lamp_pieces::{Brightness, Cut, EmissiveTexture, Lamp, Piece, cut};
 use super::{Geometry, MAX_TEXELS, area, refuse, texture_record};
 use crate::constants::*;
 use crate::error::Result;
@@ -21,7 +21,7 @@ const MAX_EMITTERS: usize = 1 << 22;
 
 impl Geometry {
     pub(super) fn add_emitters(&mut self, scene: &Scene) -> Result<()> {
-        let mut found = self.shining_triangles(scene);
+        let mut found = self.emissive_triangles(scene);
         let mut sky = Vec3::ZERO;
         let mut pictured = None;
         for light in &scene.lights {
@@ -96,9 +96,9 @@ impl Geometry {
         (emitters, scale)
     }
 
-    /// Those that shine by a texture in pieces, each by how bright it is.
-    fn shining_triangles(&mut self, scene: &Scene) -> Vec<Found> {
-        let shining = shining_textures(scene);
+    /// Those that emit by a texture in pieces, each by how bright it is.
+    fn emissive_triangles(&mut self, scene: &Scene) -> Vec<Found> {
+        let emissive = emissive_textures(scene);
         let found_in = |(index, triangle): (usize, &Triangle)| {
             let material = &scene.materials[triangle.material as usize];
             if triangle.plane >= HIDDEN || !material.is_emissive() {
@@ -111,26 +111,26 @@ impl Geometry {
             Some(Found { emitter, flux, weight: flux.element_sum(), brightest: 1.0 })
         };
         let found: Vec<Found> = self.triangles.par_iter().enumerate().filter_map(found_in).collect();
-        if shining.is_empty() {
+        if emissive.is_empty() {
             return found;
         }
         let texture_of = |found: &Found| {
             let triangle = &self.triangles[found.emitter.triangle as usize];
-            shining.get(&scene.materials[triangle.material as usize].emission_texture?.texture)
+            emissive.get(&scene.materials[triangle.material as usize].emission_texture?.texture)
         };
         let textured = found.iter().filter_map(|found| {
             let uvs = &self.uvs[found.emitter.triangle as usize];
             let uvs = [uvs.emission_a, uvs.emission_b, uvs.emission_c].map(Vec2::as_dvec2);
-            Some(Lamp { shining: texture_of(found)?, uvs, flux: found.weight })
+            Some(Lamp { emissive: texture_of(found)?, uvs, flux: found.weight })
         });
         let Cut { pieces, left } = cut(&textured.collect::<Vec<_>>());
         let mut pieces = pieces.into_iter();
         let in_pieces = |found: Found| {
-            let Some(shining) = texture_of(&found) else { return vec![found] };
+            let Some(emissive) = texture_of(&found) else { return vec![found] };
             let of_piece = |(piece, brightness): (Piece, Brightness)| {
                 let flux = found.flux * piece.width * piece.width;
                 // A hundredth of the whole texture's steers a choice, so that no part is without a chance.
-                let mean = 0.99 * brightness.mean + 0.01 * shining.all.mean;
+                let mean = 0.99 * brightness.mean + 0.01 * emissive.all.mean;
                 let emitter = Emitter { position: piece_record(piece), ..found.emitter };
                 Found { emitter, flux, weight: (flux * mean).element_sum(), brightest: brightness.most }
             };
@@ -141,7 +141,7 @@ impl Geometry {
         found
     }
 
-    /// Of a triangle that shines, or the piece of it that an emitter is.
+    /// Of an emissive triangle, or the piece of it that an emitter is.
     pub(crate) fn lamp_corners(&self, light: &Emitter) -> [Vec3; 3] {
         let Triangle { a, b, c, .. } = self.triangles[light.triangle as usize];
         let piece = Piece { corner: light.position.as_dvec3().truncate(), width: f64::from(light.position.z) };
@@ -264,9 +264,9 @@ impl Geometry {
             let shown = if layered.is_unlit != 0 { material.base_colour } else { Vec3::ZERO };
             material.emission + shown
         };
-        let shines = self.materials.iter().zip(&self.layered_materials).map(of_material);
+        let emitted = self.materials.iter().zip(&self.layered_materials).map(of_material);
         let environment = self.emitters.iter().filter(|emitter| emitter.kind == EMITTER_ENVIRONMENT);
-        shines.chain(environment.map(|emitter| if emitter.triangle == NONE { emitter.strength } else { self.sky_most * emitter.strength }))
+        emitted.chain(environment.map(|emitter| if emitter.triangle == NONE { emitter.strength } else { self.sky_most * emitter.strength }))
     }
 }
 
@@ -290,11 +290,11 @@ fn piece_record(piece: Piece) -> Vec3 {
     piece.corner.extend(piece.width).as_vec3()
 }
 
-/// Those that something shines by, by number.
-fn shining_textures(scene: &Scene) -> BTreeMap<usize, Shining<'_>> {
+/// Those that something emits by, by number.
+fn emissive_textures(scene: &Scene) -> BTreeMap<usize, EmissiveTexture<'_>> {
     let emissive = scene.materials.iter().filter(|material| material.is_emissive());
     let textures: BTreeSet<usize> = emissive.filter_map(|material| Some(material.emission_texture?.texture)).collect();
-    textures.into_iter().map(|texture| (texture, Shining::new(&scene.textures[texture]))).collect()
+    textures.into_iter().map(|texture| (texture, EmissiveTexture::new(&scene.textures[texture]))).collect()
 }
 
 #[cfg(test)]
@@ -309,7 +309,7 @@ mod tests {
         Texture { name: "t".into(), width, height, texels: texels.into(), wrap: [Wrap::Repeat; 2], filter: Default::default() }
     }
 
-    /// A strip of so many triangles that shines by a texture.
+    /// A strip of so many triangles that emits by a texture.
     fn textured_lamp(triangles: u32, texture: Texture) -> Scene {
         let mut lamp = Mesh { name: "lamp".into(), ..Mesh::default() };
         for k in 0..triangles {
@@ -326,7 +326,7 @@ mod tests {
 
     /// A texture is summed once and not for every triangle.
     #[test]
-    fn many_triangles_shine_by_a_large_texture() {
+    fn many_triangles_emit_by_a_large_texture() {
         let scene = textured_lamp(6036, texture(2048, 2048, vec![Vec3::splat(0.25); 1 << 22]));
         let (geometry, summed) = work::of(|| Geometry::new(&scene).unwrap());
         assert_eq!(geometry.emitters.len(), 6036);
@@ -340,7 +340,7 @@ mod tests {
     fn no_sample_is_brighter_than_the_brightest() {
         let texel = |k: u32| Vec3::new(0.1, 0.2 + 0.7 * (k % 997) as f32 / 997.0, 0.3);
         let texture = texture(700, 100, (0..70_000).map(texel).collect());
-        let summary = Shining::new(&texture).all;
+        let summary = EmissiveTexture::new(&texture).all;
         let texels = || (0..70_000).map(|place| texture.texels.at(place).truncate().as_dvec3());
         let brightest = texels().map(|texel| texel.y).fold(0.0, f64::max);
         assert_eq!(summary.most, brightest);

@@ -1,4 +1,4 @@
-//! Triangles that shine by a texture, cut into pieces: each is chosen by how bright the texture is there, so that photons and shadow
+//! Triangles that emit by a texture, cut into pieces: each is chosen by how bright the texture is there, so that photons and shadow
 //! rays find what is small and bright on a lamp.
 
 use std::cmp::Ordering;
@@ -20,7 +20,7 @@ pub(crate) struct Piece {
     pub width: f64,
 }
 
-/// Pieces beyond one a triangle, of all lamps together.
+/// Pieces beyond one per triangle, of all lamps together.
 const MOST_CUTS: usize = 1 << 16;
 /// No piece is cut in which the texture is nowhere so many times as bright as on the mean ..
 const CONTRAST: f64 = 4.0;
@@ -81,16 +81,16 @@ struct Level {
     cells: Vec<Cell>,
 }
 
-/// A texture that something shines by, with sums over its blocks.
-pub(crate) struct Shining<'a> {
+/// A texture that something emits by, with sums over its blocks.
+pub(crate) struct EmissiveTexture<'a> {
     texture: &'a Texture,
     /// From cells of two texels a side to one of all texels.
     levels: Vec<Level>,
     pub all: Brightness,
 }
 
-impl<'a> Shining<'a> {
-    pub(super) fn new(texture: &'a Texture) -> Shining<'a> {
+impl<'a> EmissiveTexture<'a> {
+    pub(super) fn new(texture: &'a Texture) -> EmissiveTexture<'a> {
         work::add(|| texture.texels.count());
         let mut levels: Vec<Level> = Vec::new();
         let (mut columns, mut rows) = (texture.width as usize, texture.height as usize);
@@ -108,7 +108,7 @@ impl<'a> Shining<'a> {
             levels.push(Level { columns, cells });
         }
         let all = brightness(levels[levels.len() - 1].cells[0], texture.texels.count() as f64);
-        Shining { texture, levels, all }
+        EmissiveTexture { texture, levels, all }
     }
 
     /// Over the rectangle of texture coordinates that holds a triangle.
@@ -215,9 +215,9 @@ fn wrapped(wrap: Wrap, low: f64, high: f64, size: u32) -> Vec<(usize, usize)> {
     }
 }
 
-/// A triangle that shines by a texture.
+/// A triangle that emits by a texture.
 pub(crate) struct Lamp<'a> {
-    pub shining: &'a Shining<'a>,
+    pub emissive: &'a EmissiveTexture<'a>,
     pub uvs: [DVec2; 3],
     /// Of the whole triangle, texture left out.
     pub flux: f64,
@@ -226,13 +226,13 @@ pub(crate) struct Lamp<'a> {
 impl Lamp<'_> {
     fn of(&self, piece: Piece) -> Brightness {
         let [a, b, c] = piece.corners(self.uvs.map(|uv| uv.extend(0.0))).map(DVec3::truncate);
-        self.shining.over([a, b, c])
+        self.emissive.over([a, b, c])
     }
 
     fn is_worth_cutting(&self, piece: Piece, brightness: &Brightness) -> bool {
-        let (low, high) = self.shining.texels_of(self.uvs);
+        let (low, high) = self.emissive.texels_of(self.uvs);
         let texels = piece.width.abs() * (high - low);
-        let Texture { width, height, .. } = *self.shining.texture;
+        let Texture { width, height, .. } = *self.emissive.texture;
         let has_all = texels.x >= f64::from(width) && texels.y >= f64::from(height);
         brightness.most > if has_all { CONTRAST_OF_ALL } else { CONTRAST } * brightness.mean.max_element()
             && texels.max_element() > LEAST_TEXELS
@@ -276,7 +276,7 @@ pub(crate) struct Cut {
     pub left: usize,
 }
 
-/// Cuts lamps where their brightness differs most, those first that shine most; a lamp that needs no cut is whole.
+/// Cuts lamps where their brightness differs most, those first that emit most; a lamp that needs no cut is whole.
 pub(crate) fn cut(lamps: &[Lamp]) -> Cut {
     let open = |lamp: usize, piece: Piece, brightness: Brightness| {
         let priority = lamps[lamp].flux * piece.width * piece.width * (brightness.most - brightness.mean.max_element());
@@ -318,8 +318,8 @@ mod tests {
         for wrap in [Wrap::Repeat, Wrap::MirroredRepeat, Wrap::Clamp] {
             for (width, height, one_in) in [(61, 37, 300), (1, 1, 1), (64, 9, 100), (2, 8, 7)] {
                 let texture = speckled(width, height, one_in, wrap);
-                let shining = Shining::new(&texture);
-                let Cut { pieces, left } = cut(&[Lamp { shining: &shining, uvs, flux: 1.0 }]);
+                let emissive = EmissiveTexture::new(&texture);
+                let Cut { pieces, left } = cut(&[Lamp { emissive: &emissive, uvs, flux: 1.0 }]);
                 assert_eq!(left, 0);
                 let area: f64 = pieces[0].iter().map(|(piece, _)| piece.width * piece.width).sum();
                 assert_eq!(area, 1.0, "{wrap:?} {width} x {height}");
@@ -350,7 +350,7 @@ mod tests {
         let mut texels = vec![Vec3::ONE; 1 << 20];
         let even = Texture { texels: texels.clone().into(), ..speckled(1024, 1024, 1, Wrap::Clamp) };
         let uvs = [DVec2::ZERO, DVec2::X, DVec2::Y];
-        let cut_one = |texture: &Texture| cut(&[Lamp { shining: &Shining::new(texture), uvs, flux: 1.0 }]);
+        let cut_one = |texture: &Texture| cut(&[Lamp { emissive: &EmissiveTexture::new(texture), uvs, flux: 1.0 }]);
         assert_eq!(cut_one(&even).pieces[0].len(), 1);
         texels[300 * 1024 + 200] = Vec3::splat(1e4);
         let Cut { pieces, .. } = cut_one(&Texture { texels: texels.into(), ..even });
@@ -364,8 +364,8 @@ mod tests {
     #[test]
     fn what_is_too_much_to_cut_is_counted() {
         let texture = speckled(1024, 1024, 100, Wrap::Clamp);
-        let shining = Shining::new(&texture);
-        let lamp = || Lamp { shining: &shining, uvs: [DVec2::ZERO, DVec2::X, DVec2::Y], flux: 1.0 };
+        let emissive = EmissiveTexture::new(&texture);
+        let lamp = || Lamp { emissive: &emissive, uvs: [DVec2::ZERO, DVec2::X, DVec2::Y], flux: 1.0 };
         let Cut { pieces, left } = cut(&[lamp(), lamp()]);
         let count = pieces.iter().map(Vec::len).sum::<usize>();
         assert!(left > 1000 && count <= MOST_CUTS + 2 && count > MOST_CUTS - 3, "{left} of {count}");

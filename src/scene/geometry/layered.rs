@@ -75,7 +75,7 @@ fn record((material, kinds): (&Material, LobeKinds)) -> LayeredMaterial {
         alpha,
         cutoff,
         is_unlit: u32::from(of.is_unlit),
-        is_matt: u32::from(kinds.matt),
+        is_rough: u32::from(kinds.rough),
         // Of all materials together, too.
         first_lookup: 0,
         end_lookup: 0,

@@ -59,7 +59,7 @@ pub(crate) struct Geometry {
     pub textures: Vec<TextureInfo>,
     /// Those that the kernels look 8-bit codes up in, then those of all textures.
     pub texels: Vec<u32>,
-    /// What shines, the environment last.
+    /// What emits light, the environment last.
     pub emitters: Vec<Emitter>,
     /// Largest value of the picture of a sky, in its texels' units.
     pub sky_most: f32,
@@ -72,7 +72,7 @@ pub(crate) struct Geometry {
     /// Meshes that overlap in one plane, facing alike: (hidden there, seen there), each pair once.
     pub overlaps: Vec<(u32, u32)>,
     /// Triangles that more others overlap than are cut out of one.
-    pub crowded: usize,
+    pub uncut: usize,
     /// Bits that a path keeps the number of a medium in, in a word for all solids that it is in.
     pub medium_bits: u32,
     /// Solids of different media lie partly in one another: media are numbered by size, and the smallest solid counts.
@@ -157,7 +157,7 @@ impl Geometry {
             texels,
             left_out: parts.left_out,
             overlaps: parts.overlaps.into_iter().collect(),
-            crowded: parts.crowded,
+            uncut: parts.uncut,
             planes: parts.planes.planes,
             medium_bits: media.bits,
             has_media_by_size: media.are_by_size,

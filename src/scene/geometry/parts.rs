@@ -32,7 +32,7 @@ pub(super) struct Parts {
     /// Meshes that overlap in one plane, facing alike: (hidden there, seen there).
     pub overlaps: BTreeSet<(u32, u32)>,
     /// Triangles that more others overlap than are cut out of one.
-    pub crowded: usize,
+    pub uncut: usize,
 }
 
 /// A triangle of a mesh, or a part of it.
@@ -64,7 +64,7 @@ impl Parts {
         progress("looking for overlaps", 0.0);
         let left_out = count - corners.len();
         let planes = Planes::of(&corners);
-        let mut parts = Parts { sources, corners, planes, weights: Vec::new(), left_out, overlaps, crowded: 0 };
+        let mut parts = Parts { sources, corners, planes, weights: Vec::new(), left_out, overlaps, uncut: 0 };
         let report = |done| progress("looking for overlaps", done);
         for covered in overlap::find(scene, kinds, || &ranks, &parts.sources, &parts.corners, report) {
             parts.cut(covered);
@@ -74,11 +74,11 @@ impl Parts {
 
     /// Puts what is visible of a triangle behind all others.
     fn cut(&mut self, covered: overlap::Covered) {
-        let overlap::Covered { triangle, by, pieces, crowded } = covered;
+        let overlap::Covered { triangle, by, pieces, uncut } = covered;
         let (source, [a, b, c]) = (self.sources[triangle], self.corners[triangle].map(Vec3::as_dvec3));
         let plane = self.planes.of_triangles[triangle];
         self.planes.of_triangles[triangle] |= HIDDEN;
-        self.crowded += usize::from(crowded);
+        self.uncut += usize::from(uncut);
         self.overlaps.extend(by.iter().map(|other| (source.0, self.sources[*other].0)));
         for piece in pieces {
             let corners = piece.map(|of| (a * of.x + b * of.y + c * of.z).as_vec3());
@@ -186,7 +186,7 @@ impl Part<'_> {
 }
 
 /// Which triangles have an area and lie on no other that counts: of those that are the same, facing alike, only one can be met; the others
-/// would shine, and count as surface, where none is seen. `wins` says which of two meshes counts.
+/// would emit, and count as surface, where none is seen. `wins` says which of two meshes counts.
 fn kept(sources: &[(u32, u32)], corners: &[[Vec3; 3]], wins: impl Fn(u32, u32) -> bool, overlaps: &mut BTreeSet<(u32, u32)>) -> Vec<bool> {
     let mut is_kept: Vec<bool> = corners.par_iter().map(has_area).collect();
     let find_seen = |alike: &[u32]| {

@@ -81,10 +81,10 @@ impl Geometry {
             lines.push(warning);
         }
         lines.extend(self.overlaps.iter().take(MOST).map(line));
-        if self.crowded > 0 {
+        if self.uncut > 0 {
             lines.push(format!(
                 "{} among more than 64 others that overlap each other in one plane; light there may count more than once",
-                counted(self.crowded, "triangle")
+                counted(self.uncut, "triangle")
             ));
         }
         if self.coarse_pieces > 0 {

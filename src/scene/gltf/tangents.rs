@@ -28,7 +28,7 @@ pub(super) struct Surface<'a> {
 struct Corners<'a> {
     surface: &'a Surface<'a>,
     positions: Vec<[f32; 3]>,
-    /// One a vertex, or one a triangle where the mesh is flat.
+    /// One per vertex, or one per triangle where the mesh is flat.
     normals: Vec<[f32; 3]>,
     uvs: Vec<[f32; 2]>,
     /// Triangles that the crate has to do with.
@@ -43,7 +43,7 @@ impl Surface<'_> {
         (b - a).cross(c - a)
     }
 
-    /// Whether texture coordinates tell on any triangle where u and v grow: not if they lie in one place or on a line.
+    /// Whether texture coordinates give tangents on any triangle where u and v grow: not if they lie in one place or on a line.
     pub(super) fn has_directions(&self, uvs: &[DVec2], transform: UvTransform) -> bool {
         self.triangles.is_empty()
             || self.triangles.iter().any(|triangle| {

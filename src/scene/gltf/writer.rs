@@ -76,7 +76,7 @@ impl Writer {
         self.push("accessors", json!({"bufferView": view, "componentType": kind.as_gl_enum(), "count": count, "type": dimensions}))
     }
 
-    /// An accessor of vectors, one a vertex.
+    /// An accessor of vectors, one per vertex.
     pub(crate) fn vectors<const N: usize>(&mut self, vectors: impl IntoIterator<Item = [f32; N]>) -> usize {
         let bytes: Vec<u8> = vectors.into_iter().flatten().flat_map(f32::to_le_bytes).collect();
         self.accessor(&bytes, ARRAY_BUFFER, DataType::F32, &format!("VEC{N}"), bytes.len() / (4 * N))
@@ -257,7 +257,7 @@ fn layers(material: &Material) -> Layers {
     let usual = Layers::default();
     match material.surface {
         Surface::Layered => material.layers,
-        // Nothing is reflected, so that all light reaches what is matt.
+        // Nothing is reflected, so that all light reaches the diffuse lobe.
         Surface::Lambert | Surface::PaperPhong { .. } => Layers { metallic: 0.0, specular: 0.0, ..usual },
         Surface::Glossy { exponent } => Layers { roughness: (2.0 / (exponent + 2.0)).powf(0.25), ..usual },
         Surface::Mirror => Layers { roughness: 0.0, ..usual },

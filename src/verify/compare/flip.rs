@@ -9,8 +9,8 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::image::Values;
 use super::pair::Pair;
-use super::picture::Values;
 use crate::output::colour::{luminance, srgb_code};
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -104,8 +104,8 @@ fn exposures(pair: &Pair) -> Option<Vec<f64>> {
     let median = match luminances[luminances.len() / 2] {
         median if !is_black(&median) => median,
         _ => {
-            let lit = &luminances[luminances.partition_point(is_black)..];
-            lit[lit.len() / 2]
+            let colours = &luminances[luminances.partition_point(is_black)..];
+            colours[colours.len() / 2]
         }
     };
     // The light that the tone curve shows so: the positive root of a quadratic equation.

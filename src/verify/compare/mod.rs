@@ -4,8 +4,8 @@
 pub(crate) mod deviation;
 pub(crate) mod false_colour;
 pub(crate) mod flip;
+pub(crate) mod image;
 pub(crate) mod pair;
-pub(crate) mod picture;
 pub(crate) mod report;
 pub(crate) mod z_scores;
 

@@ -3,14 +3,14 @@
 use glam::Vec3;
 use serde::Serialize;
 
-use super::picture::{Picture, Values};
+use super::image::{Image, Values};
 use crate::error::{Error, Result};
 
 /// Both pictures have the same size and the same kind of values, and at least one pixel is finite in both.
 pub(crate) struct Pair<'a> {
-    pub a: &'a Picture,
+    pub a: &'a Image,
     /// The reference.
-    pub b: &'a Picture,
+    pub b: &'a Image,
     /// By pixel.
     pub is_compared: Vec<bool>,
     pub left_out: LeftOut,
@@ -35,11 +35,11 @@ pub(crate) struct Value {
 }
 
 impl<'a> Pair<'a> {
-    pub(crate) fn new(a: &'a Picture, b: &'a Picture) -> Result<Pair<'a>> {
-        let refuse = |reason: String| Error::Picture { path: a.path.clone(), reason };
+    pub(crate) fn new(a: &'a Image, b: &'a Image) -> Result<Pair<'a>> {
+        let refuse = |reason: String| Error::Image { path: a.path.clone(), reason };
         let named = b.path.display();
         if a.values != b.values {
-            let kind = |picture: &Picture| match picture.values {
+            let kind = |picture: &Image| match picture.values {
                 Values::Linear => "linear values",
                 Values::Display => "display values",
             };
@@ -52,7 +52,7 @@ impl<'a> Pair<'a> {
             let (of_a, of_b) = (a.size(), b.size());
             return Err(refuse(format!("is {of_a} and {named} is {of_b} pixels; compare pictures of the same size")));
         }
-        let is_finite = |picture: &Picture| picture.pixels.iter().map(|pixel| pixel.is_finite()).collect::<Vec<bool>>();
+        let is_finite = |picture: &Image| picture.pixels.iter().map(|pixel| pixel.is_finite()).collect::<Vec<bool>>();
         let (finite_a, finite_b) = (is_finite(a), is_finite(b));
         let is_compared: Vec<bool> = finite_a.iter().zip(&finite_b).map(|(a, b)| *a && *b).collect();
         let missing = |of: &[bool]| of.iter().filter(|is_there| !**is_there).count();

@@ -7,8 +7,8 @@ use serde::Serialize;
 use super::Comparison;
 use super::deviation::{Deviation, Largest};
 use super::flip::Flip;
+use super::image::{Image, Values};
 use super::pair::LeftOut;
-use super::picture::{Picture, Values};
 use super::z_scores::ZScores;
 use crate::text::{counted, echo, percent};
 
@@ -50,7 +50,7 @@ impl Comparison<'_> {
 
     /// What of the files is not compared, or not as it is.
     pub(crate) fn warnings(&self) -> Vec<String> {
-        let of = |picture: &Picture| {
+        let of = |picture: &Image| {
             let path = echo(picture.path.display());
             picture.warnings.iter().map(move |warning| format!("{path}: {warning}")).collect::<Vec<_>>()
         };

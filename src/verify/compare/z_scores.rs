@@ -9,8 +9,8 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use statrs::function::erf::erfc;
 
 use super::CHANNELS;
+use super::image::{Image, Values};
 use super::pair::{Pair, Value};
-use super::picture::{Picture, Values};
 
 /// z = (a - b) / sqrt(error_a^2 + error_b^2), of every channel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -61,7 +61,7 @@ const LEVEL: f64 = 0.005;
 const TILES: u32 = 8;
 
 /// Whether a picture can be that of standard errors for this pair; else why not, and what to do.
-pub(crate) fn check(errors: &Picture, pair: &Pair) -> Result<(), String> {
+pub(crate) fn check(errors: &Image, pair: &Pair) -> Result<(), String> {
     if pair.a.values == Values::Display {
         return Err(format!("is for linear pictures, and {} has display values; compare .exr pictures", pair.a.path.display()));
     }
@@ -81,7 +81,7 @@ pub(crate) fn check(errors: &Picture, pair: &Pair) -> Result<(), String> {
 impl ZScores {
     /// From the errors of one picture or both; those of the other count as 0. Errors are themselves estimates: where they are the
     /// spread of a few `blocks` of rounds, z-scores follow Student's distribution, else a normal one. None where no z-score exists.
-    pub(crate) fn of(pair: &Pair, errors: [Option<&Picture>; 2], blocks: Option<u32>) -> Option<ZScores> {
+    pub(crate) fn of(pair: &Pair, errors: [Option<&Image>; 2], blocks: Option<u32>) -> Option<ZScores> {
         let degrees_of_freedom = blocks.map(|blocks| f64::from(blocks) - 1.0);
         let both_tails = |z: f64| both_tails(z, degrees_of_freedom);
         let variance = |pixel: usize| {

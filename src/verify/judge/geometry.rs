@@ -228,7 +228,7 @@ impl<'a> Geometry<'a> {
         self.scene.textures[texture].sample(turned * uv + offset).as_dvec4()
     }
 
-    /// Radiance that leaves a triangle's shining side.
+    /// Radiance that leaves a triangle's emissive side.
     pub(super) fn emission(&self, triangle: &Triangle, weights: DVec3) -> DVec3 {
         let material = triangle.material;
         material.emission.as_dvec3() * self.texel(material.emission_texture, triangle, weights).truncate()

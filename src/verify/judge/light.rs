@@ -49,7 +49,7 @@ impl SkyCells<'_> {
         for (j, i) in (0..height).flat_map(|j| (0..width).map(move |i| (j, i))) {
             let angle = SkyCells::solid_angle(sky, j);
             total += angle * value(i, j);
-            // What shines within a texel comes from its neighbours, too.
+            // What emits light within a texel comes from its neighbours, too.
             let near: f64 = (-1..2).flat_map(|dj| (-1..2).map(move |di| (di, dj))).map(|(di, dj)| value(i + di, j + dj)).sum();
             below += angle * near;
             cumulative.push(below);

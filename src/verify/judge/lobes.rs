@@ -42,7 +42,7 @@ pub(crate) enum Class {
     /// The path goes straight on as if nothing were there.
     Passing,
     Sharp,
-    Matt,
+    Rough,
 }
 
 /// What lies beyond a transmissive surface.
@@ -352,9 +352,9 @@ impl Lobes {
     }
 
     pub(crate) fn class(&self, kind: Kind) -> Class {
-        let by_alpha = |alpha: f64| if alpha * 1000.0 < f64::from(MAP_ALPHA_PER_MILLE) { Class::Sharp } else { Class::Matt };
+        let by_alpha = |alpha: f64| if alpha * 1000.0 < f64::from(MAP_ALPHA_PER_MILLE) { Class::Sharp } else { Class::Rough };
         match kind {
-            Kind::Diffuse | Kind::Sheen => Class::Matt,
+            Kind::Diffuse | Kind::Sheen => Class::Rough,
             // Rays follow all that a solid does.
             Kind::Reflection if matches!(self.inputs.wall, Wall::Solid { .. }) && self.inputs.transmits() => Class::Sharp,
             Kind::Reflection if self.inputs.stretch.is_some() => Class::Sharp,

@@ -6,10 +6,11 @@
 //! `max_bounces` bounces are left out, and so are caustics of point, spot and directional lights, which no
 //! path from the eye can meet.
 //!
-//! Standard errors tell little where few samples carry the light: in caustics of small lamps, and next
-//! to shining triangles that meet other surfaces, where 1 / distance^2 has no bound.
+//! Standard errors show little where few samples carry the light: in caustics of small lamps, and next
+//! to emissive triangles that meet other surfaces, where 1 / distance^2 has no bound.
 
 mod albedo;
+mod camera_path;
 mod first_surface;
 mod geometry;
 mod layered;
@@ -18,7 +19,6 @@ pub(crate) mod lobes;
 mod material;
 mod media;
 mod microfacets;
-mod path;
 pub(crate) mod radiosity;
 mod verdict;
 
@@ -43,8 +43,8 @@ pub(crate) use verdict::Verdict;
 
 /// Radiance (W/m2/sr) or irradiance (W/m2) by [`Part`], linear RGB. Irradiance has no specular part.
 ///
-/// A camera path runs through specular surfaces (mirrors, glass) to the first one that is not: x. Light is told apart by what
-/// lies before and behind x. Of layered surfaces it is the lobe that counts, sharp or matt: see the guide's page on materials.
+/// A camera path runs through specular surfaces (mirrors, glass) to the first one that is not: x. Light is classified by what
+/// lies before and behind x. Of layered surfaces it is the lobe that counts, sharp or rough: see the guide's page on materials.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Parts {

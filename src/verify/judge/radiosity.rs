@@ -247,7 +247,7 @@ impl Radiosity {
         let cell_area = (EDGE / n as f64).powi(2);
         let direct = (0..WALLS)
             .flat_map(|wall| cells_of(wall, n))
-            .map(|cell| LIT_WALLS.map(|lit| direct_flux(law, lit, &cell) / cell_area))
+            .map(|cell| LIT_WALLS.map(|lit_wall| direct_flux(law, lit_wall, &cell) / cell_area))
             .collect();
         let mut solution = vec![direct];
         while solution.len() < orders {
@@ -294,14 +294,14 @@ impl Radiosity {
     /// Irradiance straight from both lamps at a point of a wall: intensity times cosine over squared distance.
     pub(crate) fn direct_at(&self, wall: usize, point: DVec3) -> f64 {
         let mut sum = 0.0;
-        for lit in LIT_WALLS.into_iter().filter(|lit| *lit != wall) {
-            for (from, share) in lamp_points(lit) {
+        for lit_wall in LIT_WALLS.into_iter().filter(|lit_wall| *lit_wall != wall) {
+            for (from, share) in lamp_points(lit_wall) {
                 let way = point - from;
                 let squared = way.length_squared();
                 let cosine = |normal: DVec3| way.dot(normal) / squared.sqrt();
                 let intensity = match self.law {
                     Law::Uniform => 1.0 / TAU,
-                    Law::Cosine => cosine(inward(lit)) / PI,
+                    Law::Cosine => cosine(inward(lit_wall)) / PI,
                 };
                 sum += share * intensity * -cosine(inward(wall)) / squared;
             }

@@ -121,7 +121,7 @@ fn integrating_sphere() -> Vec<Case> {
     BOTH.map(of).into()
 }
 
-/// 1 / (1 + r^2)^(3/2); photons tell its mean over the disc of their estimate, of radius h,
+/// 1 / (1 + r^2)^(3/2); photons give its mean over the disc of their estimate, of radius h,
 /// (2 / h^2) (1 - 1 / sqrt(1 + h^2)) straight below; L = albedo E / pi to the eye.
 fn point() -> Vec<Case> {
     const SCENE: &str = "point-over-plane";
@@ -143,7 +143,7 @@ fn point() -> Vec<Case> {
 }
 
 /// 1 / (pi (R^2 + 1)) straight below, and for equal intensity in all directions the disc's solid angle over
-/// 2 pi (pi R^2), (1 - 1 / sqrt(1 + R^2)) / (pi R^2); photons tell the mean over a disc of radius h, from the form factor of two
+/// 2 pi (pi R^2), (1 - 1 / sqrt(1 + R^2)) / (pi R^2); photons give the mean over a disc of radius h, from the form factor of two
 /// discs that face each other.
 fn disc() -> Vec<Case> {
     const SCENE: &str = "disc-over-plane";

@@ -66,15 +66,15 @@ pub(crate) fn cases() -> Vec<Case> {
     [open_box::cases(), closed_forms::cases()].into_iter().flatten().collect()
 }
 
-/// Runs the cases that `gpu` allows (without one, those of the CPU builder), and tells each as it is found.
-pub(crate) fn run(gpu: Option<&Gpu>, cancelled: &AtomicBool, mut tell: impl FnMut(&Finding)) -> Result<Vec<Finding>> {
+/// Runs the cases that `gpu` allows (without one, those of the CPU builder), and reports each as it is found.
+pub(crate) fn run(gpu: Option<&Gpu>, cancelled: &AtomicBool, mut report: impl FnMut(&Finding)) -> Result<Vec<Finding>> {
     let mut findings = Vec::new();
     for case in cases().into_iter().filter(|case| !case.on_gpu || gpu.is_some()) {
         if cancelled.load(Ordering::Relaxed) {
             break;
         }
         let finding = Finding::new(&case.name, case.expected, (case.measure)(gpu)?);
-        tell(&finding);
+        report(&finding);
         findings.push(finding);
     }
     Ok(findings)

@@ -28,9 +28,9 @@ fn case(builder: Builder, emission: EmissionLaw, expected: f64) -> Case {
         expected,
         on_gpu: builder != Builder::Cpu,
         measure: Box::new(move |gpu| {
-            let outcome = room::run(gpu, &open_box(&settings), &settings, &mut Control::default())?;
+            let result = room::run(gpu, &open_box(&settings), &settings, &mut Control::default())?;
             let emitted = f64::from(PHOTONS);
-            Ok(Estimate { mean: outcome.ledger().stored as f64 / emitted, standard_error: DEVIATION / emitted.sqrt() })
+            Ok(Estimate { mean: result.ledger().stored as f64 / emitted, standard_error: DEVIATION / emitted.sqrt() })
         }),
     }
 }

@@ -19,7 +19,7 @@ use photonmill::settings::scene::SceneSettings;
 static FILE: LazyLock<PathBuf> = LazyLock::new(|| file("a.gltf"));
 
 pub fn run(bytes: &[u8]) {
-    // The loader tells .gltf and .glb apart by content.
+    // The loader distinguishes .gltf and .glb by content.
     std::fs::write(&*FILE, bytes).expect("the file can be written");
     if let Err(error) = plan(&FILE) {
         refused(&error);

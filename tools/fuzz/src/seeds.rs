@@ -15,7 +15,7 @@ use photonmill::engine::room;
 use photonmill::engine::run::blocks::{Blocks, Share};
 use photonmill::engine::run::identity::{Hash, Identity};
 use photonmill::engine::run::saved::SavedRun;
-use photonmill::engine::run::watch::{Keep, SaveRun};
+use photonmill::engine::run::watch::{Checkpointing, SaveRun};
 use photonmill::engine::scene::SceneFilm;
 use photonmill::engine::scene::map_file::MapWriter;
 use photonmill::ledger::Fates;
@@ -48,8 +48,8 @@ pub(crate) fn part_of_box(share: Share, resume: Option<SavedRun>) -> photonmill:
     let settings = RoomSettings { photons: 101, rounds: 4, mesh: 2, builder: Builder::Cpu, rng: Rng::Philox, ..RoomSettings::default() };
     let (never, mut saved) = (AtomicBool::new(false), Saved::default());
     let resume = resume.map(|run| ("seed".into(), run));
-    let keep = Keep { scene: "open-box", share, resume, every: Duration::ZERO, save: Some(&mut saved), dealt: None };
-    room::run(None, &open_box(&settings), &settings, &mut Control { cancelled: &never, progress: &mut |_| {}, keep })?;
+    let checkpointing = Checkpointing { scene: "open-box", share, resume, every: Duration::ZERO, save: Some(&mut saved), dealt: None };
+    room::run(None, &open_box(&settings), &settings, &mut Control { cancelled: &never, progress: &mut |_| {}, checkpointing })?;
     Ok(saved.0.pop().expect("a run saves its end"))
 }
 
@@ -78,13 +78,13 @@ pub(crate) fn part_of_picture(share: Share, keeps_parts: bool) -> SavedRun {
     let mut anomalies = [0; ANOMALY_WORDS];
     // Samples that met a surface.
     anomalies[8] = 4 * rounds * plan.samples;
-    let one_hits = [0, u32::MAX, 0.5f32.to_bits(), 3f32.to_bits(), 0].into_iter().cycle().take(4 * HIT_KINDS as usize).collect();
+    let single_hits = [0, u32::MAX, 0.5f32.to_bits(), 3f32.to_bits(), 0].into_iter().cycle().take(4 * HIT_KINDS as usize).collect();
     let film = SceneFilm {
         of_blocks: sums(),
         of_surfaces: Some(sums()),
         latest,
         differences: Differences((0..difference_count(4) as u64).map(|k| k % 3).collect()),
-        one_hits,
+        single_hits,
         part_totals: vec![3; 4],
         // Three of the four parts; what a pixel has beyond them is the fourth.
         parts: keeps_parts.then(|| vec![blocks; 4 * (PART_VALUES as usize - 3)]),

@@ -35,15 +35,15 @@ pub struct Triangles {
 }
 
 #[derive(Debug, Arbitrary)]
-pub enum Request {
+pub enum PlanRequest {
     Room(Room),
     Triangles(Triangles),
 }
 
-pub fn run(request: &Request) {
+pub fn run(request: &PlanRequest) {
     let outcome = match request {
-        Request::Room(Room(settings)) => plan_room(settings),
-        Request::Triangles(request) => plan_triangles(request),
+        PlanRequest::Room(Room(settings)) => plan_room(settings),
+        PlanRequest::Triangles(request) => plan_triangles(request),
     };
     if let Err(error) = outcome {
         refused(&error);

@@ -4,4 +4,4 @@
 
 use libfuzzer_sys::fuzz_target;
 
-fuzz_target!(init: photonmill::fuzz::panics_are_caught(), |request: photonmill::fuzz::settings::Request| photonmill::fuzz::settings::run(&request));
+fuzz_target!(init: photonmill::fuzz::panics_are_caught(), |request: photonmill::fuzz::settings::PlanRequest| photonmill::fuzz::settings::run(&request));

@@ -22,12 +22,12 @@ use crate::error;
 /// Between two looks for Ctrl-C.
 const INTERVAL: Duration = Duration::from_millis(50);
 
-/// Does `work` on another thread, which tells what it calls `Told` on the way, and calls `tell` with the latest of it. What Ctrl-C or `tell`
+/// Does `work` on another thread, which reports what it calls `Reported` on the way, and calls `report` with the latest of it. What Ctrl-C or `report`
 /// raises ends the work early.
-pub fn beside_python<T: Send, Told: Send>(
+pub fn beside_python<T: Send, Reported: Send>(
     py: Python<'_>,
-    tell: &dyn Fn(Python<'_>, Told) -> PyResult<()>,
-    work: impl FnOnce(&AtomicBool, &mut dyn FnMut(Told)) -> Result<T> + Send,
+    report: &dyn Fn(Python<'_>, Reported) -> PyResult<()>,
+    work: impl FnOnce(&AtomicBool, &mut dyn FnMut(Reported)) -> Result<T> + Send,
 ) -> PyResult<T> {
     let cancelled = AtomicBool::new(false);
     let (sender, receiver) = channel();
@@ -35,21 +35,21 @@ pub fn beside_python<T: Send, Told: Send>(
     let receiver = Mutex::new(receiver);
     let wait = || {
         let receiver = receiver.lock().unwrap_or_else(PoisonError::into_inner);
-        let told = receiver.recv_timeout(INTERVAL);
-        receiver.try_iter().last().map_or(told, Ok)
+        let reported = receiver.recv_timeout(INTERVAL);
+        receiver.try_iter().last().map_or(reported, Ok)
     };
     let mut raised = None;
     let cancelled = &cancelled;
     let done = std::thread::scope(|scope| {
         // Nobody may listen any more.
-        let worker = scope.spawn(move || work(cancelled, &mut |told| drop(sender.send(told))));
+        let worker = scope.spawn(move || work(cancelled, &mut |reported| drop(sender.send(reported))));
         loop {
-            let told = match py.detach(wait) {
+            let reported = match py.detach(wait) {
                 Err(RecvTimeoutError::Disconnected) => break,
-                told => told.ok(),
+                reported => reported.ok(),
             };
             if raised.is_none() {
-                raised = py.check_signals().and_then(|()| told.map_or(Ok(()), |told| tell(py, told))).err();
+                raised = py.check_signals().and_then(|()| reported.map_or(Ok(()), |reported| report(py, reported))).err();
                 cancelled.store(raised.is_some(), Ordering::Relaxed);
             }
         }
@@ -84,18 +84,18 @@ pub fn on_devices<T: Send>(
     work: impl FnOnce(&mut Vec<Gpu>, &Observer) -> Result<T> + Send,
 ) -> PyResult<(T, Vec<String>)> {
     let progress = progress.map(|progress| progress.clone().unbind());
-    let tell = |py: Python<'_>, told: Progress| match &progress {
-        Some(progress) => progress.call1(py, (progress_dict(py, &told)?,)).map(drop),
+    let report = |py: Python<'_>, reported: Progress| match &progress {
+        Some(progress) => progress.call1(py, (progress_dict(py, &reported)?,)).map(drop),
         None => Ok(()),
     };
-    beside_python(py, &tell, |cancelled, tell| {
-        let (warnings, tell) = (RefCell::new(Vec::new()), RefCell::new(tell));
+    beside_python(py, &report, |cancelled, report| {
+        let (warnings, report) = (RefCell::new(Vec::new()), RefCell::new(report));
         let event = |event: Event| match event {
-            Event::Progress(progress, _) => (tell.borrow_mut())(progress.clone()),
+            Event::Progress(progress, _) => (report.borrow_mut())(progress.clone()),
             Event::Warning(text) | Event::Remark(text) => warnings.borrow_mut().push(text.to_owned()),
             _ => {}
         };
-        let done = work(&mut *lock(gpus, cancelled)?, &Observer { cancelled, tell: &event })?;
+        let done = work(&mut *lock(gpus, cancelled)?, &Observer { cancelled, report: &event })?;
         Ok((done, warnings.into_inner()))
     })
 }

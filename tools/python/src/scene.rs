@@ -13,7 +13,7 @@ use photonmill::render::options::Command;
 use photonmill::render::points::point_of;
 use photonmill::render::values::SunPosition;
 use photonmill::render::{BakeRequest, Event, Observer, PreparedScene, RenderRequest};
-use photonmill::scene::picture_size::{PictureSize, parse_size};
+use photonmill::scene::image_size::{ImageSize, parse_size};
 use photonmill::scene::surroundings::Environment;
 use photonmill::scene::{LightKind, built_in};
 use pyo3::exceptions::PyTypeError;
@@ -69,13 +69,13 @@ fn environment_of(value: &Bound<'_, PyAny>) -> PyResult<Environment> {
         Ok(_) => Err(error::argument(py, format!("environment={}: must be 0 or more and finite", value.repr()?))),
         Err(_) => {
             let wrong = |_| PyTypeError::new_err("environment must be a number, three numbers, or the path of an .hdr or .exr");
-            path_of(value, "environment").map(PathBuf::from).map(Environment::Picture).map_err(wrong)
+            path_of(value, "environment").map(PathBuf::from).map(Environment::Image).map_err(wrong)
         }
     }
 }
 
 /// A width, or a width and a height, in pixels.
-fn size_of(value: &Bound<'_, PyAny>) -> PyResult<PictureSize> {
+fn size_of(value: &Bound<'_, PyAny>) -> PyResult<ImageSize> {
     let py = value.py();
     let text = match (value.extract::<i64>(), value.extract::<[i64; 2]>()) {
         (Ok(width), _) => width.to_string(),
@@ -148,12 +148,12 @@ impl Scene {
         };
         let (scene, warnings) = beside_python(py, &|_, ()| Ok(()), |cancelled, _| {
             let warnings = RefCell::new(Vec::new());
-            let tell = |event: Event| {
+            let report = |event: Event| {
                 if let Event::Warning(text) | Event::Remark(text) = event {
                     warnings.borrow_mut().push(text.to_owned());
                 }
             };
-            let observer = Observer { cancelled, tell: &tell };
+            let observer = Observer { cancelled, report: &report };
             let scene = PreparedScene::read(&request, &observer)?;
             scene.geometry(&observer)?;
             Ok((scene, warnings.take()))

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use photonmill::error::{Error as Failure, Result};
 use photonmill::gpu::{Gpu, Options};
-use photonmill::measure::study::{self as studies, Request, Study};
+use photonmill::measure::study::{self as studies, Study, StudyRequest};
 use photonmill::output::destination::Folder;
 use photonmill::scene;
 use pyo3::prelude::*;
@@ -32,21 +32,21 @@ pub fn study<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let wanted = device.map(|device| device.bind(py).as_super().get().facts.index.to_string());
     let progress = progress.map(|progress| progress.clone().unbind());
-    let tell = |py: Python<'_>, line: String| progress.as_ref().map_or(Ok(()), |progress| progress.call1(py, (line,)).map(drop));
-    let json = beside_python(py, &tell, |cancelled, tell| -> Result<Vec<u8>> {
+    let report = |py: Python<'_>, line: String| progress.as_ref().map_or(Ok(()), |progress| progress.call1(py, (line,)).map(drop));
+    let json = beside_python(py, &report, |cancelled, report| -> Result<Vec<u8>> {
         let folder = Folder::open("-o", &folder)?;
         let budget = studies::budget(budget)?;
         let name = scene.to_string_lossy().into_owned();
         let request = |is_cpu: bool| {
-            let usual = Request::usual(&name, is_cpu);
+            let usual = StudyRequest::usual(&name, is_cpu);
             let (size, photons) = (side.unwrap_or(usual.size), photons.unwrap_or(usual.photons));
-            Request { size, photons, repeats, seed, reference_samples, budget, most_rounds: rounds, ..usual }
+            StudyRequest { size, photons, repeats, seed, reference_samples, budget, most_rounds: rounds, ..usual }
         };
         request(true).validate()?;
         let scene = scene::Scene::open(&name, false)?;
         let gpu = Gpu::open(&Options { device: wanted, warm_up: true, ..Options::default() })?;
         let request = request(gpu.facts().kind == "cpu");
-        let found: Study = studies::run(&gpu, &scene, request, &folder, cancelled, &mut |line| tell(line.to_owned()))?;
+        let found: Study = studies::run(&gpu, &scene, request, &folder, cancelled, &mut |line| report(line.to_owned()))?;
         studies::write(&folder, &found)?;
         // The same call goes on with what is there.
         if !found.complete { Err(Failure::Interrupted) } else { Ok(serde_json::to_vec(&found).expect("a study is plain data")) }

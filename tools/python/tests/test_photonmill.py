@@ -115,10 +115,10 @@ def channels(path: Path) -> dict[str, Any]:
 
 
 def test_a_run_ends_at_an_error(spheres: pm.Scene) -> None:
-    told: list[pm.Progress] = []
-    film = spheres.render(size=16, error=0.5, progress=told.append)
+    reported: list[pm.Progress] = []
+    film = spheres.render(size=16, error=0.5, progress=reported.append)
     assert film.end == "error" and film.bound <= 0.5
-    assert all(now["rounds"] >= 0 and now["seconds"] >= 0.0 for now in told)
+    assert all(now["rounds"] >= 0 and now["seconds"] >= 0.0 for now in reported)
     timed = spheres.render(size=16, time=0.2)
     assert timed.end == "time" and timed.rounds > 0
 
@@ -132,7 +132,7 @@ def test_pictures_are_written(film: pm.Film, tmp_path: Path) -> None:
 
 
 def test_points_have_the_irradiance_of_a_closed_form() -> None:
-    # A closed cube whose walls shine with 1 W/m2/sr and scatter half of what arrives.
+    # A closed cube whose walls emit 1 W/m2/sr and scatter half of what arrives.
     scene = pm.Scene("furnace")
     points = np.array([[0.5, 0.001, 0.5], [0.3, 0.001, 0.4]])
     found = scene.probe(points, [[0, 2, 0], [0, 1, 0]], rounds=32, photons=8192)
@@ -394,7 +394,7 @@ def test_what_progress_raises_ends_the_run(spheres: pm.Scene) -> None:
         spheres.render(size=16, rounds=1000000, progress=stop)
 
 
-def test_a_study_ends_where_it_is_told_to(tmp_path: Path) -> None:
+def test_a_study_ends_where_it_is_asked_to(tmp_path: Path) -> None:
     def stop(line: str) -> None:
         raise RuntimeError(line)
 

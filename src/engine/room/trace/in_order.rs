@@ -6,14 +6,14 @@ use crate::engine::room::resources::{OrderBuffers, RoomResources};
 use crate::error::Result;
 use crate::gpu::kernels::{ScanMoveRoom, TraceRoomScan};
 use crate::gpu::{Buffer, Commands, Extent};
-use crate::path::StoredPath;
+use crate::photon_state::PackedPhotonState;
 use crate::records::TracePush;
 
 /// Survivors are counted by work group, the counts summed, and the survivors moved to where they belong.
 pub(crate) fn one_bounce<'a>(
     commands: &mut Commands,
     Chunk { resources, plan, .. }: Chunk,
-    [paths, next_paths]: [&Buffer<StoredPath>; 2],
+    [paths, next_paths]: [&Buffer<PackedPhotonState>; 2],
     push: &TracePush,
     extent: impl Fn() -> Extent<'a>,
 ) -> Result<()> {

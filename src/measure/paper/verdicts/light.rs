@@ -39,15 +39,15 @@ fn mean_between(frame: &Frame, from: f64, to: f64) -> f64 {
 pub(crate) fn figure_1(found: &Reproduction) -> Option<Verdict> {
     let figure = figure(found, 1)?;
     let contrast = figure.over_seeds(|frames| mean_between(&frames[0], 0.9, 1.0) / mean_between(&frames[0], 0.0, 0.1));
-    let lit = mean(illumination(&figure.frames[0].walls).map(|value| f64::from(u8::from(value > 0.0))));
+    let share = mean(illumination(&figure.frames[0].walls).map(|value| f64::from(u8::from(value > 0.0))));
     Verdict {
         topic: "Places near the lights are brighter, and no place is black",
         then: "seen".to_owned(),
-        here: format!("{} of the points receive photons", percent(lit)),
+        here: format!("{} of the points receive photons", percent(share)),
         text: format!(
             "The brightest tenth of all points is {} as bright as the dimmest tenth. {} of the points receive photons. {}",
             Quantity::Factor.shown(&contrast),
-            percent(lit),
+            percent(share),
             noise_of_seeds(figure).map_or_else(String::new, |noise| format!(
                 "The standard deviation between {SEEDS} seeds is {} of the mean illumination: the image is noisy here too.",
                 percent(noise)
@@ -92,15 +92,15 @@ pub(crate) fn figure_3(found: &Reproduction) -> Option<Verdict> {
 /// Mean illumination of the walls without a light, 15 bounces against 2 (figure 2).
 pub(super) fn indirect_light(found: &Reproduction) -> Option<Verdict> {
     let figure = figure(found, 2)?;
-    let wall_mean = |frame: &Frame, lit: bool| {
+    let wall_mean = |frame: &Frame, is_lit: bool| {
         let scene = open_box(&frame.settings);
-        let chosen = frame.walls.iter().filter(|wall| scene.lights.iter().any(|light| light.face == wall.face) == lit);
+        let chosen = frame.walls.iter().filter(|wall| scene.lights.iter().any(|light| light.face == wall.face) == is_lit);
         mean(chosen.flat_map(|wall| wall.illumination.iter().copied()))
     };
     let evidence: Vec<Evidence> = [("three walls without a light", false), ("two walls with a light", true)]
         .into_iter()
-        .map(|(what, lit)| {
-            let interval = figure.over_seeds(|frames| wall_mean(&frames[0], lit) / wall_mean(&frames[1], lit));
+        .map(|(what, is_lit)| {
+            let interval = figure.over_seeds(|frames| wall_mean(&frames[0], is_lit) / wall_mean(&frames[1], is_lit));
             Evidence::above_margin(format!("15 / 2 bounces, {what}"), interval)
         })
         .collect();
@@ -246,8 +246,11 @@ mod tests {
     fn indirect_light_is_judged_by_its_interval() {
         let standing = |without_light: f64, with_light: f64, noise: f64, seeds: u64| {
             let found = with_figure(2, seeds, |seed| {
-                let lit = |face: usize| open_box(&RoomSettings::default()).lights.iter().any(|light| light.face == face);
-                vec![frame(1, seed, noise, |face, _| if lit(face) { with_light } else { without_light }), frame(1, seed, 0.0, |_, _| 1.0)]
+                let is_lit = |face: usize| open_box(&RoomSettings::default()).lights.iter().any(|light| light.face == face);
+                vec![
+                    frame(1, seed, noise, |face, _| if is_lit(face) { with_light } else { without_light }),
+                    frame(1, seed, 0.0, |_, _| 1.0),
+                ]
             });
             indirect_light(&found).unwrap().standing.unwrap()
         };

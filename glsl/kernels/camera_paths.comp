@@ -9,7 +9,7 @@
 #include "world/scene/work.glsl"
 #include "rng/draws.glsl"
 
-struct ViewPush {
+struct CameraPathsPush {
     Draws draws;
     WorkDivision work;
     // Hash of the seed and the round that decides what is rounded up.
@@ -38,7 +38,7 @@ struct ViewPush {
     float film_limit;
 };
 
-layout(push_constant, scalar) uniform Push { ViewPush push; };
+layout(push_constant, scalar) uniform Push { CameraPathsPush push; };
 
 // Paths may start at receivers.
 const bool HAS_RECEIVERS = false;

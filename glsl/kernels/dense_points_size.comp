@@ -4,13 +4,13 @@
 
 #include "dispatch/dispatch_size.glsl"
 
-struct CrowdSizePush {
+struct DensePointsSizePush {
     uint items_per_group;
     uint max_groups;
 };
 
 layout(local_size_x = 1) in;
-layout(push_constant, scalar) uniform Push { CrowdSizePush push; };
+layout(push_constant, scalar) uniform Push { DensePointsSizePush push; };
 layout(set = 1, binding = 0, scalar) readonly buffer CrowdedPoints { uint crowded_points[]; };
 layout(set = 1, binding = 1, scalar) writeonly buffer Sizes { DispatchArgs dispatch_args[]; };
 

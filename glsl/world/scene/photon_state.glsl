@@ -1,5 +1,5 @@
 // A photon in flight through a scene of triangles.
-struct LightPath {
+struct PhotonState {
     vec3 position;
     // Number within its round.
     uint photon;

@@ -1,6 +1,6 @@
 // Both ways at smooth glass. Where the eye's path meets a surface that sends light on in several directions, each without any spread, it
-// takes one of them by chance, as what scatters beyond varies little. What shines by itself may be brighter than all else, a lamp in glass
-// that shows 4 % of it for example. So the other ways are followed too, for what shines and nothing else, and the path counts what shines as
+// takes one of them by chance, as what scatters beyond varies little. What emits light may be brighter than all else, a lamp in glass
+// that shows 4 % of it for example. So the other ways are followed too, for what emits light and nothing else, and the path counts what emits light as
 // if it had been certain to take its own: all of it is then counted once, and none by chance.
 
 // At few surfaces of a path, and so many ways in all.
@@ -20,7 +20,7 @@ struct Way {
 
 Way ways[MOST_WAYS];
 
-bool follows_other_ways(uint depth)
+bool follows_split_paths(uint depth)
 {
     return HAS_SPECULAR_CHAINS && RAYS_HIT_LIGHTS && chain.is_smooth && !has_gathered() && depth < DEPTH_OF_WAYS;
 }
@@ -87,7 +87,7 @@ float part_at_layers(Surface surface, Lobes lobes, vec3 wo, ChosenLobe chosen, b
 }
 
 // The same at any surface, where u has chosen the lobe of the path's own way.
-float leave_other_ways(float u, uint depth)
+float leave_split_paths(float u, uint depth)
 {
     if (vertex.is_layered) {
         return part_at_layers(vertex.surface, vertex.lobes, vertex.wo, choose_lobe(vertex.lobes, u), vertex.scatter.passes, depth);
@@ -106,7 +106,7 @@ uint take_way()
     chain.direction = way.direction;
     chain.weight = way.weight;
     chain.media = way.media;
-    chain.role = ROLE_OTHER_WAY;
+    chain.role = ROLE_SPLIT;
     chain.saw_specular = (way.depth & 1u) != 0;
     chain.chance = 1.0;
     chain.is_smooth = true;

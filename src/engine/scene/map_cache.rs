@@ -10,9 +10,9 @@ use crate::ledger::Fates;
 use crate::photon::MapPhoton;
 use crate::plan::scene::MapPlan;
 
-pub(crate) struct KeptMaps {
+pub(crate) struct MapCache {
     /// By round, and whether it is the caustic map.
-    maps: HashMap<(u32, bool), KeptMap>,
+    maps: HashMap<(u32, bool), CachedMap>,
     /// Maps for which there is no room are traced again.
     most_bytes: u64,
     /// The round under way, and which of its maps nobody has counted yet: the global and the caustic one.
@@ -21,7 +21,7 @@ pub(crate) struct KeptMaps {
 }
 
 #[derive(Default)]
-struct KeptMap {
+struct CachedMap {
     /// A map that has no room for all photons of a round comes in parts.
     parts: Vec<Buffer<MapPhoton>>,
     /// Known once the round has run; those emitted are not among them.
@@ -30,29 +30,29 @@ struct KeptMap {
     is_partial: bool,
 }
 
-impl KeptMaps {
-    pub(super) fn new(most_bytes: u64) -> KeptMaps {
-        KeptMaps { maps: HashMap::new(), most_bytes, round: 0, open: [false; 2] }
+impl MapCache {
+    pub(super) fn new(most_bytes: u64) -> MapCache {
+        MapCache { maps: HashMap::new(), most_bytes, round: 0, open: [false; 2] }
     }
 
     /// Begins a map of a round; whether its photons are kept, and need not be traced.
     pub(super) fn begin(&mut self, round: u32, map: &MapPlan) -> bool {
         self.round = round;
         self.open[usize::from(map.caustic_only)] = true;
-        let kept = self.maps.entry((round, map.caustic_only)).or_default();
-        let is_whole = kept.fates.is_some() && !kept.is_partial;
+        let cached = self.maps.entry((round, map.caustic_only)).or_default();
+        let is_whole = cached.fates.is_some() && !cached.is_partial;
         if !is_whole {
-            *kept = KeptMap { is_partial: kept.is_partial, ..KeptMap::default() };
+            *cached = CachedMap { is_partial: cached.is_partial, ..CachedMap::default() };
         }
         is_whole
     }
 
     /// Keeps the photons that are in the map, if there is room.
-    pub(super) fn keep(&mut self, commands: &mut Commands, round: Round, map: &MapPlan) -> Result<()> {
+    pub(super) fn store(&mut self, commands: &mut Commands, round: Round, map: &MapPlan) -> Result<()> {
         let held = self.bytes();
-        let kept = self.maps.get_mut(&(self.round, map.caustic_only)).expect("the map was begun");
+        let cached = self.maps.get_mut(&(self.round, map.caustic_only)).expect("the map was begun");
         let count = u64::from(commands.read(&round.photons().counters, 1)?[0].min(map.capacity));
-        if kept.is_partial || count == 0 {
+        if cached.is_partial || count == 0 {
             return Ok(());
         }
         let has_room = held + count * size_of::<MapPhoton>() as u64 <= self.most_bytes;
@@ -60,10 +60,10 @@ impl KeptMaps {
         match part {
             Some(Ok(part)) => {
                 commands.copy(&round.photons().map, &part, count);
-                kept.parts.push(part);
+                cached.parts.push(part);
             }
             Some(Err(error)) if !matches!(error, Error::OutOfMemory { .. }) => return Err(error),
-            _ => *kept = KeptMap { is_partial: true, ..KeptMap::default() },
+            _ => *cached = CachedMap { is_partial: true, ..CachedMap::default() },
         }
         Ok(())
     }
@@ -79,11 +79,11 @@ impl KeptMaps {
         if !std::mem::take(&mut self.open[which]) {
             return counted;
         }
-        let kept = self.maps.get_mut(&(self.round, which == 1)).expect("the map was begun");
-        match &kept.fates {
+        let cached = self.maps.get_mut(&(self.round, which == 1)).expect("the map was begun");
+        match &cached.fates {
             Some(fates) => [fates.clone(), fates.clone()],
             None => {
-                kept.fates = Some(counted[0].clone());
+                cached.fates = Some(counted[0].clone());
                 counted
             }
         }

@@ -1,8 +1,8 @@
 // Photons in flight, and their paths between bounces as three words of four: place, direction and random stream. The first
 // words of all paths stand side by side, then the second and the third ones, so that neighbouring invocations move
-// neighbouring words. Twin of src/path.rs.
+// neighbouring words. Twin of src/photon_state.rs.
 
-struct LightPath {
+struct PhotonState {
     vec3 position;
     uint wall; // NO_WALL once it has died where it stands
     vec3 direction;
@@ -19,14 +19,14 @@ uint path_word(uint k, uint index, uint capacity)
     return k * capacity + index;
 }
 
-uvec4[PATH_WORDS] pack_path(LightPath path)
+uvec4[PATH_WORDS] pack_path(PhotonState path)
 {
     return uvec4[](uvec4(floatBitsToUint(path.position), path.wall), uvec4(floatBitsToUint(path.direction), path.photon),
                    uvec4(path.stream, floatBitsToUint(path.flux), 0));
 }
 
-LightPath unpack_path(uvec4[PATH_WORDS] words)
+PhotonState unpack_path(uvec4[PATH_WORDS] words)
 {
-    return LightPath(uintBitsToFloat(words[0].xyz), words[0].w, uintBitsToFloat(words[1].xyz), words[1].w, words[2].xy,
+    return PhotonState(uintBitsToFloat(words[0].xyz), words[0].w, uintBitsToFloat(words[1].xyz), words[1].w, words[2].xy,
                 uintBitsToFloat(words[2].z));
 }

@@ -18,7 +18,7 @@ const EXR_MAGIC: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
 pub(crate) const MAX_TEXELS: u64 = 65_000_000;
 
 /// Row by row from the top.
-pub(crate) struct LinearPicture {
+pub(crate) struct LinearImage {
     pub width: u32,
     pub height: u32,
     pub colours: Vec<Vec3>,
@@ -33,15 +33,15 @@ pub(crate) fn is_one(content: &[u8]) -> bool {
     [RADIANCE_MAGIC, EXR_MAGIC].iter().any(|magic| content.starts_with(magic))
 }
 
-impl LinearPicture {
+impl LinearImage {
     /// An error says what is wrong with the file, and what to do.
-    pub(crate) fn decode(mut content: Vec<u8>) -> Result<LinearPicture, String> {
+    pub(crate) fn decode(mut content: Vec<u8>) -> Result<LinearImage, String> {
         if !content.starts_with(RADIANCE_MAGIC) {
             check_layers(&content, MAX_TEXELS)?;
             let decoder = OpenExrDecoder::with_alpha_preference(Cursor::new(&content), Some(false)).map_err(undecodable)?;
             let has_alpha = decoder.original_color_type() == ExtendedColorType::Rgba32F;
             let (width, height, colours) = decoded(decoder)?;
-            return Ok(LinearPicture { width, height, colours, exposure: 1.0, has_alpha });
+            return Ok(LinearImage { width, height, colours, exposure: 1.0, has_alpha });
         }
         let header = RadianceHeader::parse(&content)?;
         // As the library has it.
@@ -54,7 +54,7 @@ impl LinearPicture {
         if header.is_mirrored {
             colours.chunks_mut(width as usize).for_each(<[Vec3]>::reverse);
         }
-        Ok(LinearPicture { width, height, colours, exposure: header.exposure, has_alpha: false })
+        Ok(LinearImage { width, height, colours, exposure: header.exposure, has_alpha: false })
     }
 }
 

@@ -9,7 +9,7 @@ use crate::engine::room::live::LiveRoom;
 use crate::engine::scene::live::LiveScene;
 use crate::error::Result;
 use crate::gpu::Commands;
-use crate::output::colour::ColourPicture;
+use crate::output::colour::ColourImage;
 use crate::scene::Camera;
 use crate::timings::{Row, Timings};
 
@@ -55,7 +55,7 @@ impl Status {
     pub(super) fn take(&mut self, live: &mut Live) {
         self.ledger = either!(live, live => live.run.state.ledger());
         if let Live::Scene(live) = live {
-            (self.kept_rounds, self.kept_bytes) = live.kept();
+            (self.cached_rounds, self.cached_bytes) = live.cached();
         }
         let timings = live.take_timings();
         let of_round = |row: &Row| row.name.strip_prefix("round").map(str::to_owned);
@@ -75,7 +75,7 @@ impl Status {
     }
 }
 
-/// What a look at the film tells.
+/// What a look at the film shows.
 pub(crate) struct Look {
     pub noise: f64,
     pub bias: Option<f64>,
@@ -123,7 +123,7 @@ impl<'a> Live<'a> {
                 let (film, error) = live.run.look()?;
                 let pixels: Vec<Vec3> = film.means().map(DVec3::as_vec3).collect();
                 let mean = film.surface_means().map(|mean| mean.element_sum() / 3.0).sum::<f64>() / pixels.len().max(1) as f64;
-                let picture = ColourPicture { width: pixels.len() as u32, height: 1, pixels };
+                let picture = ColourImage { width: pixels.len() as u32, height: 1, pixels };
                 let unseen = error.unseen.hypot(error.unknown.relative);
                 Ok(Look { noise: error.noise, bias: error.bias.map(|bias| bias.relative), unseen, mean, stops: picture.usual_exposure() })
             }

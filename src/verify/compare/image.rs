@@ -9,7 +9,7 @@ use image::{DynamicImage, ImageDecoder, Limits};
 use serde::Serialize;
 
 use crate::scene::file;
-use crate::scene::linear_picture::{self, LinearPicture, MAX_TEXELS};
+use crate::scene::linear_image::{self, LinearImage, MAX_TEXELS};
 
 const PNG_MAGIC: &[u8] = b"\x89PNG";
 
@@ -25,7 +25,7 @@ pub(crate) enum Values {
 
 /// Row by row from the top.
 #[derive(Debug, Clone)]
-pub(crate) struct Picture {
+pub(crate) struct Image {
     /// As the user named it.
     pub path: PathBuf,
     pub width: u32,
@@ -36,28 +36,28 @@ pub(crate) struct Picture {
     pub warnings: Vec<&'static str>,
 }
 
-impl Picture {
+impl Image {
     /// Reads a file; an error says what is wrong with it, and what to do.
-    pub(crate) fn read(path: &Path) -> Result<Picture, String> {
+    pub(crate) fn read(path: &Path) -> Result<Image, String> {
         let content = file::read(path)?;
         let path = path.to_owned();
-        if linear_picture::is_one(&content) {
-            let LinearPicture { width, height, mut colours, exposure, has_alpha } = LinearPicture::decode(content)?;
+        if linear_image::is_one(&content) {
+            let LinearImage { width, height, mut colours, exposure, has_alpha } = LinearImage::decode(content)?;
             colours.iter_mut().for_each(|colour| *colour /= exposure);
-            return Ok(Picture { path, width, height, values: Values::Linear, pixels: colours, warnings: warnings(has_alpha, false) });
+            return Ok(Image { path, width, height, values: Values::Linear, pixels: colours, warnings: warnings(has_alpha, false) });
         }
         if content.starts_with(PNG_MAGIC) {
             let mut limits = Limits::default();
             limits.max_alloc = Some(16 * MAX_TEXELS);
-            let decoder = PngDecoder::with_limits(Cursor::new(&content), limits).map_err(linear_picture::undecodable)?;
+            let decoder = PngDecoder::with_limits(Cursor::new(&content), limits).map_err(linear_image::undecodable)?;
             let (width, height) = decoder.dimensions();
-            linear_picture::check_size(width, height)?;
+            linear_image::check_size(width, height)?;
             let colour = decoder.color_type();
-            let decoded = DynamicImage::from_decoder(decoder).map_err(linear_picture::undecodable)?;
+            let decoded = DynamicImage::from_decoder(decoder).map_err(linear_image::undecodable)?;
             // Codes of 8 bits become multiples of 257, so that equal colours are equal whatever holds them.
             let pixels = decoded.into_rgb16().pixels().map(|pixel| Vec3::from(pixel.0.map(f32::from)) / 65535.0).collect();
             let warnings = warnings(colour.has_alpha(), !colour.has_color());
-            return Ok(Picture { path, width, height, values: Values::Display, pixels, warnings });
+            return Ok(Image { path, width, height, values: Values::Display, pixels, warnings });
         }
         if content.is_empty() {
             return Err("is empty; write it again".into());

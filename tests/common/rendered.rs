@@ -4,11 +4,11 @@ use std::ops::Range;
 
 use super::estimate_check;
 use super::prelude::*;
-use photonmill::engine::scene::{self, RunResult, Target, View, trial};
+use photonmill::engine::scene::{self, Receivers, RunResult, Viewpoint, trial};
 use photonmill::render::PreparedScene;
 use photonmill::verify::selfcheck::Estimate;
 
-/// The default settings with blocks of one round: few rounds tell the error well.
+/// The default settings with blocks of one round: few rounds give the error well.
 pub fn by_rounds() -> SceneSettings {
     SceneSettings { rounds: 16, block: Some(1), ..SceneSettings::default() }
 }
@@ -18,8 +18,8 @@ const SCENE_BUILDERS: [Builder; 2] = [Builder::Ballot, Builder::Persistent];
 pub const BOTH: [Illumination; 2] = [Illumination::Split, Illumination::Photons];
 
 /// Lights a scene to the end of the run, with default radii from a trial round.
-pub fn render(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, target: Target) -> Result<RunResult, Error> {
-    let prepared = PreparedScene::new(scene.clone()).prepare_with(settings, target)?;
+pub fn render(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, receivers: Receivers) -> Result<RunResult, Error> {
+    let prepared = PreparedScene::new(scene.clone()).prepare_with(settings, receivers)?;
     prepared.light(gpu, prepared.plan_on(gpu, settings)?, &mut Control::default())
 }
 
@@ -41,18 +41,18 @@ pub fn square_picture(side: u32) -> Sensor {
 }
 
 /// Runs to the end, whatever comes out.
-pub fn run(gpu: &Gpu, view: &View, plan: ScenePlan) -> RunResult {
-    scene::light(gpu, view, plan, &mut Control::default()).unwrap()
+pub fn run(gpu: &Gpu, viewpoint: &Viewpoint, plan: ScenePlan) -> RunResult {
+    scene::light(gpu, viewpoint, plan, &mut Control::default()).unwrap()
 }
 
 /// Runs to the end, with nothing odd.
-pub fn light(gpu: &Gpu, view: &View, plan: ScenePlan) -> RunResult {
-    let lit = run(gpu, view, plan);
-    assert_eq!(lit.film.anomalies[..3], [0, 0, 0], "values that are no number, or too large for the film");
-    if let Some(nonfinite_values) = &lit.nonfinite_values {
+pub fn light(gpu: &Gpu, viewpoint: &Viewpoint, plan: ScenePlan) -> RunResult {
+    let result = run(gpu, viewpoint, plan);
+    assert_eq!(result.film.anomalies[..3], [0, 0, 0], "values that are no number, or too large for the film");
+    if let Some(nonfinite_values) = &result.nonfinite_values {
         assert_eq!(nonfinite_values.count, 0, "{}", nonfinite_values.text());
     }
-    lit
+    result
 }
 
 /// What arrives at points (position, normal) of a scene of triangles.
@@ -62,16 +62,16 @@ pub fn received(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, points: &[(D
 
 /// The same within other limits than the device's own.
 pub fn received_within(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, points: &[(DVec3, DVec3)], limits: &Limits) -> RunResult {
-    lit_in(gpu, (scene, &Geometry::new(scene).unwrap()), settings, Target::Points(points), limits)
+    result_for(gpu, (scene, &Geometry::new(scene).unwrap()), settings, Receivers::Points(points), limits)
 }
 
 /// With radii by the scene's area, and the device looking for values that are no finite number.
-fn lit_in(gpu: &Gpu, scene: (&Scene, &Geometry), settings: &SceneSettings, target: Target, limits: &Limits) -> RunResult {
+fn result_for(gpu: &Gpu, scene: (&Scene, &Geometry), settings: &SceneSettings, receivers: Receivers, limits: &Limits) -> RunResult {
     let (scene, geometry) = scene;
     // Values of tiles with more samples have no names.
     let settings = SceneSettings { paranoid: settings.tiles.is_none(), ..settings.clone() };
-    let plan = ScenePlan::new(scene, geometry, &settings, target.sensor(), limits).unwrap();
-    light(gpu, &View { geometry, camera: target.camera(), phases: &target.phases(geometry) }, plan)
+    let plan = ScenePlan::new(scene, geometry, &settings, receivers.sensor(), limits).unwrap();
+    light(gpu, &Viewpoint { geometry, camera: receivers.camera(), phases: &receivers.phases(geometry) }, plan)
 }
 
 /// Fails unless every builder comes to the same fates and sums in a short run: what one of them shows of these settings then
@@ -90,51 +90,51 @@ pub fn assert_builders_agree(gpu: &Gpu, scene: &Scene, settings: &SceneSettings,
 
 /// What a camera sees of a scene of triangles.
 pub fn seen(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, camera: &Camera, size: [u32; 2]) -> RunResult {
-    let (geometry, target) = (Geometry::new(scene).unwrap(), Target::Picture(camera, size));
-    lit_in(gpu, (scene, &geometry), settings, target, &engine::limits(gpu.facts()))
+    let (geometry, receivers) = (Geometry::new(scene).unwrap(), Receivers::Image(camera, size));
+    result_for(gpu, (scene, &geometry), settings, receivers, &engine::limits(gpu.facts()))
 }
 
 /// Red mean and standard error of a pixel or point.
-pub fn red(lit: &RunResult, place: usize) -> (f64, f64) {
-    (lit.film.mean(place).x, lit.film.standard_error(place).x)
+pub fn red(result: &RunResult, place: usize) -> (f64, f64) {
+    (result.film.mean(place).x, result.film.standard_error(place).x)
 }
 
 /// Fails unless the red channel of a pixel or point is known to some share of what is right; it must be right to its error, or to another
 /// share if that is more.
-pub fn red_check(what: &str, lit: &RunResult, place: usize, expected: f64, [known_to, right_to]: [f64; 2]) -> Check<Complaint> {
-    let (found, error) = red(lit, place);
+pub fn red_check(what: &str, result: &RunResult, place: usize, expected: f64, [known_to, right_to]: [f64; 2]) -> Check<Complaint> {
+    let (found, error) = red(result, place);
     println!("{what}: {found} +- {error}, {expected} expected");
     assert!(error < known_to * expected, "{what}: {found} +- {error}");
     estimate_check(what, found, expected, error.max(right_to * expected))
 }
 
 /// Mean of the red channel over all pixels or points.
-pub fn mean_red(lit: &RunResult) -> f64 {
-    lit.film.means().map(|mean| mean.x).sum::<f64>() / lit.film.pixels() as f64
+pub fn mean_red(result: &RunResult) -> f64 {
+    result.film.means().map(|mean| mean.x).sum::<f64>() / result.film.pixels() as f64
 }
 
 /// Standard error of every pixel or point.
-pub fn standard_errors(lit: &RunResult) -> Vec<DVec3> {
-    (0..lit.film.pixels()).map(|place| lit.film.standard_error(place)).collect()
+pub fn standard_errors(result: &RunResult) -> Vec<DVec3> {
+    (0..result.film.pixels()).map(|place| result.film.standard_error(place)).collect()
 }
 
 /// Mean of every pixel or point.
-pub fn means(lit: &RunResult) -> Vec<DVec3> {
-    lit.film.means().collect()
+pub fn means(result: &RunResult) -> Vec<DVec3> {
+    result.film.means().collect()
 }
 
 /// Irradiance at points, W/m2, of each of several runs of other seeds.
 pub fn irradiances(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, points: &[(DVec3, DVec3)], seeds: Range<u64>) -> Vec<Vec<DVec3>> {
     let (geometry, limits) = (Geometry::new(scene).unwrap(), engine::limits(gpu.facts()));
     let settings_of = |seed| SceneSettings { seed, ..settings.clone() };
-    seeds.map(|seed| means(&lit_in(gpu, (scene, &geometry), &settings_of(seed), Target::Points(points), &limits))).collect()
+    seeds.map(|seed| means(&result_for(gpu, (scene, &geometry), &settings_of(seed), Receivers::Points(points), &limits))).collect()
 }
 
 /// Radiance along one ray, W/m2/sr, once for each pixel of a picture so narrow that they are all but the same ray;
 /// pixels draw random numbers of their own. The red channel of a grey scene.
-pub fn radiances(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, eye: DVec3, target: DVec3, side: u32) -> Vec<f64> {
-    let up = if (target - eye).normalize().y.abs() > 0.9 { DVec3::X } else { DVec3::Y };
-    let camera = Camera::looking_at("ray", eye, target, up, 2e-4);
+pub fn radiances(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, eye: DVec3, receivers: DVec3, side: u32) -> Vec<f64> {
+    let up = if (receivers - eye).normalize().y.abs() > 0.9 { DVec3::X } else { DVec3::Y };
+    let camera = Camera::looking_at("ray", eye, receivers, up, 2e-4);
     means(&seen(gpu, scene, settings, &camera, [side, side])).into_iter().map(|mean| mean.x).collect()
 }
 
@@ -147,8 +147,8 @@ pub fn matt(albedo: f32) -> Material {
     Material::lambert("matt", Vec3::splat(albedo))
 }
 
-/// Scatters this share, and shines with 1 W/m2/sr.
-pub fn shining(albedo: f32) -> Material {
+/// Scatters this share, and emits 1 W/m2/sr.
+pub fn emissive(albedo: f32) -> Material {
     Material { emission: Vec3::ONE, ..matt(albedo) }
 }
 
@@ -293,13 +293,13 @@ impl Viewed {
         Viewed { geometry: Geometry::new(&scene).unwrap(), camera: scene.first_camera(), scene }
     }
 
-    pub fn view(&self) -> View<'_> {
-        View { geometry: &self.geometry, camera: Some(&self.camera), phases: &[] }
+    pub fn viewpoint(&self) -> Viewpoint<'_> {
+        Viewpoint { geometry: &self.geometry, camera: Some(&self.camera), phases: &[] }
     }
 
     /// With radii by a trial round.
     pub fn tried(&self, gpu: &Gpu, settings: &SceneSettings, sensor: Sensor) -> ScenePlan {
-        trial::plan(gpu, &self.scene, &self.view(), settings, sensor).unwrap()
+        trial::plan(gpu, &self.scene, &self.viewpoint(), settings, sensor).unwrap()
     }
 
     /// With radii by the scene's area.
@@ -308,8 +308,8 @@ impl Viewed {
     }
 
     /// Runs to the end, whatever comes out.
-    pub fn lit(&self, gpu: &Gpu, plan: ScenePlan) -> RunResult {
-        run(gpu, &self.view(), plan)
+    pub fn run(&self, gpu: &Gpu, plan: ScenePlan) -> RunResult {
+        run(gpu, &self.viewpoint(), plan)
     }
 }
 

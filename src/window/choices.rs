@@ -1,6 +1,6 @@
 //! What the user of a window chooses: what is shown, and of which run.
 
-use super::{Subject, ViewRequest};
+use super::{ViewedScene, WindowRequest};
 use crate::render::RenderRequest;
 use crate::render::values::Variant;
 use crate::settings::scene::{Effect, SceneSettings};
@@ -41,16 +41,16 @@ const ROUNDS_OF_BOX: u32 = 1 << 12;
 
 impl RunChoices {
     /// What was asked for, or is usual on a class of devices.
-    pub(super) fn of(view: &ViewRequest, kind: &str) -> RunChoices {
-        let request = &view.request;
-        let (builder, own) = match &view.subject {
-            Subject::Scene { .. } => (request.variant.and_then(Variant::builder), SceneSettings::default().photons),
-            Subject::Box => {
+    pub(super) fn of(window: &WindowRequest, kind: &str) -> RunChoices {
+        let request = &window.request;
+        let (builder, own) = match &window.viewed {
+            ViewedScene::Scene { .. } => (request.variant.and_then(Variant::builder), SceneSettings::default().photons),
+            ViewedScene::Box => {
                 let settings = request.room_settings();
                 (Some(settings.builder), settings.photons)
             }
         };
-        let is_slow = kind == "cpu" && matches!(view.subject, Subject::Scene { .. });
+        let is_slow = kind == "cpu" && matches!(window.viewed, ViewedScene::Scene { .. });
         let usual = if is_slow { own.min(PHOTONS_ON_CPU) } else { own };
         let usual_photons = request.photons.is_none().then_some(usual);
         let without = request.without.clone();

@@ -11,11 +11,11 @@ use glam::DVec3;
 
 use super::camera::MovingCamera;
 use super::choices::Choices;
+use super::display::{DisplayImage, Exposure};
 use super::events::Events;
 use super::live::{Live, Rate};
-use super::panel::{self, PHOTON_COLOURS, Requests, Status};
-use super::picture::{Exposure, Picture};
-use super::{Subject, ViewRequest};
+use super::panel::{self, PHOTON_COLOURS, PanelActions, Status};
+use super::{ViewedScene, WindowRequest};
 use crate::engine::room::live::LiveRoom;
 use crate::engine::scene::live::{DotPlace, LiveScene};
 use crate::error::Result;
@@ -25,10 +25,10 @@ use crate::output::colour::png_of_codes;
 use crate::plan::scene::ScenePlan;
 use crate::render::image::command_line;
 use crate::render::names::{as_option, spelled};
-use crate::render::{Inputs, Observer, Receivers, RenderRequest, Stops, room};
+use crate::render::{Inputs, Observer, RenderRequest, RequestedReceivers, Stops, room};
 use crate::scene::geometry::Geometry;
+use crate::scene::image_size::ImageSize;
 use crate::scene::open_box::open_box;
-use crate::scene::picture_size::PictureSize;
 use crate::scene::{Camera, Projection};
 use crate::settings::scene::Part;
 
@@ -44,14 +44,14 @@ pub(crate) enum Next {
 /// What stays from run to run.
 pub(crate) struct Session<'a> {
     gpu: &'a Gpu,
-    request: &'a ViewRequest<'a>,
+    request: &'a WindowRequest<'a>,
     interface: Context,
     status: Status,
     camera: MovingCamera,
     first_camera: MovingCamera,
-    /// Nobody has chosen an exposure, and no picture has told one.
+    /// Nobody has chosen an exposure, and no picture has given one.
     wants_exposure: bool,
-    /// What the user is told for a while.
+    /// What the user is shown for a while.
     said: Option<Instant>,
     files: u32,
     rendering: Option<Rendering>,
@@ -67,15 +67,15 @@ const STOPS_OF_PHOTONS: f32 = 2.0;
 const SAID: Duration = Duration::from_secs(8);
 
 impl<'a> Session<'a> {
-    pub(super) fn new(gpu: &'a Gpu, request: &'a ViewRequest<'a>, interface: Context, title: String) -> Session<'a> {
-        let camera = match &request.subject {
-            Subject::Scene { scene, camera } => {
+    pub(super) fn new(gpu: &'a Gpu, request: &'a WindowRequest<'a>, interface: Context, title: String) -> Session<'a> {
+        let camera = match &request.viewed {
+            ViewedScene::Scene { scene, camera } => {
                 let scene = &scene.scene;
                 let (min, max) = scene.bounds();
                 let ahead = scene.distance_along(camera.eye, camera.forward).filter(|distance| distance.is_finite());
                 MovingCamera { camera: camera.clone(), pivot: ahead.unwrap_or(0.5 * (max - min).length()).max(1e-9) }
             }
-            Subject::Box => {
+            ViewedScene::Box => {
                 let room = open_box(&request.request.room_settings());
                 let middle = 0.5 * (room.min_corner + room.max_corner);
                 let half = 0.5 * (room.max_corner - room.min_corner).max_element();
@@ -83,7 +83,7 @@ impl<'a> Session<'a> {
                 MovingCamera { camera: Camera::looking_at("box", eye, middle, DVec3::Y, 0.8), pivot: eye.distance(middle) }
             }
         };
-        let status = Status { title, device: gpu.facts().label(), is_box: matches!(request.subject, Subject::Box), ..Status::default() };
+        let status = Status { title, device: gpu.facts().label(), is_box: matches!(request.viewed, ViewedScene::Box), ..Status::default() };
         Session {
             gpu,
             request,
@@ -107,23 +107,23 @@ impl<'a> Session<'a> {
     pub(super) fn show(&mut self, events: &mut Events, presenter: &mut Presenter, choices: &mut Choices) -> Result<Next> {
         let Some(window) = self.settled_size(events, presenter)? else { return Ok(Next::Close) };
         let size = self.request.size.unwrap_or(window.map(|length| (length / choices.zoom).max(1)));
-        let picture = Picture::new(self.gpu, size, window)?;
+        let picture = DisplayImage::new(self.gpu, size, window)?;
         self.status.size = size;
         self.status.rounds = 0;
         (self.status.noise, self.status.unseen) = (f64::INFINITY, 0.0);
         self.wait_frame(events, presenter, &picture, choices)?;
-        match &self.request.subject {
-            Subject::Scene { scene, .. } => {
+        match &self.request.viewed {
+            ViewedScene::Scene { scene, .. } => {
                 let request = RenderRequest { size: Some(width_and_height(size)), ..choices.run.live(&self.request.request) };
                 let mut inputs = Inputs::open(&request)?;
                 inputs.settings.keeps_parts = true;
-                let prepared = scene.prepare(inputs, Receivers::Image(Some(&self.camera.camera)), &Observer::default())?;
+                let prepared = scene.prepare(inputs, RequestedReceivers::Image(Some(&self.camera.camera)), &Observer::default())?;
                 let plan = prepared.plan_on(self.gpu, &prepared.inputs.settings)?;
                 let live = LiveScene::new(self.gpu, &prepared.geometry, &self.camera.camera, &plan, self.request.cancelled)?;
                 self.take_plan(&plan, &prepared.geometry, choices);
                 self.frames(Live::Scene(Box::new(live)), &picture, events, presenter, choices)
             }
-            Subject::Box => {
+            ViewedScene::Box => {
                 let settings = choices.run.live_box(&self.request.request);
                 let scene = open_box(&settings);
                 let plan = LiveRoom::plan(self.gpu, &scene, &settings)?;
@@ -143,7 +143,7 @@ impl<'a> Session<'a> {
     }
 
     /// A frame that says that a run is being prepared.
-    fn wait_frame(&mut self, events: &mut Events, presenter: &mut Presenter, picture: &Picture, choices: &mut Choices) -> Result<()> {
+    fn wait_frame(&mut self, events: &mut Events, presenter: &mut Presenter, picture: &DisplayImage, choices: &mut Choices) -> Result<()> {
         let mut commands = Commands::new(self.gpu, crate::gpu::Constants::new(64), Instant::now())?;
         commands.fill(&picture.pixels, 0, picture.pixels.count(), 0xff1c_1c1c);
         commands.submit()?;
@@ -178,20 +178,20 @@ impl<'a> Session<'a> {
         &mut self,
         events: &mut Events,
         presenter: &mut Presenter,
-        picture: &Picture,
+        picture: &DisplayImage,
         choices: &mut Choices,
         is_waiting: bool,
-    ) -> Result<(Requests, bool)> {
+    ) -> Result<(PanelActions, bool)> {
         events.wait(Duration::ZERO);
         if self.said.is_some_and(|said| said.elapsed() > SAID) {
             self.status.message.clear();
             self.said = None;
         }
-        let mut requests = Requests::default();
+        let mut actions = PanelActions::default();
         let (interface, status, pivot) = (self.interface.clone(), &self.status, self.camera.pivot);
         let input = if is_waiting { events.look_at_input() } else { events.take_input() };
         let mut output = interface.run_ui(input, |ui| {
-            requests = panel::show(ui.ctx(), choices, status, pivot);
+            actions = panel::show(ui.ctx(), choices, status, pivot);
             if is_waiting {
                 egui::Area::new("waiting".into()).anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0]).show(ui.ctx(), |ui| {
                     ui.label(egui::RichText::new("Preparing ...").size(22.0));
@@ -200,13 +200,13 @@ impl<'a> Session<'a> {
         });
         events.obey(&mut output);
         let fits = picture.present(presenter, &interface, output)?;
-        Ok((requests, fits))
+        Ok((actions, fits))
     }
 
     fn frames(
         &mut self,
         mut live: Live,
-        picture: &Picture,
+        picture: &DisplayImage,
         events: &mut Events,
         presenter: &mut Presenter,
         choices: &mut Choices,
@@ -245,12 +245,12 @@ impl<'a> Session<'a> {
             }
             live.commands().submit()?;
             self.status.command = self.command(choices);
-            let (requests, fits) = self.interface_frame(events, presenter, picture, choices, false)?;
-            if requests.close || events.is_closed() || self.request.cancelled.load(Ordering::Relaxed) {
+            let (actions, fits) = self.interface_frame(events, presenter, picture, choices, false)?;
+            if actions.close || events.is_closed() || self.request.cancelled.load(Ordering::Relaxed) {
                 self.end_rendering();
                 return Ok(Next::Close);
             }
-            self.act(requests, &mut live, picture, presenter, choices)?;
+            self.act(actions, &mut live, picture, presenter, choices)?;
             // A minimised window has no pixels; the run goes on when it is back.
             if presenter.size()?.contains(&0) {
                 events.wait(Duration::from_millis(100));
@@ -266,23 +266,30 @@ impl<'a> Session<'a> {
     }
 
     /// Window pixels of one of the picture.
-    fn zoom(&self, picture: &Picture, choices: &Choices) -> u32 {
+    fn zoom(&self, picture: &DisplayImage, choices: &Choices) -> u32 {
         let fits = (picture.window[0] / picture.size[0]).min(picture.window[1] / picture.size[1]).max(1);
         if self.request.size.is_some() { fits } else { choices.zoom }
     }
 
-    fn act(&mut self, requests: Requests, live: &mut Live, picture: &Picture, presenter: &Presenter, choices: &mut Choices) -> Result<()> {
-        let back = requests.first_camera && self.camera.camera != self.first_camera.camera;
+    fn act(
+        &mut self,
+        actions: PanelActions,
+        live: &mut Live,
+        picture: &DisplayImage,
+        presenter: &Presenter,
+        choices: &mut Choices,
+    ) -> Result<()> {
+        let back = actions.first_camera && self.camera.camera != self.first_camera.camera;
         if back {
             self.camera = self.first_camera.clone();
         }
-        if self.camera.apply(&requests.motion) || back {
+        if self.camera.apply(&actions.motion) || back {
             live.look_from(&self.camera.camera)?;
         }
-        if requests.usual_exposure {
+        if actions.usual_exposure {
             choices.stops = live.look()?.stops;
         }
-        if requests.screenshot {
+        if actions.screenshot {
             let path = self.free_name("png");
             let codes = picture.codes(live.commands(), presenter.blue_first())?;
             let content = png_of_codes(picture.window[0], picture.window[1], &codes);
@@ -291,7 +298,7 @@ impl<'a> Session<'a> {
                 Err(error) => format!("{}: cannot be written ({error})", path.display()),
             });
         }
-        match (requests.render, &self.rendering) {
+        match (actions.render, &self.rendering) {
             (true, None) => self.begin_rendering(choices),
             (true, Some(rendering)) => self.say(format!("{} is still being rendered", rendering.path.display())),
             _ => {}
@@ -320,9 +327,9 @@ impl<'a> Session<'a> {
             Err(error) => return self.say(error.to_string()),
         };
         let (request, cancelled) = (self.image_request(choices), Arc::new(AtomicBool::new(false)));
-        let scene = match &self.request.subject {
-            Subject::Scene { scene, .. } => Some(scene.clone()),
-            Subject::Box => None,
+        let scene = match &self.request.viewed {
+            ViewedScene::Scene { scene, .. } => Some(scene.clone()),
+            ViewedScene::Box => None,
         };
         let thread = std::thread::spawn({
             let (path, cancelled) = (path.clone(), cancelled.clone());
@@ -361,14 +368,14 @@ impl<'a> Session<'a> {
     /// What the picture as it is seen now is asked for.
     fn image_request(&self, choices: &Choices) -> RenderRequest {
         let request = &self.request.request;
-        match &self.request.subject {
-            Subject::Scene { .. } => RenderRequest {
+        match &self.request.viewed {
+            ViewedScene::Scene { .. } => RenderRequest {
                 size: Some(width_and_height(self.status.size)),
                 part: part_of(choices.shows),
                 exposure: Some(Stops((100.0 * choices.stops).round() / 100.0)),
                 ..seen_from(&self.camera, choices.run.of_scene(request))
             },
-            Subject::Box => {
+            ViewedScene::Box => {
                 let ends = request.error.is_some() || request.time.is_some();
                 choices.run.of_box(request, (!ends).then_some(self.status.rounds))
             }
@@ -399,15 +406,15 @@ impl Rendering {
     }
 }
 
-fn width_and_height([width, height]: [u32; 2]) -> PictureSize {
-    PictureSize::WidthAndHeight(width, height)
+fn width_and_height([width, height]: [u32; 2]) -> ImageSize {
+    ImageSize::WidthAndHeight(width, height)
 }
 
 fn part_of(shows: u32) -> Option<Part> {
     shows.checked_sub(crate::constants::SHOW_DIRECT).and_then(|part| Part::EACH.get(part as usize).copied())
 }
 
-/// Nine digits, which tell apart what single precision does.
+/// Nine digits, which distinguish what single precision does.
 fn short(value: f64) -> f64 {
     format!("{value:.8e}").parse().unwrap_or(value)
 }

@@ -3,10 +3,10 @@
 
 mod camera;
 mod choices;
+pub(crate) mod display;
 mod events;
 mod live;
 mod panel;
-pub(crate) mod picture;
 mod session;
 
 use std::sync::Arc;
@@ -23,14 +23,14 @@ use events::Events;
 use session::{Next, Session};
 
 /// What is looked at: by a camera of its own, or the paper's box.
-pub(crate) enum Subject {
+pub(crate) enum ViewedScene {
     Scene { scene: Arc<PreparedScene>, camera: Camera },
     Box,
 }
 
 /// What `photonmill view` is asked for.
-pub(crate) struct ViewRequest<'a> {
-    pub subject: Subject,
+pub(crate) struct WindowRequest<'a> {
+    pub viewed: ViewedScene,
     /// What the picture in a file is asked for, but for its camera and what the user of the window chooses.
     pub request: RenderRequest,
     /// Of the picture; `None` for what suits the window and the device.
@@ -48,15 +48,15 @@ const PANEL_WINDOW: u32 = 600;
 const ZOOM_OF_CPU: u32 = 4;
 
 /// Shows a window until it is closed.
-pub(crate) fn run(request: ViewRequest) -> Result<()> {
+pub(crate) fn run(request: WindowRequest) -> Result<()> {
     let interface = egui::Context::default();
-    let name = match &request.subject {
-        Subject::Scene { scene, .. } => scene.scene.name.clone(),
-        Subject::Box => "the paper's box".to_owned(),
+    let name = match &request.viewed {
+        ViewedScene::Scene { scene, .. } => scene.scene.name.clone(),
+        ViewedScene::Box => "the paper's box".to_owned(),
     };
-    let aspect = match &request.subject {
-        Subject::Scene { camera, .. } => camera.aspect.unwrap_or(USUAL_ASPECT).clamp(0.5, 2.0),
-        Subject::Box => USUAL_ASPECT,
+    let aspect = match &request.viewed {
+        ViewedScene::Scene { camera, .. } => camera.aspect.unwrap_or(USUAL_ASPECT).clamp(0.5, 2.0),
+        ViewedScene::Box => USUAL_ASPECT,
     };
     let usual = [(aspect * f64::from(WINDOW_HEIGHT)) as u32, WINDOW_HEIGHT];
     // A small picture is shown with large pixels.
@@ -67,7 +67,7 @@ pub(crate) fn run(request: ViewRequest) -> Result<()> {
     let mut events = Events::open(&format!("{name} - photonmill"), window, &interface)?;
     let gpu = Gpu::open_in(&request.options, Some(events.window()))?;
     // The box costs what its walls do, whoever looks.
-    let is_slow = gpu.facts().kind == "cpu" && matches!(request.subject, Subject::Scene { .. });
+    let is_slow = gpu.facts().kind == "cpu" && matches!(request.viewed, ViewedScene::Scene { .. });
     let zoom = if is_slow && request.size.is_none() { ZOOM_OF_CPU } else { 1 };
     let mut presenter = Presenter::new(&gpu)?;
     let run = RunChoices::of(&request, gpu.facts().kind);

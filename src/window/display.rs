@@ -20,7 +20,7 @@ pub(crate) struct Exposure {
 }
 
 /// Buffers of one size of window and picture.
-pub(crate) struct Picture {
+pub(crate) struct DisplayImage {
     pub size: [u32; 2],
     pub window: [u32; 2],
     /// Radiance, or the relative error; see `glsl/kernels/show_scene.comp`.
@@ -28,10 +28,10 @@ pub(crate) struct Picture {
     pub pixels: Buffer<u32>,
 }
 
-impl Picture {
-    pub(crate) fn new(gpu: &Gpu, size: [u32; 2], window: [u32; 2]) -> Result<Picture> {
+impl DisplayImage {
+    pub(crate) fn new(gpu: &Gpu, size: [u32; 2], window: [u32; 2]) -> Result<DisplayImage> {
         let count = |size: [u32; 2]| u64::from(size[0]) * u64::from(size[1]);
-        Ok(Picture {
+        Ok(DisplayImage {
             size,
             window,
             shown: gpu.buffer("shown", count(size), Memory::Device)?,

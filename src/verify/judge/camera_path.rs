@@ -20,11 +20,11 @@ const MAX_SURVIVAL: f64 = 0.95;
 struct Prefix<'a> {
     /// Share of the radiance along the ray that reaches the eye.
     beta: DVec3,
-    /// A sharp lobe comes before the first matt one.
+    /// A sharp lobe comes before the first rough one.
     saw_sharp: bool,
     /// A sharp lobe comes after it.
     is_caustic: bool,
-    matt_count: u32,
+    rough_count: u32,
     /// Some lobe was no delta: discs are seen from then on.
     was_spread: bool,
     last: Scattering,
@@ -36,7 +36,7 @@ struct Prefix<'a> {
 impl Prefix<'_> {
     /// Where light belongs that the ray meets, or that is sampled where it starts.
     fn part(&self) -> Part {
-        match self.matt_count {
+        match self.rough_count {
             _ if self.saw_sharp => Part::Specular,
             0 => Part::Direct,
             1 if self.is_caustic => Part::Caustic,
@@ -45,17 +45,17 @@ impl Prefix<'_> {
         }
     }
 
-    /// Nothing matt lies between it and the eye.
+    /// No rough lobe lies between it and the eye.
     fn is_seen(&self) -> bool {
-        self.matt_count == 0
+        self.rough_count == 0
     }
 
     fn add(&mut self, class: Class) {
         match class {
             Class::Passing => {}
-            Class::Sharp if self.matt_count == 0 => self.saw_sharp = true,
+            Class::Sharp if self.rough_count == 0 => self.saw_sharp = true,
             Class::Sharp => self.is_caustic = true,
-            Class::Matt => self.matt_count += 1,
+            Class::Rough => self.rough_count += 1,
         }
     }
 
@@ -96,9 +96,18 @@ impl<'a> Judge<'a> {
         Parts { direct, specular: DVec3::ZERO, caustic: PI * parts.caustic, indirect: PI * parts.indirect }
     }
 
-    fn start(&self, position: DVec3, last: Scattering, matt_count: u32) -> Prefix<'a> {
+    fn start(&self, position: DVec3, last: Scattering, rough_count: u32) -> Prefix<'a> {
         let media = if self.has_solids { Media::around(&self.geometry, self.by_size.clone(), position) } else { Media::default() };
-        Prefix { beta: DVec3::ONE, saw_sharp: false, is_caustic: false, matt_count, was_spread: matt_count > 0, last, media, channel: None }
+        Prefix {
+            beta: DVec3::ONE,
+            saw_sharp: false,
+            is_caustic: false,
+            rough_count,
+            was_spread: rough_count > 0,
+            last,
+            media,
+            channel: None,
+        }
     }
 
     fn follow(&self, mut ray: Ray, mut prefix: Prefix<'a>, rng: &mut Random) -> Parts {
@@ -173,7 +182,7 @@ impl<'a> Judge<'a> {
         }
         let towards_eye = prefix.is_seen();
         let is_specular = vertex.surface.is_specular();
-        prefix.add(if is_specular { Class::Sharp } else { Class::Matt });
+        prefix.add(if is_specular { Class::Sharp } else { Class::Rough });
         if !is_specular {
             prefix.was_spread = true;
             let brdf = |wi| (vertex.brdf(wi, towards_eye), 0.0);

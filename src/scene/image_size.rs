@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 
 /// `--size`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum PictureSize {
+pub enum ImageSize {
     Width(u32),
     WidthAndHeight(u32, u32),
 }
@@ -24,23 +24,23 @@ fn is_allowed(width: u32, height: u32) -> bool {
 }
 
 /// `1280`, `1280x720`.
-pub fn parse_size(text: &str) -> std::result::Result<PictureSize, String> {
+pub fn parse_size(text: &str) -> std::result::Result<ImageSize, String> {
     let size = match text.split_once('x') {
         Some((width, height)) => {
-            width.parse().ok().zip(height.parse().ok()).map(|(width, height)| PictureSize::WidthAndHeight(width, height))
+            width.parse().ok().zip(height.parse().ok()).map(|(width, height)| ImageSize::WidthAndHeight(width, height))
         }
-        None => text.parse().ok().map(PictureSize::Width),
+        None => text.parse().ok().map(ImageSize::Width),
     };
     size.filter(|size| match *size {
-        PictureSize::Width(width) => is_allowed(width, 1),
-        PictureSize::WidthAndHeight(width, height) => is_allowed(width, height),
+        ImageSize::Width(width) => is_allowed(width, 1),
+        ImageSize::WidthAndHeight(width, height) => is_allowed(width, height),
     })
     .ok_or_else(|| format!("must be WIDTH or WIDTHxHEIGHT in pixels, each from 1 to {MAX_SIDE}, and {MAX_PIXELS} pixels at most"))
 }
 
-impl PictureSize {
+impl ImageSize {
     /// Width and height in pixels, and a remark if they change what the camera sees.
-    pub fn of(size: Option<PictureSize>, camera: &Camera) -> Result<(u32, u32, Option<String>)> {
+    pub fn of(size: Option<ImageSize>, camera: &Camera) -> Result<(u32, u32, Option<String>)> {
         let aspect = camera.aspect.unwrap_or(DEFAULT_ASPECT);
         // A float that is cut to the range of u32.
         let rounded = |side: f64| (side.round() as u32).max(1);
@@ -49,7 +49,7 @@ impl PictureSize {
                 let width = rounded((DEFAULT_PIXELS * aspect).sqrt()).min(MAX_SIDE);
                 Ok((width, rounded(f64::from(width) / aspect).min(MAX_SIDE), None))
             }
-            Some(PictureSize::Width(width)) => {
+            Some(ImageSize::Width(width)) => {
                 let height = rounded(f64::from(width) / aspect);
                 if height > MAX_SIDE || !is_allowed(width, height) {
                     let allowed = format!(
@@ -59,7 +59,7 @@ impl PictureSize {
                 }
                 Ok((width, height, None))
             }
-            Some(PictureSize::WidthAndHeight(width, height)) => {
+            Some(ImageSize::WidthAndHeight(width, height)) => {
                 let by_aspect = f64::from(height) * aspect;
                 // Sides are whole pixels.
                 let is_same = (f64::from(width) - by_aspect).abs() <= 1.0 || (f64::from(width) / aspect - f64::from(height)).abs() <= 1.0;
@@ -84,8 +84,8 @@ mod tests {
     #[test]
     fn a_picture_has_the_aspect_of_its_camera_unless_both_sides_are_given() {
         let camera = |aspect| Camera { aspect, ..Camera::around(DVec3::ZERO, DVec3::ONE, 1.0) };
-        let of = |text: &str, aspect| PictureSize::of(Some(parse_size(text).unwrap()), &camera(aspect)).unwrap();
-        let default = |aspect| PictureSize::of(None, &camera(aspect)).unwrap();
+        let of = |text: &str, aspect| ImageSize::of(Some(parse_size(text).unwrap()), &camera(aspect)).unwrap();
+        let default = |aspect| ImageSize::of(None, &camera(aspect)).unwrap();
         assert_eq!(default(None), (640, 480, None));
         assert_eq!(default(Some(4.0 / 3.0)), (640, 480, None));
         assert_eq!(default(Some(1.0)), (554, 554, None));
@@ -106,9 +106,9 @@ mod tests {
     fn extreme_aspects_give_a_picture_or_a_refusal() {
         for aspect in [1e-30, 1e-4, 1e4, 1e30] {
             let camera = Camera { aspect: Some(aspect), ..Camera::around(DVec3::ZERO, DVec3::ONE, 1.0) };
-            let (width, height, _) = PictureSize::of(None, &camera).unwrap();
+            let (width, height, _) = ImageSize::of(None, &camera).unwrap();
             assert!(is_allowed(width, height), "{width} x {height}");
-            let given = PictureSize::of(Some(PictureSize::Width(65_535)), &camera);
+            let given = ImageSize::of(Some(ImageSize::Width(65_535)), &camera);
             assert!(given.is_err() == (aspect < 1.0), "{aspect}");
         }
     }

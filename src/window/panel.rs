@@ -45,8 +45,8 @@ pub(crate) struct Status {
     pub unseen: f64,
     /// Of the global and of the caustic map in the latest round, metres.
     pub radii: [Option<f64>; 2],
-    pub kept_rounds: usize,
-    pub kept_bytes: u64,
+    pub cached_rounds: usize,
+    pub cached_bytes: u64,
     pub ledger: Ledger,
     /// Name, depth and milliseconds of passes of the latest round.
     pub passes: Vec<(String, usize, f64)>,
@@ -61,7 +61,7 @@ pub(crate) struct Status {
 
 /// What the user asks for, beside choices.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct Requests {
+pub(crate) struct PanelActions {
     pub motion: Motion,
     pub screenshot: bool,
     pub render: bool,
@@ -82,21 +82,21 @@ const NARROWER: f64 = 0.8;
 const STOPS_PER_SECOND: f32 = 3.0;
 
 /// Draws the panel, and takes what the user does in it, on the picture and on keys.
-pub(crate) fn show(context: &Context, choices: &mut Choices, status: &Status, pivot: f64) -> Requests {
-    let mut requests = Requests::default();
+pub(crate) fn show(context: &Context, choices: &mut Choices, status: &Status, pivot: f64) -> PanelActions {
+    let mut actions = PanelActions::default();
     if choices.is_open {
         egui::Window::new(&status.title).default_size([270.0, 640.0]).default_pos([12.0, 12.0]).show(context, |ui| {
-            egui::ScrollArea::vertical().show(ui, |ui| panel(ui, choices, status, &mut requests));
+            egui::ScrollArea::vertical().show(ui, |ui| panel(ui, choices, status, &mut actions));
         });
     }
     if !context.egui_wants_keyboard_input() {
-        keys(context, choices, status, &mut requests);
+        keys(context, choices, status, &mut actions);
     }
-    requests.motion = motion(context, pivot);
-    requests
+    actions.motion = motion(context, pivot);
+    actions
 }
 
-fn panel(ui: &mut Ui, choices: &mut Choices, status: &Status, requests: &mut Requests) {
+fn panel(ui: &mut Ui, choices: &mut Choices, status: &Status, actions: &mut PanelActions) {
     ui.label(&status.device);
     let noise = if status.noise.is_finite() { format!("{:.2} %", 100.0 * status.noise) } else { "not known yet".to_owned() };
     let bias = status.bias.map_or_else(String::new, |bias| format!(", bias {:.2} %", 100.0 * bias));
@@ -127,20 +127,20 @@ fn panel(ui: &mut Ui, choices: &mut Choices, status: &Status, requests: &mut Req
         }
     }
     ui.add(Slider::new(&mut choices.stops, -20.0..=20.0).text("stops  (- +)"));
-    requests.usual_exposure |= ui.button("Exposure by the mean  (X)").clicked();
+    actions.usual_exposure |= ui.button("Exposure by the mean  (X)").clicked();
     ui.separator();
     settings(ui, &mut choices.run, status);
     ui.add(Slider::new(&mut choices.zoom, 1..=8).text("window pixels per pixel"));
     ui.separator();
     ui.horizontal(|ui| {
-        requests.screenshot |= ui.button("Screenshot  (F)").clicked();
-        requests.render |= ui.button("Render this  (R)").clicked();
+        actions.screenshot |= ui.button("Screenshot  (F)").clicked();
+        actions.render |= ui.button("Render this  (R)").clicked();
     });
     ui.horizontal(|ui| {
         if ui.button("Copy command").clicked() {
             ui.ctx().copy_text(status.command.clone());
         }
-        requests.first_camera |= ui.button("First camera  (Home)").clicked();
+        actions.first_camera |= ui.button("First camera  (Home)").clicked();
     });
     ui.label(RichText::new(&status.command).monospace());
     let keys = if status.is_box {
@@ -172,7 +172,7 @@ fn panel(ui: &mut Ui, choices: &mut Choices, status: &Status, requests: &mut Req
             }
         });
         if !status.is_box {
-            ui.label(format!("maps of {} rounds kept, {} MiB", status.kept_rounds, status.kept_bytes >> 20));
+            ui.label(format!("maps of {} rounds kept, {} MiB", status.cached_rounds, status.cached_bytes >> 20));
         }
     });
 }
@@ -233,7 +233,7 @@ fn legend(ui: &mut Ui) {
     ui.label(RichText::new("of the picture's mean; grey: not known").small());
 }
 
-fn keys(context: &Context, choices: &mut Choices, status: &Status, requests: &mut Requests) {
+fn keys(context: &Context, choices: &mut Choices, status: &Status, actions: &mut PanelActions) {
     context.input(|input| {
         for (key, shows, _) in SHOWN {
             if input.key_pressed(key) && (matches!(shows, SHOW_ALL | SHOW_ERROR) || status.has_parts) {
@@ -257,11 +257,11 @@ fn keys(context: &Context, choices: &mut Choices, status: &Status, requests: &mu
         }
         choices.has_photons ^= input.key_pressed(Key::P) && !status.is_box;
         choices.is_open ^= input.key_pressed(Key::H);
-        requests.screenshot |= input.key_pressed(Key::F);
-        requests.render |= input.key_pressed(Key::R);
-        requests.close |= input.key_pressed(Key::Escape);
-        requests.usual_exposure |= input.key_pressed(Key::X);
-        requests.first_camera |= input.key_pressed(Key::Home);
+        actions.screenshot |= input.key_pressed(Key::F);
+        actions.render |= input.key_pressed(Key::R);
+        actions.close |= input.key_pressed(Key::Escape);
+        actions.usual_exposure |= input.key_pressed(Key::X);
+        actions.first_camera |= input.key_pressed(Key::Home);
         let step = STOPS_PER_SECOND * input.stable_dt.min(0.1);
         for (keys, sign) in [([Key::Plus, Key::Equals], 1.0), ([Key::Minus, Key::Minus], -1.0)] {
             if keys.into_iter().any(|key| input.key_down(key)) {
