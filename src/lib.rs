@@ -86,7 +86,7 @@ pub mod render;
 pub mod rng;
 pub mod scene;
 pub mod settings;
-pub(crate) mod text;
+pub mod text;
 pub(crate) mod timings;
 pub(crate) mod verify;
 #[cfg(feature = "window")]

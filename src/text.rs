@@ -14,7 +14,7 @@ pub(crate) fn counted(count: impl Display, noun: &str) -> String {
 const MOST_ECHOED: usize = 120;
 
 /// A value as it was typed; of a long one the beginning and the end.
-pub(crate) fn echo(typed: impl Display) -> String {
+pub fn echo(typed: impl Display) -> String {
     const END: usize = 40;
     let typed = typed.to_string();
     let letters: Vec<char> = typed.chars().collect();

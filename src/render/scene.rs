@@ -54,6 +54,11 @@ impl PreparedScene {
         Ok(self.geometry.get_or_init(|| geometry).clone())
     }
 
+    /// Makes the geometry that the first run would make, so that its warnings and its refusals come now.
+    pub fn make_geometry(&self, observer: &Observer) -> Result<()> {
+        self.geometry(observer).map(|_| ())
+    }
+
     /// The file that it was read from, which may hold other things, too; `None` of a built-in one.
     pub fn path(&self) -> Option<&Path> {
         self.read_as.as_ref().map(|request| Path::new(&request.scene)).filter(|_| built_in::by_name(self.name()).is_none())

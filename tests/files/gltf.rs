@@ -1113,6 +1113,31 @@ fn surfaces_of_ior_zero_reflect_their_specular_factor() {
     }
 }
 
+/// What has the diffuse lobe alone costs no more than a built-in surface; what adds a lobe, a normal or a gap, or takes a side, is layered.
+#[test]
+fn plain_diffuse_materials_are_lambertian() {
+    let no_gloss = json!({"KHR_materials_specular": {"specularFactor": 0}});
+    let plain = json!({"doubleSided": true, "extensions": no_gloss, "emissiveFactor": [1, 0, 0],
+        "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0.3, "baseColorTexture": {"index": 0}}});
+    let surface = |material: &Value| load_material(material.clone()).materials[0].surface;
+    assert_eq!(surface(&plain), Surface::Lambert);
+    for (member, value) in [
+        ("doubleSided", json!(false)),
+        ("alphaMode", json!("BLEND")),
+        ("normalTexture", json!({"index": 0})),
+        ("pbrMetallicRoughness", json!({"metallicFactor": 0.5})),
+        ("extensions", json!({})),
+        ("extensions", json!({"KHR_materials_unlit": {}})),
+        ("extensions", json!({"KHR_materials_specular": {"specularFactor": 0}, "KHR_materials_clearcoat": {"clearcoatFactor": 1}})),
+        ("extensions", json!({"KHR_materials_specular": {"specularFactor": 0}, "KHR_materials_sheen": {"sheenColorFactor": [1, 1, 1]}})),
+        ("extensions", json!({"KHR_materials_specular": {"specularFactor": 0}, "KHR_materials_transmission": {"transmissionFactor": 1}})),
+    ] {
+        let mut other = plain.clone();
+        other[member] = value;
+        assert_eq!(surface(&other), Surface::Layered, "{other}");
+    }
+}
+
 /// A picture is one texture for each way in which it is read.
 #[test]
 fn pictures_are_shared_where_they_are_read_alike() {

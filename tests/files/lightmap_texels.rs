@@ -474,7 +474,8 @@ fn as_gltf(material: &Material) -> Material {
             Layers { metallic: 0.0, roughness: 0.0, transmission: 1.0, ior, medium, ..Layers::default() }
         }
     };
-    Material { surface: Surface::Layered, layers, ..material.clone() }
+    let material = Material { surface: Surface::Layered, layers, ..material.clone() };
+    Material { surface: if material.is_lambertian() { Surface::Lambert } else { Surface::Layered }, ..material }
 }
 
 /// The uses of textures that a material has, taken out of it.

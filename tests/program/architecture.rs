@@ -271,8 +271,10 @@ fn public_items(sources: &BTreeMap<String, String>) -> BTreeSet<String> {
     const BEFORE_NAMES: [&str; 9] = ["async", "const", "enum", "fn", "static", "struct", "trait", "type", "unsafe"];
     let of_file = |(module, source): (&String, &String)| {
         let path = |name: &str| format!("{module}::{name}").trim_start_matches("lib::").to_owned();
-        // What is indented is a field or a method, but for an enum in a macro that writes more of it.
-        let code = format!("\n{}", code_of(source)).replace("\n    pub enum ", "\npub enum ");
+        // What is indented is a field or a method, but for a type in a macro that writes more of it.
+        let is_type = |line: &str| ["pub enum ", "pub struct "].iter().any(|start| line.starts_with(start) && !line.contains('$'));
+        let at_the_edge = |line: &str| Some(line.trim_start()).filter(|trimmed| is_type(trimmed)).unwrap_or(line).to_owned();
+        let code = format!("\n{}", code_of(source).lines().map(at_the_edge).collect::<Vec<_>>().join("\n"));
         let names = |item: &str| match item.strip_prefix("use ").and_then(|rest| rest.split(';').next()) {
             Some(tree) => opened(tree).iter().map(|used| path(used.rsplit([':', ' ']).next().unwrap_or_default())).collect(),
             None => {

@@ -155,7 +155,7 @@ impl Scene {
             };
             let observer = Observer { cancelled, report: &report };
             let scene = PreparedScene::read(&request, &observer)?;
-            scene.geometry(&observer)?;
+            scene.make_geometry(&observer)?;
             Ok((scene, warnings.take()))
         })?;
         error::warn(py, &warnings)?;
