@@ -25,6 +25,7 @@ pub struct RenderRequest {
 
     pub exposure: Option<Stops>,
     pub tone: Option<Tone>,
+    pub white_balance: Option<f32>,
     pub layers: Option<Layers>,
     pub denoise: bool,
 
