@@ -89,11 +89,12 @@ pub(super) fn run(args: &MergeArgs) -> Result<()> {
             size: (width, height),
             exposure: args.exposure.map(|Stops(stops)| stops),
             tone: args.tone.map_or(Tone::default(), Tone::from),
+            white_balance: None,
             layers: Layer::ALL.into(),
             denoised: None,
         };
         files.extend(picture.zip(format).map(|(picture, format)| {
-            let metadata = |stops| metadata(args.command(format), &run, film, units(format, stops, show.tone));
+            let metadata = |stops| metadata(args.command(format), &run, film, units(format, stops, &show));
             let content = if format == Format::Exr { show.exr(film, &[], Some(&metadata(0.0))) } else { show.png(film, metadata).0 };
             (picture, content)
         }));

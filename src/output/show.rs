@@ -5,6 +5,7 @@ use glam::{DVec3, Vec3};
 use super::colour::{ColourImage, Format, Tone};
 use super::exr_file::{self, Channel, channels};
 use super::metadata::Metadata;
+use super::white_balance;
 use crate::constants::PART_COUNT;
 use crate::engine::scene::SceneFilm;
 use crate::scene::{Camera, Scene};
@@ -60,14 +61,15 @@ pub(crate) fn surfaces(scene: &Scene, camera: &Camera, size: (u32, u32)) -> Vec<
 }
 
 /// What a file's values are.
-pub(crate) fn units(format: Format, stops: f32, tone: Tone) -> String {
-    let tone = match tone {
+pub(crate) fn units(format: Format, stops: f32, show: &Show) -> String {
+    let white = show.white_balance.map_or_else(String::new, |kelvin| format!(", white balance {kelvin} K"));
+    let tone = match show.tone {
         Tone::Neutral => "Khronos PBR Neutral",
         Tone::Linear => "linear",
     };
     match format {
         Format::Exr => "radiance, W/m2/sr, linear, Rec. 709 primaries".to_owned(),
-        Format::Png => format!("sRGB; exposure {stops:+.2} stops, tone curve {tone}"),
+        Format::Png => format!("sRGB; exposure {stops:+.2} stops, tone curve {tone}{white}"),
     }
 }
 
@@ -78,6 +80,8 @@ pub(crate) struct Show {
     /// In stops; `None`: what makes the mean middle grey.
     pub exposure: Option<f32>,
     pub tone: Tone,
+    /// Of a PNG: the colour temperature that is white, kelvin.
+    pub white_balance: Option<f32>,
     /// Of an EXR.
     pub layers: Vec<Layer>,
     /// Radiance in place of the film's; layers are the film's in any case.
@@ -92,15 +96,25 @@ impl Show {
 
     /// The picture alone, as one is shown while the run goes on.
     pub(crate) fn so_far(&self, film: &SceneFilm, format: Format) -> Vec<u8> {
-        let image = self.image(film);
+        let image = if format == Format::Png { self.balanced(film) } else { self.image(film) };
         image.encode(format, self.stops(&image), self.tone, None)
     }
 
     /// A PNG, and its exposure in stops; what its file says of it follows from these.
     pub(crate) fn png(&self, film: &SceneFilm, metadata: impl FnOnce(f32) -> Metadata) -> (Vec<u8>, f32) {
-        let image = self.image(film);
+        let image = self.balanced(film);
         let stops = self.stops(&image);
         (image.encode(Format::Png, stops, self.tone, Some(&metadata(stops))), stops)
+    }
+
+    /// The image for the eye.
+    fn balanced(&self, film: &SceneFilm) -> ColourImage {
+        let mut image = self.image(film);
+        if let Some(kelvin) = self.white_balance {
+            let adaptation = white_balance::adaptation(kelvin).as_mat3();
+            image.pixels.iter_mut().for_each(|pixel| *pixel = adaptation * *pixel);
+        }
+        image
     }
 
     /// An EXR.

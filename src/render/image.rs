@@ -22,6 +22,7 @@ use crate::output::colour::Format;
 use crate::output::destination::{Destination, write_all};
 use crate::output::metadata::{Metadata, Repeat, devices, errors};
 use crate::output::show::{Layer, Show, Surface, surfaces, units};
+use crate::output::white_balance;
 use crate::plan::work_division::Division;
 use crate::scene::{Camera, Scene};
 use crate::settings::scene::{Part, SceneSettings};
@@ -96,7 +97,14 @@ fn blocks_with_gaps(resumed: Option<&SavedRun>) -> u32 {
 /// How the image of a request is shown.
 pub(crate) fn show(request: &RenderRequest, size: (u32, u32)) -> Show {
     let layers = request.layers.as_ref().map_or(Layer::ALL.into(), |layers| layers.0.clone());
-    Show { size, exposure: request.exposure.map(|stops| stops.0), tone: request.tone.unwrap_or_default(), layers, denoised: None }
+    Show {
+        size,
+        exposure: request.exposure.map(|stops| stops.0),
+        tone: request.tone.unwrap_or_default(),
+        white_balance: request.white_balance,
+        layers,
+        denoised: None,
+    }
 }
 
 /// Refuses what the format of an image's file does not have.
@@ -106,6 +114,10 @@ pub(crate) fn check_format(request: &RenderRequest, path: Option<&Path>) -> Resu
     let of_png = "is for PNG only: an EXR holds linear radiance";
     if let Some(exposure) = request.exposure {
         require(format == Some(Format::Png), "exposure", exposure.0, of_png)?;
+    }
+    if let Some(kelvin) = request.white_balance {
+        require(path.is_none() || format == Some(Format::Png), "white_balance", kelvin, of_png)?;
+        white_balance::check(kelvin)?;
     }
     if request.layers.is_some() && path.is_some() {
         require(format == Some(Format::Exr), "layers", name(), "is for EXR only: a PNG holds what the eye sees")?;
@@ -150,8 +162,7 @@ impl Image {
             format!("\ndirect light is denoised by {denoiser}; all errors are those of the picture before that, and layers are as rendered")
         });
         let show = Show { denoised, ..show };
-        let metadata =
-            |stops: f32| Metadata { denoiser: denoiser.clone(), ..self.metadata(style, units(format, stops, show.tone), format) };
+        let metadata = |stops: f32| Metadata { denoiser: denoiser.clone(), ..self.metadata(style, units(format, stops, &show), format) };
         if format == Format::Png {
             let (content, stops) = show.png(film, metadata);
             return (content, format!(" at {stops:+.2} stops{by}"));

@@ -25,6 +25,7 @@ pub struct RenderRequest {
 
     pub exposure: Option<Stops>,
     pub tone: Option<Tone>,
+    pub white_balance: Option<f32>,
     pub layers: Option<Layers>,
     pub denoise: bool,
 
@@ -46,7 +47,7 @@ pub struct RenderRequest {
     pub focus: Option<f64>,
     pub emission: Option<EmissionLaw>,
     pub shininess: Option<Shininess>,
-    pub(crate) phong_direction: Option<PhongDirection>,
+    pub phong_direction: Option<PhongDirection>,
     pub reflectance: Option<f32>,
     pub light_radius: Option<f64>,
     pub light_power: Option<Watts>,
@@ -60,9 +61,9 @@ pub struct RenderRequest {
     pub checkpoint: Option<PathBuf>,
     pub every: Option<Seconds>,
     pub resume: Option<PathBuf>,
-    pub(crate) shard: Option<blocks::Share>,
+    pub shard: Option<blocks::Share>,
 
-    pub(crate) preset: Option<Preset>,
+    pub preset: Option<Preset>,
     pub photons: Option<u32>,
     pub caustic_photons: Option<u32>,
     pub bounces: Option<u32>,
@@ -70,7 +71,7 @@ pub struct RenderRequest {
     pub map: Option<PathBuf>,
     pub rounds: Option<u32>,
     pub block: Option<u32>,
-    pub(crate) rng: Option<Rng>,
+    pub rng: Option<Rng>,
     pub seed: Option<u64>,
 
     pub illumination: Option<Illumination>,
@@ -97,8 +98,8 @@ pub struct RenderRequest {
     pub mesh: Option<u32>,
 
     pub variant: Option<Variant>,
-    pub(crate) gather: Option<Gather>,
-    pub(crate) sums: Option<Sums>,
+    pub gather: Option<Gather>,
+    pub sums: Option<Sums>,
     pub counters: Option<u32>,
     pub threads: Option<Threads>,
     pub math: Option<Math>,

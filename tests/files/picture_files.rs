@@ -223,11 +223,16 @@ fn albedos_have_textures_and_normals_are_smooth() {
 fn files_say_how_they_were_made() {
     let Some(gpu) = device() else { return };
     let place = Place::new();
-    place.succeed(&format!("render cornell --rounds 8 --seed 7 --samples 2 --exposure -1.5 -o a.png {SMALL}"));
+    place.succeed(&format!("render cornell --rounds 8 --seed 7 --samples 2 --exposure -1.5 --white-balance 3000 -o a.png {SMALL}"));
     place.succeed(&format!("render cornell --rounds 8 --seed 7 --samples 2 -o a.exr --json a.json {SMALL}"));
     let report = place.json("a.json");
     let [png, exr] = ["a.png", "a.exr"].map(|name| Metadata::read(&place.content(name)).unwrap());
-    assert!(png.units.contains("exposure -1.50 stops") && exr.units.contains("W/m2/sr"), "{}, {}", png.units, exr.units);
+    assert!(
+        png.units.ends_with("exposure -1.50 stops, tone curve Khronos PBR Neutral, white balance 3000 K") && exr.units.contains("W/m2/sr"),
+        "{}, {}",
+        png.units,
+        exr.units
+    );
     for made in [&png, &exr] {
         assert_eq!((made.photonmill.as_str(), made.scene.as_str(), made.seed, made.rounds), (env!("CARGO_PKG_VERSION"), "cornell", 7, 8));
         assert_eq!(made.devices, [format!("{}, {}", gpu.facts().name, gpu.facts().driver)]);

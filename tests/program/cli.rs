@@ -76,6 +76,8 @@ fn bad_input_is_refused_in_one_line() {
         ("render cornell -o a.png --radius", "-1e-1", "above 0"),
         ("render cornell -o a.png --caustic-radius", "-0.0", "above 0"),
         ("render cornell -o a.png --exposure", "1e3", "from -64 to 64"),
+        ("render cornell -o a.png --white-balance", "1000", "from 1667 to 25000 K"),
+        ("render cornell -o a.exr --white-balance", "3000", "is for PNG only"),
         ("render cornell -o a.png --judge", "01", "from 2 to"),
         ("render cornell -o a.png --error", "200.0%", "to 100 %"),
         ("render cornell -o a.png --size", "-16x16", "from 1 to 65535"),
