@@ -30,6 +30,8 @@ fn main() {
 
     let modules = modules(&glsl);
     let spirv = out.join("spirv");
+    // Kernels that are gone stay in an old folder, and the packed crate would have them.
+    let _ = fs::remove_dir_all(&spirv);
     fs::create_dir_all(&spirv).expect("OUT_DIR can be written");
     let mut structs = String::new();
     let mut layouts = String::new();

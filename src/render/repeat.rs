@@ -34,7 +34,7 @@ pub struct Repeated {
 /// What each round of an image did.
 #[derive(Debug, Clone)]
 pub struct RoundsOf {
-    pub(crate) division: Division,
+    pub division: Division,
     pub tiles: Option<TileSamples>,
 }
 

@@ -30,7 +30,7 @@ pub struct TunedSettings {
     size: [u32; 2],
     /// Class of the device.
     device: String,
-    pub(crate) settings: Division,
+    pub settings: Division,
     /// Tiles with more samples than all pixels have.
     tiles: Option<TileSamples>,
     /// Rounds that the goal was expected to take, whole blocks.

@@ -113,7 +113,7 @@ pub enum PhongDirection {
 /// The paper's experiments.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub(crate) enum Preset {
+pub enum Preset {
     /// Figure 1: naive slots, 2 bounces.
     Naive,
     /// Figure 2: the modified implementation, 15 bounces.

@@ -11,7 +11,7 @@ pub(crate) struct Blocks(Vec<Range<u32>>);
 
 /// Every so many-th block of a run, from block `number` on: all of them, where nothing is shared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct Share {
+pub struct Share {
     pub number: u32,
     pub of: u32,
 }

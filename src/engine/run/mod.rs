@@ -1,6 +1,6 @@
 //! The one loop over rounds, of every run: until something ends it, with the fate of every photon.
 
-pub(crate) mod blocks;
+pub mod blocks;
 pub(crate) mod identity;
 mod recorder;
 mod result;

@@ -150,7 +150,7 @@ impl SavedRun {
     }
 
     /// Blocks that it should have and does not.
-    #[cfg(test)]
+    #[cfg(any(test, fuzzing))]
     pub(crate) fn missing(&self) -> u32 {
         self.share.missing(&self.done, self.wanted)
     }

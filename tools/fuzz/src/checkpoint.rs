@@ -50,7 +50,14 @@ pub(crate) fn use_run(run: &SavedRun) {
         let _ = (film.mean(pixel), film.standard_error(pixel));
     }
     if let Some(Sensor::Picture { width, height }) = run.sensor {
-        let show = Show { size: (width, height), exposure: None, tone: Tone::default(), layers: Layer::ALL.into(), denoised: None };
+        let show = Show {
+            size: (width, height),
+            exposure: None,
+            tone: Tone::default(),
+            white_balance: None,
+            layers: Layer::ALL.into(),
+            denoised: None,
+        };
         let metadata = metadata(run, film, report[KEY].as_str().expect("a report says which version wrote it"));
         for file in [show.exr(film, &[], Some(&metadata)), show.png(film, |_| metadata.clone()).0] {
             assert_eq!(Metadata::read(&file).as_ref(), Ok(&metadata), "a picture says how it was made");
