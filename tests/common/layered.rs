@@ -62,7 +62,7 @@ pub fn inputs(material: &Material) -> Inputs {
 
 /// Its lobes where a normal map, of the coat too, has turned the normal.
 pub fn lobes_at(material: &Material, place: &Place, n: DVec3) -> Lobes {
-    Lobes::new(inputs(material), Frame { wo: place.wo, ng: place.normal, n, coat_n: n })
+    Lobes::new(&inputs(material), Frame { wo: place.wo, ng: place.normal, n, coat_n: n })
 }
 
 /// Radiance towards the eye under a sun of 1 W/m2 in this direction: each lobe times the cosine to its own normal.
@@ -190,7 +190,7 @@ pub fn lobes_in_the_sun(gpu: &Gpu, materials: &[Material], is_inside: bool) -> C
                 mesh.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
             }
             let inputs = if is_inside { from_inside(material) } else { inputs(material) };
-            lobes.push((Lobes::new(inputs, Frame { wo: place.wo, ng: n, n, coat_n: n }), DVec3::ZERO));
+            lobes.push((Lobes::new(&inputs, Frame { wo: place.wo, ng: n, n, coat_n: n }), DVec3::ZERO));
         }
     }
     // What the kernels interpolate in tables, and refraction within the width of a pixel.
@@ -261,7 +261,7 @@ pub fn coats_and_backs_in_the_sun(gpu: &Gpu) -> Check<Complaint> {
             (mesh.tangents, mesh.coat_tangents) = (vec![[place.x.extend(1.0); 3]; 2], vec![[place.x.extend(sign); 3]; 2]);
             let n = mapped_normal(LEANS[1], 1.0, (place.x, place.y, place.normal), place.wo);
             let coat_n = mapped_normal(LEANS[4], f64::from(0.7f32), (place.x, sign * place.y, place.normal), place.wo);
-            lobes.push((Lobes::new(inputs(&material), Frame { wo: place.wo, ng: place.normal, n, coat_n }), DVec3::ZERO));
+            lobes.push((Lobes::new(&inputs(&material), Frame { wo: place.wo, ng: place.normal, n, coat_n }), DVec3::ZERO));
 
             let material = Material { normal_map: Some(map_of(1, 1.0)), two_sided: true, ..dull(0.6) };
             let (place, mesh) = plates.add(row, material.clone());

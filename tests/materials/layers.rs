@@ -305,7 +305,7 @@ fn plates_in_the_sun_have_the_lobes_of_the_guide() {
             let along = alpha + (f64::from(layers.anisotropy) * blue).powi(2) * (1.0 - alpha);
             let inputs = Inputs { stretch: Some((tangent, along)), ..inputs(&material) };
             let frame = Frame { wo: place.wo, ng: place.normal, n: place.normal, coat_n: place.normal };
-            expected.push((Lobes::new(inputs, frame), DVec3::ZERO));
+            expected.push((Lobes::new(&inputs, frame), DVec3::ZERO));
         }
         for material in &covered {
             let place = plates.add(row, material.clone()).0;

@@ -132,7 +132,7 @@ pub(super) fn judged(case: &LobeCase) -> Lobes {
         sheen_colour: case.sheen.as_dvec3(),
         sheen_s: case.sheen_alpha.into(),
     };
-    Lobes::new(inputs, Frame { wo: unit(case.wo), ng: unit(case.ng), n: unit(case.ns), coat_n: unit(case.coat_normal) })
+    Lobes::new(&inputs, Frame { wo: unit(case.wo), ng: unit(case.ng), n: unit(case.ns), coat_n: unit(case.coat_normal) })
 }
 
 /// A direction with the digits that rounding took from its largest component.

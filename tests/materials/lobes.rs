@@ -33,7 +33,7 @@ fn wo(cosine: f64) -> DVec3 {
 }
 
 fn lobes(inputs: &Inputs, wo: DVec3) -> Lobes {
-    Lobes::new(*inputs, Frame { wo, ng: DVec3::Z, n: DVec3::Z, coat_n: DVec3::Z })
+    Lobes::new(inputs, Frame { wo, ng: DVec3::Z, n: DVec3::Z, coat_n: DVec3::Z })
 }
 
 /// Of every lobe alone and of mixtures.
@@ -212,7 +212,7 @@ fn lobes_are_reciprocal() {
                     wall => wall,
                 };
                 let n = side * DVec3::Z;
-                let back = Lobes::new(Inputs { wall, ..inputs }, Frame { wo: l, ng: n, n, coat_n: n }).evaluate(kind, v);
+                let back = Lobes::new(&Inputs { wall, ..inputs }, Frame { wo: l, ng: n, n, coat_n: n }).evaluate(kind, v);
                 let off = (flux_scale(inputs.wall, kind) * there - back).abs();
                 assert!(off.cmple(1e-9 * (back.abs() + 1e-3)).all(), "{what}, {kind:?}: {there} and {back} between {v} and {l}");
                 tested += u32::from(there.max_element() > 0.0);

@@ -139,6 +139,6 @@ impl<'a> Geometry<'a> {
             sheen_colour: layers.sheen_colour.as_dvec3() * texel(layers.sheen_colour_texture).truncate(),
             sheen_s: squared(layers.sheen_roughness, texel(layers.sheen_roughness_texture).w).max(LEAST_SHEEN),
         };
-        Lobes::new(inputs, Frame { wo, ng: vertex.ng, n, coat_n })
+        Lobes::new(&inputs, Frame { wo, ng: vertex.ng, n, coat_n })
     }
 }

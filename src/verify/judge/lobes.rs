@@ -184,7 +184,7 @@ fn along_normal(from: f64, to: f64) -> f64 {
 }
 
 impl Lobes {
-    pub(crate) fn new(inputs: Inputs, frame: Frame) -> Lobes {
+    pub(crate) fn new(inputs: &Inputs, frame: Frame) -> Lobes {
         // An ior of 0 stands for an infinite one.
         let f0 = inputs.f0(if inputs.ior == 0.0 { 1.0 } else { along_normal(inputs.ior, 1.0) });
         let f0_transmission = match inputs.wall {
@@ -193,8 +193,16 @@ impl Lobes {
         };
         let coat_leaves = (1.0 - inputs.coat_albedo(frame.coat_n.dot(frame.wo))).max(0.0);
         let sheen_leaves = (1.0 - inputs.sheen_albedo(frame.n.dot(frame.wo))).max(0.0);
-        let mut lobes =
-            Lobes { inputs, frame, f0, f0_transmission, diffuse: 0.0, coat_leaves, sheen_leaves, chances: [(Kind::Diffuse, 0.0); 6] };
+        let mut lobes = Lobes {
+            inputs: *inputs,
+            frame,
+            f0,
+            f0_transmission,
+            diffuse: 0.0,
+            coat_leaves,
+            sheen_leaves,
+            chances: [(Kind::Diffuse, 0.0); 6],
+        };
         let n_v = frame.n.dot(frame.wo);
         if inputs.diffuse_colour().max_element() > 0.0 || inputs.colour_beyond().max_element() > 0.0 {
             // As of one normal: of two, no more gets through.
