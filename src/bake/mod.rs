@@ -38,7 +38,6 @@
 //! - `scene.gltf` shows the baked light in every viewer and in Blender. The materials that
 //!   have a map are black and emit `NAME_radiance.png`, so that lamps and environments of the
 //!   viewer add nothing to them. A texture finer than the lightmap is as coarse as the lightmap there.
-//!   [`preview`] is the same in one file.
 //! - `scene_lightmap.gltf` is for engines. Its materials are the scene's, with `NAME_lightmap.png` as
 //!   MOZ_lightmap, read as three.js reads it: texel times intensity is irradiance (times the
 //!   exposure), to be multiplied with base colour / pi. It has no punctual lights: the lightmap holds
