@@ -117,7 +117,7 @@ pub const ROWS: &[Row] = rows! {
         exposure "STOPS" Image R
             "Exposure of a PNG in stops, each of which doubles the brightness" default "what makes the mean middle grey";
         tone "CURVE" Image R "Tone curve of a PNG" default "neutral";
-        white_balance "KELVIN" Image R "Show light of this colour temperature as white in a PNG" default "6500, that of sRGB's own white"
+        white_balance "KELVIN" Image R "Show light of this colour temperature as white in a PNG" default "daylight, sRGB's own white"
             requires "output";
         layers "all|none|LAYER,..." Image R
             "Layers of an EXR beside the light: all, none, or some of direct, specular, caustic, indirect, standard_error, unseen, albedo, normal and depth"

@@ -81,7 +81,7 @@ class Settings(TypedDict, total=False):
     save_settings: str | PathLike[str] | None
     """Write what the pilot has chosen for settings. Of pictures only."""
     white_balance: float | None
-    """Show light of this colour temperature as white in a PNG, kelvin; 6500, that of sRGB's own white."""
+    """Show light of this colour temperature as white in a PNG, kelvin; daylight, sRGB's own white."""
     denoise: bool | None
     """Remove noise from direct light in files of the picture with Open Image Denoise. Of pictures only."""
     eye: Sequence[float] | None
