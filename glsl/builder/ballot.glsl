@@ -1,5 +1,5 @@
 // One atomic per subgroup instead of one per thread: ballots find the survivors, exclusive bit counts their order, and a broadcast
-// broadcasts where the subgroup's block begins.
+// says where the subgroup's block begins.
 
 const uint PLACES = PATHS_EACH;
 

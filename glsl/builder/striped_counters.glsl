@@ -1,5 +1,5 @@
-// Places from one counter of several, so that no single one has to serve all work groups of a device: they use them round-robin:
-// the counters, and the counters at blocks of places as long as a work group. The last blocks of some counters then have
+// Places from one counter of several, so that no single one has to serve all work groups of a device: they take the
+// counters round-robin, and each counter's places in blocks as long as a work group. The last blocks of some counters then have
 // gaps, which kernels/fill_gaps.comp marks as empty. Kernels that include this have work groups of the same length, and
 // lists_end(), the number of counters before these.
 

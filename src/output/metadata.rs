@@ -132,7 +132,7 @@ impl Metadata {
     }
 
     /// Of the content of a .png or .exr; fails with why there is none.
-    pub(crate) fn read(content: &[u8]) -> Result<Metadata, String> {
+    pub fn read(content: &[u8]) -> Result<Metadata, String> {
         let absent = || "holds nothing of how it was made: either photonmill did not write it, or another program has saved it since";
         let json = if content.starts_with(b"\x89PNG") { png_text(content)? } else { exr_attribute(content)? }.ok_or_else(absent)?;
         if json.len() > MOST_BYTES {

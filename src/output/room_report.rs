@@ -36,7 +36,7 @@ struct Report<'a> {
 struct PlanReport<'a> {
     decisions: &'a [Decision],
     light_photons: &'a [u32],
-    /// That the atomic builder's work groups use round-robin.
+    /// Counters that the atomic builder's work groups use round-robin.
     counters: u32,
     chunks_per_round: u32,
     photon_map_entries: u32,

@@ -14,7 +14,7 @@ pub(crate) fn check(kelvin: f32) -> Result<()> {
 /// What takes linear Rec. 709 values of a scene to those of an image in which a black body of this temperature is white: by the cones'
 /// responses, each scaled by itself (Bradford: Lam 1985).
 pub(crate) fn adaptation(kelvin: f32) -> DMat3 {
-    let [x, y] = planckian(f64::from(kelvin));
+    let [x, y] = planckian(f64::from(kelvin.clamp(*TEMPERATURES.start(), *TEMPERATURES.end())));
     let white = DVec3::new(x / y, 1.0, (1.0 - x - y) / y);
     let cones = DMat3::from_cols_array_2d(&[[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]]).transpose();
     let of_rgb = cones * XYZ_OF_RGB.transpose();

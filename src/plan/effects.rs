@@ -86,7 +86,11 @@ fn row(effect: Effect) -> Row {
         },
         Effect::Layers => Row {
             constant: Some("HAS_LAYERS"),
-            needed: |facts| facts.found("layered", |material| material.surface == Surface::Layered, "no glTF material"),
+            // A Lambertian surface of a file is layered where it is to have one side (see TwoSided).
+            needed: |facts| {
+                let is_layered = |of: &Material| of.surface == Surface::Layered || facts.has_one_sides && of.is_lambertian();
+                facts.found("layered", is_layered, "no layered material")
+            },
             remove: |scene| make_lambert(scene, |surface| surface == Surface::Layered),
             ..PLAIN
         },
@@ -257,7 +261,13 @@ fn row(effect: Effect) -> Row {
         Effect::TwoSided => Row {
             constant: Some("HAS_TWO_SIDED"),
             needed: |facts| facts.found("two-sided", Material::has_two_sides, "no two-sided material"),
-            remove: |scene| each_material(scene, |material| material.two_sided = false),
+            remove: |scene| {
+                each_material(scene, |material| {
+                    // The eye sees no back of a file's surfaces, and a black one of built-in ones.
+                    material.surface = if material.is_lambertian() { Surface::Layered } else { material.surface };
+                    material.two_sided = false;
+                });
+            },
             ..PLAIN
         },
         Effect::SmoothNormals => Row {

@@ -42,6 +42,8 @@ pub(super) struct Facts<'a> {
     is_picture: bool,
     /// Some indirect light comes by a gather ray, at whose end there is light of all kinds.
     pub(super) gathers: bool,
+    /// Surfaces with two sides are asked to have one.
+    pub(super) has_one_sides: bool,
 }
 
 impl<'a> Facts<'a> {
@@ -68,6 +70,7 @@ impl<'a> Facts<'a> {
             part: settings.part,
             is_picture: matches!(sensor, Sensor::Picture { .. }),
             gathers: settings.final_gather || glossy && settings.illumination == Illumination::Split,
+            has_one_sides: settings.without.contains(&Effect::TwoSided),
         }
     }
 

@@ -117,7 +117,6 @@ pub(crate) fn check_format(request: &RenderRequest, path: Option<&Path>) -> Resu
     }
     if let Some(kelvin) = request.white_balance {
         require(path.is_none() || format == Some(Format::Png), "white_balance", kelvin, of_png)?;
-        white_balance::check(kelvin)?;
     }
     if request.layers.is_some() && path.is_some() {
         require(format == Some(Format::Exr), "layers", name(), "is for EXR only: a PNG holds what the eye sees")?;
@@ -139,12 +138,15 @@ impl Image {
     /// The same with the exposure, the tone and the layers of another request.
     pub fn save_as(&self, path: &Path, style: &RenderRequest, observer: &Observer) -> Result<()> {
         let format = Format::of("output", path)?;
+        style.white_balance.map_or(Ok(()), white_balance::check)?;
         let destination = Destination::open("output", path)?;
         write_all([(destination, self.file(style, format, observer).0)])
     }
 
     /// The content of such a file, and in words its exposure and who has changed it.
     pub fn file(&self, style: &RenderRequest, format: Format, observer: &Observer) -> (Vec<u8>, String) {
+        // An EXR has none, and its command must not ask for it.
+        let style = &RenderRequest { white_balance: style.white_balance.filter(|_| format == Format::Png), ..style.clone() };
         let show = show(style, self.size);
         let film = &self.run.film;
         let has_layers = format == Format::Exr && show.shows_surfaces();

@@ -1121,6 +1121,8 @@ fn plain_diffuse_materials_are_lambertian() {
         "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0.3, "baseColorTexture": {"index": 0}}});
     let surface = |material: &Value| load_material(material.clone()).materials[0].surface;
     assert_eq!(surface(&plain), Surface::Lambert);
+    // The eye does not see the back of what then has one side.
+    assert_eq!(load_material(plain.clone()).without(&[Effect::TwoSided]).materials[0].surface, Surface::Layered);
     for (member, value) in [
         ("doubleSided", json!(false)),
         ("alphaMode", json!("BLEND")),

@@ -1,6 +1,6 @@
 // Both ways at smooth glass. Where the eye's path meets a surface that sends light on in several directions, each without any spread, it
 // takes one of them by chance, as what scatters beyond varies little. What emits light may be brighter than all else, a lamp in glass
-// that shows 4 % of it for example. So the other ways are followed too, for what emits light and nothing else, and the path counts what emits light as
+// that shows 4 % of it for example. So the other ways are followed too, for emission alone, and the path counts emission as
 // if it had been certain to take its own: all of it is then counted once, and none by chance.
 
 // At few surfaces of a path, and so many ways in all.

@@ -1,4 +1,4 @@
-//! Materials: each becomes a layered one, with every factor and texture that the scene simulates.
+//! Materials: each becomes a layered one, with every factor and texture that is simulated; plain diffuse ones become Lambertian.
 
 use std::borrow::Borrow;
 
@@ -104,7 +104,12 @@ impl Reader<'_> {
         let normal_map = self.normal_map(json.normal_texture.as_ref())?;
         let emission_texture = self.texture(json.emissive_texture.as_ref(), Meaning::Colours)?;
         let material = Material { emission, emission_texture, normal_map, layers, ..read };
-        Ok(if material.is_lambertian() { Material { surface: Surface::Lambert, ..material } } else { material })
+        if material.is_lambertian() {
+            // Nothing asks for what no lobe uses.
+            let layers = Layers { anisotropy: 0.0, ..layers.without_textures() };
+            return Ok(Material { surface: Surface::Lambert, layers, ..material });
+        }
+        Ok(material)
     }
 
     /// What KHR_materials_pbrSpecularGlossiness has in place of [`METALLIC_ROUGHNESS`].

@@ -2,7 +2,7 @@
 //!
 //! Read: meshes with node transforms and instances, skins and morph targets in the pose at rest or at a time of the first animation,
 //! quantized or compressed or not, smooth normals, tangents, two sets of texture coordinates and their transforms, vertex colours,
-//! materials as [`super::Surface::Layered`] with all that [`super::material::Layers`] has, KHR_lights_punctual, cameras in perspective
+//! materials as [`super::Surface::Layered`] (plain diffuse ones as Lambertian) with all that [`super::material::Layers`] has, KHR_lights_punctual, cameras in perspective
 //! and orthographic ones. Whatever else the file holds is named in a warning.
 
 mod accessor;
