@@ -54,24 +54,6 @@ impl HeldMemory {
 }
 
 /// A buffer of elements of one type: one in another's place does not compile.
-///
-/// ```
-/// use photonmill::gpu::{Buffer, kernels::MapCount};
-/// use photonmill::photon::MapPhoton;
-///
-/// fn kernel<'a>(map: &'a Buffer<MapPhoton>, counters: &'a Buffer<u32>, cells: &'a Buffer<u32>, ranks: &'a Buffer<u32>) -> MapCount<'a> {
-///     MapCount { map, counters, cells, ranks }
-/// }
-/// ```
-///
-/// ```compile_fail,E0308
-/// use photonmill::gpu::{Buffer, kernels::MapCount};
-/// use photonmill::photon::MapPhoton;
-///
-/// fn kernel<'a>(map: &'a Buffer<MapPhoton>, counters: &'a Buffer<u32>, cells: &'a Buffer<u32>, ranks: &'a Buffer<u32>) -> MapCount<'a> {
-///     MapCount { map: counters, counters, cells, ranks }
-/// }
-/// ```
 pub(crate) struct Buffer<T> {
     any: AnyBuffer,
     element: PhantomData<T>,
