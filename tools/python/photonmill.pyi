@@ -80,8 +80,6 @@ class Settings(TypedDict, total=False):
     """Take what a pilot has chosen from a file of save_settings, and run no pilot."""
     save_settings: str | PathLike[str] | None
     """Write what the pilot has chosen for settings. Of pictures only."""
-    white_balance: float | None
-    """Show light of this colour temperature as white in a PNG, kelvin; daylight, sRGB's own white."""
     denoise: bool | None
     """Remove noise from direct light in files of the picture with Open Image Denoise. Of pictures only."""
     eye: Sequence[float] | None

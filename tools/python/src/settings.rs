@@ -13,7 +13,7 @@ use pyo3::types::{PyBool, PyDict};
 use crate::error::{self, keyword};
 
 /// Rows of other arguments: the camera and the size of its picture, and what a picture's file is written with.
-const ELSEWHERE: [&str; 5] = ["camera", "size", "exposure", "tone", "layers"];
+const ELSEWHERE: [&str; 6] = ["camera", "size", "exposure", "tone", "white_balance", "layers"];
 
 /// The keyword arguments of a command's call.
 fn rows(command: Command) -> impl Iterator<Item = &'static Row> {
