@@ -8,14 +8,14 @@
 layout(set = 1, binding = 4, scalar) readonly buffer VisiblePoints { VisiblePoint visible_points[]; };
 layout(set = 1, binding = 2, scalar) readonly buffer SortedMap { uvec4 sorted_map[]; };
 // Points with more than one slice: how many, the longest one's candidates; then which, and each one's candidates.
-layout(set = 1, binding = 3, scalar) buffer CrowdedPoints { uint crowded_points[]; };
+layout(set = 1, binding = 3, scalar) buffer DensePoints { uint dense_points[]; };
 
 // The point of an invocation, or NONE.
 uint point_of(uint item, uint slice)
 {
     if (push.first_slice != 0) {
-        bool has_slice = item < crowded_points[0] && crowded_points[3 + 2 * item] > slice * GATHER_SLICE;
-        return has_slice ? crowded_points[2 + 2 * item] : NONE;
+        bool has_slice = item < dense_points[0] && dense_points[3 + 2 * item] > slice * GATHER_SLICE;
+        return has_slice ? dense_points[2 + 2 * item] : NONE;
     }
     uint place = push.first_point + item;
     if (place >= push.end_point) {
@@ -255,10 +255,10 @@ void gather_photons()
         }
     }
     if (push.first_slice == 0 && passed > GATHER_SLICE && lane == 0) {
-        uint place = atomicAdd(crowded_points[0], 1);
-        crowded_points[2 + 2 * place] = index;
-        crowded_points[3 + 2 * place] = passed;
-        atomicMax(crowded_points[1], passed);
+        uint place = atomicAdd(dense_points[0], 1);
+        dense_points[2 + 2 * place] = index;
+        dense_points[3 + 2 * place] = passed;
+        atomicMax(dense_points[1], passed);
     }
     if (has_found) {
         write_sums(index);

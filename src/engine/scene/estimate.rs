@@ -43,7 +43,7 @@ pub(crate) fn cut_discs(commands: &mut Commands, round: Round, map: &MapPlan) ->
 
 /// Adds a chunk of a map to the estimates of all visible points whose class this grid serves, all where radii have no classes.
 pub(crate) fn gather(commands: &mut Commands, round: Round, map: &MapPlan, classes: Range<u32>, cells_push: CellPush) -> Result<()> {
-    let PhotonBuffers { cells, sorted_map, crowded_points, dispatch_args, .. } = round.photons();
+    let PhotonBuffers { cells, sorted_map, dense_points, dispatch_args, .. } = round.photons();
     let Round { resources, plan, number: round, .. } = round;
     let SceneResources { scene, visible_points, rough_lobes, rough_covers, estimates, near_sums, .. } = resources;
     let SceneResources { radius_classes, disc_cuts, nonfinite_values, .. } = resources;
@@ -55,7 +55,7 @@ pub(crate) fn gather(commands: &mut Commands, round: Round, map: &MapPlan, class
             commands,
             commands.facts().int64_atomics,
             [GatherVisiblePointsU64, GatherVisiblePointsTwoWords] {
-                scene, visible_points, rough_lobes, rough_covers, film: estimates, near_sums, cells, sorted_map, crowded_points,
+                scene, visible_points, rough_lobes, rough_covers, film: estimates, near_sums, cells, sorted_map, dense_points,
                 radius_classes, disc_cuts, nonfinite_values,
             },
             push,
@@ -83,11 +83,11 @@ pub(crate) fn gather(commands: &mut Commands, round: Round, map: &MapPlan, class
             first_cut: plan.first_cut(map.caustic_only),
             cells: cells_push,
         };
-        commands.fill(crowded_points, 0, 2, 0);
+        commands.fill(dense_points, 0, 2, 0);
         let groups = ((end_point - first_point) * lanes).div_ceil(plan.settings.group_size);
         dispatch(commands, &push, Extent::Groups(groups, 1))?;
         let size = DensePointsSizePush { items_per_group: plan.settings.group_size / lanes, max_groups: MAX_GROUPS };
-        commands.dispatch(DensePointsSize { crowded_points, dispatch_args }, &size, Extent::Groups(1, 1))?;
+        commands.dispatch(DensePointsSize { dense_points, dispatch_args }, &size, Extent::Groups(1, 1))?;
         dispatch(commands, &SceneGatherPush { first_slice: 1, ..push }, Extent::Indirect(dispatch_args))
     })
 }

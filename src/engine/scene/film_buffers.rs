@@ -38,7 +38,7 @@ buffers! {
         anomalies: Buffer<u32> = planned.zeroed(commands, scene::ANOMALIES)?,
         class_counts: Buffer<u32> = planned.zeroed(commands, scene::CLASS_COUNTS)?,
         /// Counts as the latest whole block left them: a block that is cut short leaves nothing in the result.
-        one_hits_of_blocks: Buffer<u32> = planned.one(scene::SINGLE_HITS_OF_BLOCKS)?,
+        single_hits_of_blocks: Buffer<u32> = planned.one(scene::SINGLE_HITS_OF_BLOCKS)?,
         part_totals_of_blocks: Buffer<u64> = planned.one(scene::PART_TOTALS_OF_BLOCKS)?,
         anomalies_of_blocks: Buffer<u32> = planned.one(scene::ANOMALIES_OF_BLOCKS)?,
     }
@@ -66,7 +66,7 @@ impl FilmBuffers {
 
     /// Notes what the block that ends leaves of the counts.
     pub(super) fn end_block(&self, commands: &mut Commands) {
-        commands.copy(&self.single_hits, &self.one_hits_of_blocks, self.single_hits.count());
+        commands.copy(&self.single_hits, &self.single_hits_of_blocks, self.single_hits.count());
         commands.copy(&self.part_totals, &self.part_totals_of_blocks, PART_COUNT.into());
         commands.copy(&self.anomalies, &self.anomalies_of_blocks, self.anomalies.count());
     }
@@ -86,7 +86,7 @@ impl FilmBuffers {
             values[(block.number % KEPT_BLOCKS) as usize * kept..][..kept].copy_from_slice(&block.values);
         }
         commands.upload(latest_blocks, &values)?;
-        for single_hits in [&self.single_hits, &self.one_hits_of_blocks] {
+        for single_hits in [&self.single_hits, &self.single_hits_of_blocks] {
             commands.upload(single_hits, &film.single_hits)?;
         }
         if let Some(parts) = &film.parts {
@@ -126,7 +126,7 @@ impl FilmBuffers {
         let FilmBuffers { sums_of_block, film_sums, film_squares, surface_sums_of_block, surface_sums, surface_squares, .. } = self;
         let (film_sums, surface_sums) = if is_whole { (film_sums, surface_sums) } else { (sums_of_block, surface_sums_of_block) };
         let (single_hits, part_totals, anomalies) = match is_whole {
-            true => (&self.one_hits_of_blocks, &self.part_totals_of_blocks, &self.anomalies_of_blocks),
+            true => (&self.single_hits_of_blocks, &self.part_totals_of_blocks, &self.anomalies_of_blocks),
             false => (&self.single_hits, &self.part_totals, &self.anomalies),
         };
         let seen = if plan.film.sees_light { pixels } else { 0 };

@@ -98,7 +98,7 @@ buffers! {
         sums_of_cells: Vec<Buffer<u32>> = planned.all(scene::SUMS_OF_CELLS)?,
         /// Points with so many candidates that several invocations share them: how many, the most candidates, and each one
         /// with its candidates.
-        crowded_points: Buffer<u32> = planned.one(scene::DENSE_POINTS)?,
+        dense_points: Buffer<u32> = planned.one(scene::DENSE_POINTS)?,
         /// What keeps photons in order; `None` where they come as they do.
         order: Option<OrderBuffers> = (plan.builder() == Builder::Scan).then(|| OrderBuffers::made(planned)).transpose()?,
         /// Fates of the submission under way, one tally a bounce: of the global map's photons, and of the
