@@ -72,7 +72,7 @@ pub mod error;
 pub mod gpu;
 #[cfg(doc)]
 pub mod guide;
-pub(crate) mod ledger;
+pub mod ledger;
 #[cfg(feature = "lab")]
 pub mod measure;
 #[expect(unsafe_code, reason = "the functions of Open Image Denoise, which is loaded at run time, are unsafe")]
@@ -87,7 +87,7 @@ pub mod rng;
 pub mod scene;
 pub mod settings;
 pub mod text;
-pub(crate) mod timings;
+pub mod timings;
 pub(crate) mod verify;
 #[cfg(feature = "window")]
 pub(crate) mod window;

@@ -14,7 +14,7 @@ use crate::engine::scene::map_file::MapFile;
 use crate::error::{Error, Result, require};
 use crate::output::destination::{Destination, check_not_read, write_all};
 use crate::output::photon_map;
-use crate::render::map::{USUAL_ROUNDS, WrittenMap};
+use crate::render::map::{WrittenMap, by_blocks};
 use crate::render::{Event, Inputs, Observer, RenderRequest, RequestedReceivers, prepare};
 use crate::text::counted;
 
@@ -120,13 +120,7 @@ pub(super) fn run(args: &MapArgs, cancelled: &AtomicBool) -> Result<End> {
 }
 
 fn make(args: &MakeArgs, cancelled: &AtomicBool) -> Result<End> {
-    // Of a block each: rounds know nothing of each other.
-    let request = RenderRequest {
-        camera: args.camera.clone(),
-        rounds: Some(args.rounds.unwrap_or(USUAL_ROUNDS)),
-        block: Some(1),
-        ..args.request.0.clone()
-    };
+    let request = by_blocks(RenderRequest { camera: args.camera.clone(), rounds: args.rounds, ..args.request.0.clone() });
     let inputs = Inputs::open(&request)?;
     let output = Destination::open_file("-o", &args.output)?;
     check_not_read(std::slice::from_ref(&output), request.inputs())?;

@@ -15,7 +15,7 @@ pub(crate) mod planning;
 pub(crate) mod radius;
 pub(crate) mod room;
 pub(crate) mod room_effects;
-pub(crate) mod scene;
+pub mod scene;
 pub(crate) mod sensor;
 pub(crate) mod traffic;
 pub(crate) mod work_cost;

@@ -1,7 +1,11 @@
 //! The photons of a scene as a file.
 
+use std::path::Path;
+
 use super::events::{Event, Observer};
-use super::prepare::Prepared;
+use super::prepare::{Inputs, Prepared, RequestedReceivers};
+use super::request::RenderRequest;
+use super::scene::PreparedScene;
 use crate::engine::run::retry::until_done;
 use crate::engine::run::watch::Checkpointing;
 use crate::engine::scene::fill_map::{Filled, fill};
@@ -19,6 +23,11 @@ use crate::text::counted;
 /// Rounds of a file where nobody says how many: each is a block, and so many give the error of an image well.
 pub(crate) const USUAL_ROUNDS: u32 = 2 * LEAST_BLOCKS;
 
+/// The same with rounds of a block each: rounds of a file know nothing of each other.
+pub(crate) fn by_blocks(request: RenderRequest) -> RenderRequest {
+    RenderRequest { rounds: Some(request.rounds.unwrap_or(USUAL_ROUNDS)), block: Some(1), ..request }
+}
+
 /// A file that was written.
 pub struct WrittenMap {
     pub(crate) header: Header,
@@ -27,8 +36,29 @@ pub struct WrittenMap {
     pub failed: Option<Error>,
 }
 
+impl WrittenMap {
+    /// Rounds that the file holds.
+    pub fn rounds(&self) -> u32 {
+        self.filled.rounds
+    }
+
+    /// Photons of all rounds and maps.
+    pub fn photons(&self) -> u64 {
+        self.header.rounds.iter().flatten().map(|photons| photons.count).sum()
+    }
+}
+
+impl PreparedScene {
+    /// Traces the photons of a request's rounds, 16 unless it says how many, into a file, which [`RenderRequest::map`] takes.
+    pub fn write_map(&self, gpu: &mut Gpu, path: impl AsRef<Path>, request: &RenderRequest, observer: &Observer) -> Result<WrittenMap> {
+        let output = Destination::open_file("output", path.as_ref())?;
+        let inputs = Inputs::open(&by_blocks(request.clone()))?;
+        self.prepare(inputs, RequestedReceivers::Image(None), observer)?.write_map(gpu, &output, observer)
+    }
+}
+
 impl Prepared {
-    /// Traces the photons of all rounds into a file. The rounds should be of a block each, as they know nothing of each other.
+    /// Traces the photons of all rounds into a file. The rounds should be of a block each ([`by_blocks`]).
     pub(crate) fn write_map(&self, gpu: &mut Gpu, output: &Destination, observer: &Observer) -> Result<WrittenMap> {
         let (scene, geometry, settings) = (&*self.scene, &*self.geometry, &self.inputs.settings);
         let find = |gpu: &Gpu| trial::find(gpu, scene, &self.viewpoint(), settings, self.sensor);

@@ -38,6 +38,27 @@
 //! # assert!(lightmaps.files.iter().all(|file| std::path::Path::new("baked").join(file).is_file()) && floor.irradiance[0].x > 0.0);
 //! # Ok::<(), photonmill::error::Error>(())
 //! ```
+//!
+//! Photons of a file, and the paper's box:
+//!
+//! ```
+//! # use photonmill::gpu::{Gpu, Options};
+//! # use photonmill::render::{Observer, PreparedScene, RenderRequest, room};
+//! # let folder = tempfile::tempdir().unwrap();
+//! # std::env::set_current_dir(folder.path()).unwrap();
+//! # let mut gpus = vec![Gpu::open(&Options::default())?];
+//! let (scene, observer) = (PreparedScene::open("cornell")?, Observer::default());
+//! let request = RenderRequest { rounds: Some(2), photons: Some(4096), ..RenderRequest::default() };
+//! let map = scene.write_map(&mut gpus[0], "photons.pm", &request, &observer)?;
+//! println!("{} photons of {} rounds", map.photons(), map.rounds());
+//!
+//! let request = RenderRequest { photons: Some(1000), ..RenderRequest::default() };
+//! let image = room::render(&mut gpus, &request, &observer)?;
+//! image.save("box.png")?;
+//! println!("{} of {} photons were absorbed", image.ledger().absorbed, image.ledger().emitted);
+//! # assert!(map.photons() > 0 && map.rounds() == 2 && image.ledger().emitted == 1000 && image.timings().row("run").is_some());
+//! # Ok::<(), photonmill::error::Error>(())
+//! ```
 
 pub(crate) mod bias;
 pub(crate) mod checkpoints;

@@ -19,6 +19,7 @@ use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::output::colour::Format;
 use crate::output::metadata::{Metadata, devices};
+use crate::output::show::Layer;
 use crate::output::{colour, exr_file};
 use crate::plan::work_division::Division;
 use crate::scene::built_in;
@@ -89,10 +90,7 @@ pub fn repeat<Devices: DerefMut<Target = Vec<Gpu>>>(
     let map = request.map.as_ref().map(|path| MapFile::open("map", path)).transpose()?;
     // They are the picture's own, whatever scene they were chosen for.
     let inputs = Inputs { tuned: None, ..Inputs::with(&request, map, Some(tuned))? };
-    let inputs = inputs.for_image(
-        format == Format::Exr && show(&request, (0, 0)).layers.into_iter().any(super::super::output::show::Layer::is_part),
-        None,
-    )?;
+    let inputs = inputs.for_image(format == Format::Exr && show(&request, (0, 0)).layers.into_iter().any(Layer::is_part), None)?;
     if let (Some(before), Some(now)) = (&made.denoiser, inputs.denoiser.as_ref().map(denoise::name))
         && *before != now
     {

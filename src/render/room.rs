@@ -18,6 +18,7 @@ use crate::engine::run::watch::End;
 use crate::engine::{self, Control};
 use crate::error::{Result, require};
 use crate::gpu::Gpu;
+use crate::ledger::Ledger;
 use crate::output::colour::Format;
 use crate::output::destination::{Destination, write_all};
 use crate::output::image::overview;
@@ -33,6 +34,7 @@ use crate::settings::scene::SceneSettings;
 use crate::settings::stop::Stop;
 use crate::settings::{Builder, Preset, RoomSettings, Sums};
 use crate::text::counted;
+use crate::timings::Timings;
 
 impl RenderRequest {
     /// Settings of the paper's box: those of its experiment, but for what is asked for.
@@ -192,6 +194,23 @@ pub fn render<'a>(gpus: &mut Vec<Gpu>, request: &'a RenderRequest, observer: &Ob
 }
 
 impl RoomImage<'_> {
+    pub fn error(&self) -> FilmError {
+        room_report::error(&self.result, &self.scene)
+    }
+
+    pub fn ledger(&self) -> Ledger {
+        self.result.ledger()
+    }
+
+    pub fn timings(&self) -> &Timings {
+        &self.result.timings
+    }
+
+    /// What ended the run.
+    pub fn end(&self) -> End {
+        self.result.end
+    }
+
     pub fn devices(&self) -> Vec<String> {
         devices_of(&self.result)
     }
@@ -206,7 +225,7 @@ impl RoomImage<'_> {
     /// The content of such a file.
     pub fn file(&self, format: Format) -> Vec<u8> {
         let walls = estimate_walls(&self.result.film, &self.scene, &self.result.plan);
-        let metadata = metadata(self.request, &self.result, &room_report::error(&self.result, &self.scene), format);
+        let metadata = metadata(self.request, &self.result, &self.error(), format);
         overview(&self.scene, &walls).encode(format, Some(&metadata))
     }
 }

@@ -13,7 +13,7 @@ pub(crate) use spread::Spread;
 
 /// One line of the timing table: everything that ran under one name.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Row {
+pub struct Row {
     /// Path from the outermost scope, such as `round/build/bounce 3`.
     pub name: String,
     pub count: u64,
@@ -74,7 +74,8 @@ pub struct Timings {
 const MAX_SPANS: usize = 200_000;
 
 impl Timings {
-    pub(crate) fn rows(&self) -> &[Row] {
+    /// Every scope, in the order of calls.
+    pub fn rows(&self) -> &[Row] {
         &self.rows
     }
 
@@ -87,7 +88,8 @@ impl Timings {
         self.spans_left_out
     }
 
-    pub(crate) fn row(&self, name: &str) -> Option<&Row> {
+    /// A scope by its path, such as `round/caustic/trace`.
+    pub fn row(&self, name: &str) -> Option<&Row> {
         self.by_name.get(name).map(|&index| &self.rows[index])
     }
 
@@ -101,7 +103,7 @@ impl Timings {
     }
 
     /// Counts one more run of a scope, before its time is known, so that rows stand in call order.
-    pub fn count(&mut self, name: &str) {
+    pub(crate) fn count(&mut self, name: &str) {
         self.row_mut(name).count += 1;
     }
 
@@ -124,7 +126,7 @@ impl Timings {
     }
 
     /// Adds those of another device, which ran at the same time; its spans are left out of the trace.
-    pub fn join(&mut self, other: &Timings) {
+    pub(crate) fn join(&mut self, other: &Timings) {
         for row in &other.rows {
             let own = self.row_mut(&row.name);
             own.count += row.count;

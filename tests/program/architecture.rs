@@ -287,6 +287,14 @@ fn public_items(sources: &BTreeMap<String, String>) -> BTreeSet<String> {
     sources.iter().flat_map(of_file).collect()
 }
 
+/// Whether the modules of a path are public.
+fn is_reached(sources: &BTreeMap<String, String>, path: &str) -> bool {
+    path.match_indices("::").all(|(end, _)| {
+        let (parent, module) = path[..end].rsplit_once("::").unwrap_or(("lib", &path[..end]));
+        sources.get(parent).is_some_and(|source| format!("\n{source}").contains(&format!("\npub mod {module};")))
+    })
+}
+
 /// What is public stays as it is until x of 0.x rises, so that nothing is by chance: a list has all of it.
 #[test]
 fn what_is_public_is_promised() {
@@ -295,6 +303,12 @@ fn what_is_public_is_promised() {
     let public = public_items(&sources());
     let differences: Vec<&String> = public.symmetric_difference(&promised).collect();
     assert!(differences.is_empty(), "public and not in promised.txt, or in it and not public: {differences:?}");
+    // By one of its paths, if `pub use` shows it at several.
+    let sources = sources();
+    let name = |path: &str| path.rsplit("::").next().unwrap_or_default().to_owned();
+    let reached: BTreeSet<String> = promised.iter().filter(|path| is_reached(&sources, path)).map(|path| name(path)).collect();
+    let hidden: Vec<&String> = promised.iter().filter(|path| !reached.contains(&name(path))).collect();
+    assert!(hidden.is_empty(), "promised, in modules that are private: {hidden:?}");
 
     let a =
         "pub use b::{C, d::E as F};\npub const fn g() {}\npub(crate) fn h() {}\nimpl C {\n    pub fn i() {}\n}\nx! {\n    pub enum J {}\n}";
