@@ -4,21 +4,20 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::values::{parse_stops, value_enum};
+use super::request::{MERGE, RequestArgs};
 use super::{JsonArg, complain, optional_file, say_beside};
 use crate::engine::run::blocks::Share;
 use crate::engine::run::saved::{NotMerged, SavedFilm, SavedRun};
 use crate::engine::scene::SceneFilm;
 use crate::error::{Error, Result, require};
-use crate::output::colour::{Format, Tone};
+use crate::output::colour::Format;
 use crate::output::destination::{Destination, check_distinct, check_not_read, write_all, write_synced};
 use crate::output::merge_report;
 use crate::output::metadata::{Metadata, Repeat, errors};
-use crate::output::show::{Layer, Show, units};
+use crate::output::show::units;
 use crate::plan::sensor::Sensor;
 use crate::render::checkpoints::read;
-use crate::render::image::name_in_text;
-use crate::render::{RenderRequest, Stops};
+use crate::render::image::{check_format, name_in_text, show};
 use crate::text::quoted;
 use serde_json::Value;
 
@@ -33,12 +32,8 @@ pub(super) struct MergeArgs {
     /// Write the standard error of each pixel as an .exr, W/m2/sr; infinite where unknown
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     error_image: Option<PathBuf>,
-    /// Exposure of a PNG in stops, each of which doubles the brightness [default: what makes the mean middle grey]
-    #[arg(long, value_name = "STOPS", value_parser = parse_stops, allow_hyphen_values = true, help_heading = "Output")]
-    exposure: Option<Stops>,
-    /// Tone curve of a PNG [default: neutral]
-    #[arg(long, value_enum, value_name = "CURVE", help_heading = "Output")]
-    tone: Option<ToneArg>,
+    #[command(flatten)]
+    request: RequestArgs<MERGE>,
     #[command(flatten)]
     json: JsonArg,
     /// Write the sums of all parts, with which `--resume` of the same command goes on
@@ -49,21 +44,12 @@ pub(super) struct MergeArgs {
     partial: bool,
 }
 
-value_enum!(ToneArg => Tone {
-    /// Highlights keep their shape: Khronos PBR Neutral
-    Neutral,
-    /// What is brighter than white is white
-    Linear,
-});
-
 pub(super) fn run(args: &MergeArgs) -> Result<()> {
     let format = args.output.as_ref().map(|path| Format::of("-o", path)).transpose()?;
     if let Some(path) = &args.error_image {
         require(Format::of("--error-image", path)? == Format::Exr, "--error-image", path.display(), "must end in .exr")?;
     }
-    if let Some(Stops(exposure)) = args.exposure {
-        require(format == Some(Format::Png), "--exposure", exposure, "is for PNG only: an EXR holds linear radiance")?;
-    }
+    check_format(&args.request.0, args.output.as_deref())?;
     let picture = optional_file("-o", args.output.as_ref())?;
     let errors = optional_file("--error-image", args.error_image.as_ref())?;
     let json = optional_file("--json", args.json.json.as_ref())?;
@@ -85,14 +71,7 @@ pub(super) fn run(args: &MergeArgs) -> Result<()> {
     let film = film_of(&run, args)?;
     let mut files = Vec::new();
     if let (Some(film), Some(Sensor::Picture { width, height })) = (film, run.sensor) {
-        let show = Show {
-            size: (width, height),
-            exposure: args.exposure.map(|Stops(stops)| stops),
-            tone: args.tone.map_or(Tone::default(), Tone::from),
-            white_balance: None,
-            layers: Layer::ALL.into(),
-            denoised: None,
-        };
+        let show = show(&args.request.0, (width, height));
         files.extend(picture.zip(format).map(|(picture, format)| {
             let metadata = |stops| metadata(args.command(format), &run, film, units(format, stops, &show));
             let content = if format == Format::Exr { show.exr(film, &[], Some(&metadata(0.0))) } else { show.png(film, metadata).0 };
@@ -110,10 +89,9 @@ pub(super) fn run(args: &MergeArgs) -> Result<()> {
 impl MergeArgs {
     /// What makes the same picture.
     fn command(&self, format: Format) -> String {
-        let request = RenderRequest { exposure: self.exposure, tone: self.tone.map(Tone::from), ..RenderRequest::default() };
         let files = self.files.iter().map(|path| path.to_string_lossy().into_owned());
         let output = ["-o".to_owned(), name_in_text(format).to_owned()];
-        let words = ["photonmill", "merge"].map(str::to_owned).into_iter().chain(files).chain(request.words()).chain(output);
+        let words = ["photonmill", "merge"].map(str::to_owned).into_iter().chain(files).chain(self.request.0.words()).chain(output);
         words.map(quoted).collect::<Vec<_>>().join(" ")
     }
 }

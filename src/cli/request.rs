@@ -22,6 +22,7 @@ pub(super) const PLAN: u32 = options::Command::Plan as u32;
 #[cfg(feature = "lab")]
 pub(super) const STUDY: u32 = options::Command::Study as u32;
 pub(super) const BOX: u32 = options::Command::Box as u32;
+pub(super) const MERGE: u32 = options::Command::Merge as u32;
 
 /// What a command line calls the scene.
 const SCENE: &str = "scene";
@@ -29,7 +30,7 @@ const SCENE: &str = "scene";
 impl<const COMMAND: u32> Args for RequestArgs<COMMAND> {
     fn augment_args(command: Command) -> Command {
         let scene = Arg::new(SCENE).value_name("SCENE").help(help::scene()).required(true);
-        let scene = (COMMAND != BOX).then_some(scene);
+        let scene = has_scene(COMMAND).then_some(scene);
         scene.into_iter().chain(rows(COMMAND).map(|row| argument(row, COMMAND))).fold(command, Command::arg)
     }
 
@@ -40,7 +41,7 @@ impl<const COMMAND: u32> Args for RequestArgs<COMMAND> {
 
 impl<const COMMAND: u32> FromArgMatches for RequestArgs<COMMAND> {
     fn from_arg_matches(matches: &ArgMatches) -> Result<RequestArgs<COMMAND>, clap::Error> {
-        let scene = if COMMAND == BOX { None } else { matches.get_one::<String>(SCENE) };
+        let scene = if has_scene(COMMAND) { matches.get_one::<String>(SCENE) } else { None };
         let mut request = RenderRequest::of(scene.cloned().unwrap_or_default());
         for row in rows(COMMAND) {
             let value = (row.of)(&mut request);
@@ -58,6 +59,10 @@ impl<const COMMAND: u32> FromArgMatches for RequestArgs<COMMAND> {
         *self = RequestArgs::from_arg_matches(matches)?;
         Ok(())
     }
+}
+
+fn has_scene(command: u32) -> bool {
+    command & (BOX | MERGE) == 0
 }
 
 fn rows(command: u32) -> impl Iterator<Item = &'static Row> {

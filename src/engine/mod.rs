@@ -8,7 +8,7 @@ pub(crate) mod nonfinite_values;
 pub(crate) mod planned;
 pub(crate) mod prefix_sum;
 pub(crate) mod replay;
-pub(crate) mod room;
+pub mod room;
 pub mod run;
 pub mod scene;
 pub(crate) mod tallies;

@@ -21,5 +21,5 @@ pub(crate) mod svg;
 #[cfg(feature = "program")]
 pub(crate) mod tev;
 pub(crate) mod trace_file;
-pub(crate) mod white_balance;
+pub mod white_balance;
 pub(crate) mod words;

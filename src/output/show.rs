@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3};
 use super::colour::{ColourImage, Format, Tone};
 use super::exr_file::{self, Channel, channels};
 use super::metadata::Metadata;
-use super::white_balance;
+use super::white_balance::{Kelvin, adaptation};
 use crate::constants::PART_COUNT;
 use crate::engine::scene::SceneFilm;
 use crate::scene::{Camera, Scene};
@@ -80,8 +80,8 @@ pub(crate) struct Show {
     /// In stops; `None`: what makes the mean middle grey.
     pub exposure: Option<f32>,
     pub tone: Tone,
-    /// Of a PNG: the colour temperature that is white, kelvin.
-    pub white_balance: Option<f32>,
+    /// Of a PNG: what is white.
+    pub white_balance: Option<Kelvin>,
     /// Of an EXR.
     pub layers: Vec<Layer>,
     /// Radiance in place of the film's; layers are the film's in any case.
@@ -111,7 +111,7 @@ impl Show {
     fn balanced(&self, film: &SceneFilm) -> ColourImage {
         let mut image = self.image(film);
         if let Some(kelvin) = self.white_balance {
-            let adaptation = white_balance::adaptation(kelvin).as_mat3();
+            let adaptation = adaptation(kelvin).as_mat3();
             image.pixels.iter_mut().for_each(|pixel| *pixel = adaptation * *pixel);
         }
         image

@@ -1,20 +1,33 @@
 //! Light of one colour temperature as white.
 
+use std::fmt;
+use std::str::FromStr;
+
 use glam::{DMat3, DVec3};
 
-use crate::error::{Result, require};
+/// A colour temperature, within those that [`planckian`] is made for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Kelvin(f32);
 
-/// Colour temperatures that [`planckian`] is made for, kelvin.
-const TEMPERATURES: std::ops::RangeInclusive<f32> = 1667.0..=25_000.0;
+impl FromStr for Kelvin {
+    type Err = String;
 
-pub(crate) fn check(kelvin: f32) -> Result<()> {
-    require(TEMPERATURES.contains(&kelvin), "white_balance", kelvin, "must be from 1667 to 25000 K; a candle has 1900, daylight 6500")
+    fn from_str(text: &str) -> Result<Kelvin, String> {
+        let allowed = || "must be from 1667 to 25000 K; a candle has 1900, daylight 6500".to_owned();
+        text.trim().parse().ok().filter(|kelvin| (1667.0..=25_000.0).contains(kelvin)).map(Kelvin).ok_or_else(allowed)
+    }
+}
+
+impl fmt::Display for Kelvin {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
 }
 
 /// What takes linear Rec. 709 values of a scene to those of an image in which a black body of this temperature is white: by the cones'
 /// responses, each scaled by itself (Bradford: Lam 1985).
-pub(crate) fn adaptation(kelvin: f32) -> DMat3 {
-    let [x, y] = planckian(f64::from(kelvin.clamp(*TEMPERATURES.start(), *TEMPERATURES.end())));
+pub(crate) fn adaptation(kelvin: Kelvin) -> DMat3 {
+    let [x, y] = planckian(f64::from(kelvin.0));
     let white = DVec3::new(x / y, 1.0, (1.0 - x - y) / y);
     let cones = DMat3::from_cols_array_2d(&[[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]]).transpose();
     let of_rgb = cones * XYZ_OF_RGB.transpose();
@@ -50,9 +63,9 @@ mod tests {
         assert!((x - 0.44757).abs() < 1e-3 && (y - 0.40745).abs() < 1e-3, "{x} {y}");
 
         let tungsten = XYZ_OF_RGB.transpose().inverse() * DVec3::new(0.44757 / 0.40745, 1.0, (1.0 - 0.44757 - 0.40745) / 0.40745);
-        let shown = adaptation(2856.0) * tungsten;
+        let shown = adaptation(Kelvin(2856.0)) * tungsten;
         assert!((shown - DVec3::ONE).abs().max_element() < 0.01, "{tungsten} -> {shown}");
-        let daylight = adaptation(6504.0) * DVec3::ONE;
+        let daylight = adaptation(Kelvin(6504.0)) * DVec3::ONE;
         assert!((daylight - DVec3::ONE).abs().max_element() < 0.05, "{daylight}");
         assert!(tungsten.x > 3.0 * tungsten.z);
     }

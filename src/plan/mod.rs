@@ -13,7 +13,7 @@ pub(crate) mod light_choice;
 mod maps;
 pub(crate) mod planning;
 pub(crate) mod radius;
-pub(crate) mod room;
+pub mod room;
 pub(crate) mod room_effects;
 pub mod scene;
 pub(crate) mod sensor;

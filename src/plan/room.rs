@@ -37,9 +37,9 @@ impl EmissionRange {
 }
 
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct RoomPlan {
+pub struct RoomPlan {
     pub settings: RoomSettings,
-    pub decisions: Vec<Decision>,
+    pub(crate) decisions: Vec<Decision>,
     /// Sums a point keeps: flux, and where it differs from the paper's illumination, that too.
     pub channel_count: u32,
     /// Fixed-point bits after the binary point of a film sum.
@@ -58,14 +58,14 @@ pub(crate) struct RoomPlan {
     pub path_capacity: u32,
     /// Entries of the photon map.
     pub photon_capacity: u32,
-    pub points: Vec<Point>,
-    pub grid: Grid,
+    pub(crate) points: Vec<Point>,
+    pub(crate) grid: Grid,
     /// What a gather is expected to cost.
-    pub work: Work,
+    pub(crate) work: Work,
     /// Pair tests (point, photon) after which commands are handed to the device.
     pub pair_tests_per_submission: u64,
     /// How photons are dealt to invocations that keep them to their end.
-    pub persistence: Persistence,
+    pub(crate) persistence: Persistence,
     /// Whether entries of the photon map say which photon they are: the nearest photons are distinguished by it, and so are
     /// photons that somebody lists.
     pub keeps_origins: bool,

@@ -22,7 +22,6 @@ use crate::output::colour::Format;
 use crate::output::destination::{Destination, write_all};
 use crate::output::metadata::{Metadata, Repeat, devices, errors};
 use crate::output::show::{Layer, Show, Surface, surfaces, units};
-use crate::output::white_balance;
 use crate::plan::work_division::Division;
 use crate::scene::{Camera, Scene};
 use crate::settings::scene::{Part, SceneSettings};
@@ -110,13 +109,13 @@ pub(crate) fn show(request: &RenderRequest, size: (u32, u32)) -> Show {
 /// Refuses what the format of an image's file does not have.
 pub(crate) fn check_format(request: &RenderRequest, path: Option<&Path>) -> Result<()> {
     let format = path.map(|path| Format::of("output", path)).transpose()?;
-    let name = || path.map_or_else(String::new, |path| path.display().to_string());
+    let name = || path.map_or_else(|| "(no file)".to_owned(), |path| path.display().to_string());
     let of_png = "is for PNG only: an EXR holds linear radiance";
     if let Some(exposure) = request.exposure {
         require(format == Some(Format::Png), "exposure", exposure.0, of_png)?;
     }
     if let Some(kelvin) = request.white_balance {
-        require(path.is_none() || format == Some(Format::Png), "white_balance", kelvin, of_png)?;
+        require(format == Some(Format::Png), "white_balance", kelvin, of_png)?;
     }
     if request.layers.is_some() && path.is_some() {
         require(format == Some(Format::Exr), "layers", name(), "is for EXR only: a PNG holds what the eye sees")?;
@@ -138,7 +137,6 @@ impl Image {
     /// The same with the exposure, the tone and the layers of another request.
     pub fn save_as(&self, path: &Path, style: &RenderRequest, observer: &Observer) -> Result<()> {
         let format = Format::of("output", path)?;
-        style.white_balance.map_or(Ok(()), white_balance::check)?;
         let destination = Destination::open("output", path)?;
         write_all([(destination, self.file(style, format, observer).0)])
     }

@@ -55,8 +55,9 @@
 //! let request = RenderRequest { photons: Some(1000), ..RenderRequest::default() };
 //! let image = room::render(&mut gpus, &request, &observer)?;
 //! image.save("box.png")?;
-//! println!("{} of {} photons were absorbed", image.ledger().absorbed, image.ledger().emitted);
-//! # assert!(map.photons() > 0 && map.rounds() == 2 && image.ledger().emitted == 1000 && image.timings().row("run").is_some());
+//! let ledger = image.result.ledger();
+//! println!("{} of {} photons were absorbed", ledger.absorbed, ledger.emitted);
+//! # assert!(map.photons() > 0 && map.rounds() == 2 && ledger.emitted == 1000 && image.result.timings.row("run").is_some());
 //! # Ok::<(), photonmill::error::Error>(())
 //! ```
 

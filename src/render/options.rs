@@ -56,6 +56,7 @@ pub enum Command {
     /// Without a name: the paper's box.
     Box = 1 << 6,
     Study = 1 << 7,
+    Merge = 1 << 8,
 }
 
 const R: u32 = Command::Render as u32;
@@ -66,6 +67,7 @@ const M: u32 = Command::Map as u32;
 const L: u32 = Command::Plan as u32;
 const X: u32 = Command::Box as u32;
 const S: u32 = Command::Study as u32;
+const G: u32 = Command::Merge as u32;
 /// Those that light a scene to its end, and what they share with `plan`, which shows what they would do.
 const ESTIMATES: u32 = R | B | P;
 const RUNS: u32 = ESTIMATES | L;
@@ -114,11 +116,10 @@ macro_rules! rows {
 /// In the order of the help.
 pub const ROWS: &[Row] = rows! {
     Output {
-        exposure "STOPS" Image R
+        exposure "STOPS" Image (R | G)
             "Exposure of a PNG in stops, each of which doubles the brightness" default "what makes the mean middle grey";
-        tone "CURVE" Image R "Tone curve of a PNG" default "neutral";
-        white_balance "KELVIN" Image R "Show light of this colour temperature as white in a PNG" default "daylight, sRGB's own white"
-            requires "output";
+        tone "CURVE" Image (R | G) "Tone curve of a PNG" default "neutral";
+        white_balance "KELVIN" Image (R | G) "Show light of this colour temperature as white in a PNG" default "daylight, sRGB's own white";
         layers "all|none|LAYER,..." Image R
             "Layers of an EXR beside the light: all, none, or some of direct, specular, caustic, indirect, standard_error, unseen, albedo, normal and depth"
             default "all";
@@ -375,6 +376,7 @@ mod tests {
             ("layers", _) => "direct,depth",
             ("shininess", _) => "1,2,3,4,5",
             ("threads", _) => "3",
+            ("white_balance", _) => "3000",
             (_, Form::Flag | Form::Switch) => "on",
             (_, Form::Integer) => "7",
             (_, Form::Number) => "0.25",

@@ -27,7 +27,7 @@ use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::oidn::Denoiser;
 use crate::output::destination::Destination;
-use crate::output::{scene_report, white_balance};
+use crate::output::scene_report;
 
 use crate::plan::Limits;
 use crate::plan::film::BiasPlan;
@@ -77,7 +77,6 @@ impl Inputs {
             None => settings,
         };
         settings.validate()?;
-        request.white_balance.map_or(Ok(()), white_balance::check)?;
         let save_settings = request.save_settings.as_ref().map(|path| Destination::open("save_settings", path)).transpose()?;
         Ok(Inputs { request: request.clone(), settings, map, tuned, save_settings, denoiser: None })
     }

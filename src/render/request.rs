@@ -7,6 +7,7 @@ use glam::DVec3;
 use super::values::{Layers, Percent, Seconds, Shininess, Stops, SunPosition, Threads, Variant, Watts};
 use crate::engine::run::blocks;
 use crate::output::colour::Tone;
+use crate::output::white_balance::Kelvin;
 use crate::plan::work_division::TunableSettings;
 use crate::rng::Rng;
 use crate::scene::Reading;
@@ -25,7 +26,7 @@ pub struct RenderRequest {
 
     pub exposure: Option<Stops>,
     pub tone: Option<Tone>,
-    pub white_balance: Option<f32>,
+    pub white_balance: Option<Kelvin>,
     pub layers: Option<Layers>,
     pub denoise: bool,
 

@@ -18,7 +18,6 @@ use crate::engine::run::watch::End;
 use crate::engine::{self, Control};
 use crate::error::{Result, require};
 use crate::gpu::Gpu;
-use crate::ledger::Ledger;
 use crate::output::colour::Format;
 use crate::output::destination::{Destination, write_all};
 use crate::output::image::overview;
@@ -34,7 +33,6 @@ use crate::settings::scene::SceneSettings;
 use crate::settings::stop::Stop;
 use crate::settings::{Builder, Preset, RoomSettings, Sums};
 use crate::text::counted;
-use crate::timings::Timings;
 
 impl RenderRequest {
     /// Settings of the paper's box: those of its experiment, but for what is asked for.
@@ -177,7 +175,7 @@ fn fastest(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings, observer: &Obs
 
 /// The picture of the box.
 pub struct RoomImage<'a> {
-    pub(crate) result: RunResult,
+    pub result: RunResult,
     scene: RoomScene,
     request: &'a RenderRequest,
 }
@@ -196,19 +194,6 @@ pub fn render<'a>(gpus: &mut Vec<Gpu>, request: &'a RenderRequest, observer: &Ob
 impl RoomImage<'_> {
     pub fn error(&self) -> FilmError {
         room_report::error(&self.result, &self.scene)
-    }
-
-    pub fn ledger(&self) -> Ledger {
-        self.result.ledger()
-    }
-
-    pub fn timings(&self) -> &Timings {
-        &self.result.timings
-    }
-
-    /// What ended the run.
-    pub fn end(&self) -> End {
-        self.result.end
     }
 
     pub fn devices(&self) -> Vec<String> {

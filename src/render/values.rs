@@ -12,6 +12,7 @@ use glam::DVec3;
 use crate::engine::run::blocks;
 use crate::output::colour::Tone;
 use crate::output::show::Layer;
+use crate::output::white_balance::Kelvin;
 use crate::rng::Rng;
 use crate::scene::image_size::{ImageSize, parse_size};
 use crate::scene::surroundings::Environment;
@@ -343,6 +344,7 @@ words! {
     String as Form::Text, |text| Ok(text.to_owned()), String::clone;
     Percent as Form::Percent, str::parse, Percent::to_string;
     Seconds as Form::Time, str::parse, Seconds::to_string;
+    Kelvin as Form::Number, str::parse, Kelvin::to_string;
     Stops as Form::Number, parse_stops, |stops| stops.0.to_string();
     DVec3 as Form::Numbers(3), |text| parse_numbers(text).map(DVec3::from_array), |point| commas(&point.to_array());
     SunPosition as Form::Numbers(2), parse_sun, |sun| commas(&[sun.azimuth, sun.elevation]);

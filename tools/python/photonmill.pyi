@@ -526,6 +526,7 @@ class Film(Run):
         *,
         exposure: float | None = None,
         tone: Literal["neutral", "linear"] = "neutral",
+        white_balance: float | None = None,
         layers: Sequence[str] | None = None,
     ) -> None:
         """Writes a file, which appears whole or not at all.
@@ -533,10 +534,13 @@ class Film(Run):
         path: ends in .exr, which holds linear radiance and layers, or in .png, which is for the eye.
         exposure: of a PNG, stops; what makes the mean middle grey.
         tone: curve of a PNG.
+        white_balance: of a PNG, the colour temperature of light that is shown as white, kelvin; daylight, sRGB's own white.
         layers: of an EXR, some of direct, specular, caustic, indirect, standard_error, unseen, albedo, normal and depth; all.
         """
 
-    def png(self, *, exposure: float | None = None, tone: Literal["neutral", "linear"] = "neutral") -> bytes:
+    def png(
+        self, *, exposure: float | None = None, tone: Literal["neutral", "linear"] = "neutral", white_balance: float | None = None
+    ) -> bytes:
         """The content of a PNG, as `save` writes it."""
 
 @final

@@ -16,14 +16,14 @@ use crate::settings::stop::{LEAST_BLOCKS, Measure, Stop};
 
 /// Sums of a run, point by point, and what they are worth.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct RoomFilm {
+pub struct RoomFilm {
     /// `channel_count` sums a point, in fixed-point units: relative flux, then the paper's illumination
     /// power (photons within the radius times their Phong weight). With one channel the two are the same. With
     /// `--nearest` it is what the disc of the radius would hold at the density of the nearest photons. A block is a round. No squares
     /// of a run of a single one.
     pub of_blocks: BlockSums,
     /// Of relative flux.
-    pub latest: LatestBlocks,
+    pub(crate) latest: LatestBlocks,
     /// What the bits of a sum mean.
     pub kind: Sums,
     pub channel_count: u32,

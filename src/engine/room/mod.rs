@@ -3,7 +3,7 @@
 
 mod bias;
 pub(crate) mod estimate;
-pub(crate) mod film;
+pub mod film;
 pub(crate) mod index;
 pub(crate) mod live;
 mod on_cpu;
@@ -37,7 +37,7 @@ use crate::scene::room::RoomScene;
 use crate::settings::{Builder, RoomSettings, Sums};
 
 /// What a run leaves behind.
-pub(crate) type RunResult = run::RunResult<RoomPlan, RoomFilm>;
+pub type RunResult = run::RunResult<RoomPlan, RoomFilm>;
 
 /// Runs on a device or, without one and by the CPU builder, on the CPU.
 pub(crate) fn run(gpu: Option<&Gpu>, scene: &RoomScene, settings: &RoomSettings, control: &mut Control) -> Result<RunResult> {

@@ -7,17 +7,16 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 use numpy::ndarray::{Array, Array2, Array3, Dimension};
 use numpy::{IntoPyArray, PyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods};
-use photonmill::output::colour::{Format, Tone};
-use photonmill::output::show::{Layer, Surface};
-use photonmill::render::values::Layers;
-use photonmill::render::{Image, Lightmaps as Baked, Observer, RenderRequest, Stops};
+use photonmill::output::colour::Format;
+use photonmill::output::show::Surface;
+use photonmill::render::{Image, Lightmaps as Baked, Observer};
 use photonmill::settings::scene::Part;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyBytes, PyDict};
 
-use crate::error;
 use crate::run::{Found, Run};
+use crate::{error, settings};
 
 /// An array that cannot be written to.
 fn array<D: Dimension>(py: Python<'_>, values: Array<f32, D>) -> Bound<'_, PyArray<f32, D>> {
@@ -73,13 +72,6 @@ impl Film {
         }
     }
 
-    fn style(&self, py: Python<'_>, exposure: Option<f32>, tone: &str) -> PyResult<RenderRequest> {
-        let exposure = stops_of(py, exposure)?.map(Stops);
-        // A file that says nothing of its tone has the usual one.
-        let tone = Some(tone_of(py, tone)?).filter(|tone| *tone != Tone::default());
-        Ok(RenderRequest { exposure, tone, ..self.image().request.clone() })
-    }
-
     fn surfaces(&self, py: Python<'_>) -> PyResult<&Surfaces> {
         self.surfaces.get_or_try_init(py, || {
             let made = self.image();
@@ -91,29 +83,6 @@ impl Film {
             let (albedo, normal) = (colours(|surface| surface.albedo), colours(|surface| surface.normal));
             Ok(Surfaces { albedo, normal, depth: array(py, depth).unbind() })
         })
-    }
-}
-
-fn tone_of(py: Python<'_>, name: &str) -> PyResult<Tone> {
-    match name {
-        "neutral" => Ok(Tone::Neutral),
-        "linear" => Ok(Tone::Linear),
-        _ => Err(error::argument(py, format!("tone '{name}': must be one of neutral, linear"))),
-    }
-}
-
-fn layers_of(py: Python<'_>, names: &[String]) -> PyResult<Vec<Layer>> {
-    let known = Layer::ALL.map(Layer::name).join(", ");
-    let layer = |name: &String| Layer::ALL.into_iter().find(|layer| layer.name() == name);
-    let refused = |name: &String| error::argument(py, format!("layers='{name}': must be among {known}"));
-    names.iter().map(|name| layer(name).ok_or_else(|| refused(name))).collect()
-}
-
-/// Stops of an exposure.
-fn stops_of(py: Python<'_>, exposure: Option<f32>) -> PyResult<Option<f32>> {
-    match exposure.filter(|stops| !(-64.0..=64.0).contains(stops)) {
-        Some(stops) => Err(error::argument(py, format!("exposure={stops}: must be from -64 to 64 stops"))),
-        None => Ok(exposure),
     }
 }
 
@@ -210,23 +179,22 @@ impl Film {
     }
 
     #[doc = doc!("Film.save")]
-    #[pyo3(signature = (path, *, exposure=None, tone="neutral", layers=None))]
-    fn save(&self, py: Python<'_>, path: PathBuf, exposure: Option<f32>, tone: &str, layers: Option<Vec<String>>) -> PyResult<()> {
-        let layers = layers.map(|names| layers_of(py, &names).map(Layers)).transpose()?;
-        let style = RenderRequest { layers, ..self.style(py, exposure, tone)? };
+    #[pyo3(signature = (path, **style), text_signature = "($self, path, *, exposure=None, tone='neutral', white_balance=None, layers=None)")]
+    fn save(&self, py: Python<'_>, path: PathBuf, style: Option<&Bound<'_, PyDict>>) -> PyResult<()> {
+        let style = settings::style(py, &self.image().request, style, &["exposure", "tone", "white_balance", "layers"])?;
         py.detach(|| self.image().save_as(&path, &style, &Observer::default())).map_err(|failure| error::of(py, &failure))
     }
 
     #[doc = doc!("Film.png")]
-    #[pyo3(signature = (*, exposure=None, tone="neutral"))]
-    fn png<'py>(&self, py: Python<'py>, exposure: Option<f32>, tone: &str) -> PyResult<Bound<'py, PyBytes>> {
-        let style = self.style(py, exposure, tone)?;
+    #[pyo3(signature = (**style), text_signature = "($self, *, exposure=None, tone='neutral', white_balance=None)")]
+    fn png<'py>(&self, py: Python<'py>, style: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyBytes>> {
+        let style = settings::style(py, &self.image().request, style, &["exposure", "tone", "white_balance"])?;
         Ok(PyBytes::new(py, &py.detach(|| self.image().file(&style, Format::Png, &Observer::default()).0)))
     }
 
     /// What a notebook shows.
     fn _repr_png_<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        self.png(py, None, "neutral")
+        self.png(py, None)
     }
 }
 

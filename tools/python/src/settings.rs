@@ -29,7 +29,7 @@ pub fn request(py: Python<'_>, settings: Option<&Bound<'_, PyDict>>, command: Co
             let is_of_pictures = rows(Command::Render).any(|row| keyword(row.field) == name);
             return Err(match is_of_pictures {
                 true => PyTypeError::new_err(format!("'{name}' is of pictures only; leave it out")),
-                false => unknown(&name, command),
+                false => unknown(&name, rows(command).map(|row| keyword(row.field)).collect()),
             });
         };
         // None is as if it were not given.
@@ -40,9 +40,22 @@ pub fn request(py: Python<'_>, settings: Option<&Bound<'_, PyDict>>, command: Co
     Ok(request)
 }
 
+/// An image's request with the keyword arguments that its file is written with, some of the rows.
+pub fn style(py: Python<'_>, request: &RenderRequest, style: Option<&Bound<'_, PyDict>>, fields: &[&str]) -> PyResult<RenderRequest> {
+    let mut request = request.clone();
+    for (key, value) in style.into_iter().flatten() {
+        let name: String = key.extract()?;
+        let row = ROWS.iter().find(|row| row.field == name && fields.contains(&row.field));
+        let row = row.ok_or_else(|| unknown(&name, fields.to_vec()))?;
+        if !value.is_none() {
+            Argument { py, name: &name, value: &value }.set(row, &mut request)?;
+        }
+    }
+    Ok(request)
+}
+
 /// As Python refuses what a function does not take.
-fn unknown(name: &str, command: Command) -> PyErr {
-    let names: Vec<&str> = rows(command).map(|row| keyword(row.field)).collect();
+fn unknown(name: &str, names: Vec<&str>) -> PyErr {
     let likeness = |known: &&str| strsim::jaro(known, name);
     let meant = names.iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b))).filter(|best| likeness(best) > 0.8);
     let meant = meant.map_or_else(|| format!("; the settings are {}", names.join(", ")), |meant| format!(". Did you mean '{meant}'?"));
@@ -111,6 +124,10 @@ impl Argument<'_, '_> {
             Form::Names(_) => {
                 let names = text().map(|name| vec![name]).or_else(|_| self.value.extract::<Vec<String>>());
                 names.map(|names| names.join(",")).map_err(|_| self.wrong_type("the name of an effect or a sequence of names"))
+            }
+            Form::Other if row.field == "layers" => {
+                let names: Vec<String> = self.value.extract().map_err(|_| self.wrong_type("a sequence of names"))?;
+                Ok(if names.is_empty() { "none".to_owned() } else { names.join(",") })
             }
             Form::Text | Form::Other | Form::Choice(_) => text().map_err(|_| self.wrong_type("a str")),
         }

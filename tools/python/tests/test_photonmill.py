@@ -128,7 +128,7 @@ def test_pictures_are_written(film: pm.Film, tmp_path: Path) -> None:
     film.save(tmp_path / "picture.exr", layers=["caustic"])
     assert (tmp_path / "picture.png").read_bytes().startswith(b"\x89PNG")
     assert set(channels(tmp_path / "picture.exr")) == {"R", "G", "B", "caustic.R", "caustic.G", "caustic.B"}
-    assert film.png() == film._repr_png_() != film.png(exposure=3)  # type: ignore[attr-defined]
+    assert film.png() == film._repr_png_() != film.png(exposure=3) != film.png(exposure=3, white_balance=3000)  # type: ignore[attr-defined]
 
 
 def test_points_have_the_irradiance_of_a_closed_form() -> None:
@@ -256,7 +256,8 @@ def test_other_wrong_arguments_are_refused(film: pm.Film, spheres: pm.Scene, tmp
         (pm.ArgumentError, "path=.*picture.bmp: must be a file name that ends in .png or .exr", lambda: film.save(tmp_path / "picture.bmp")),
         (pm.Error, "cannot be written", lambda: film.save(tmp_path / "absent" / "picture.png")),
         (pm.ArgumentError, "exposure=100", lambda: film.png(exposure=100)),
-        (pm.ArgumentError, "layers='depths'", lambda: film.save(tmp_path / "picture.exr", layers=["depths"])),
+        (pm.ArgumentError, "white_balance=1000: must be from 1667", lambda: film.png(white_balance=1000)),
+        (pm.ArgumentError, r"layers=\['depths'\]: must be all, none, or some of", lambda: film.save(tmp_path / "picture.exr", layers=["depths"])),
         (pm.ArgumentError, r"points: must have the shape \(n, 3\), and has \(3,\)", lambda: spheres.probe([0, 0, 0], [0, 1, 0])),
         (pm.ArgumentError, "points=0: must be from 1 to", lambda: spheres.probe(np.empty((0, 3)), np.empty((0, 3)))),
         (pm.ArgumentError, "each point needs one", lambda: spheres.probe([[0, 0, 0]], [[0, 1, 0], [0, 1, 0]])),
