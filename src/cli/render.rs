@@ -52,7 +52,7 @@ pub(super) struct RenderArgs {
     /// Trace a single photon of this run, print its path, and exit; rounds and photons count from 0, and `:caustic` at the
     /// end takes a photon of the caustic map
     #[arg(long, value_name = "ROUND:PHOTON", value_parser = parse_photon_name, help_heading = "Checks",
-        conflicts_with_all = ["output", "display", "error_image", "exposure", "tone", "layers", "denoise", "judge", "explain", "json", "trace", "save_settings", "time_dispatches", "map", "devices"])]
+        conflicts_with_all = ["output", "display", "error_image", "exposure", "tone", "white_balance", "layers", "denoise", "judge", "explain", "json", "trace", "save_settings", "time_dispatches", "map", "devices"])]
     replay: Option<PhotonName>,
     #[command(flatten)]
     messages: MessageArgs,

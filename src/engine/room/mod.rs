@@ -1,5 +1,5 @@
-//! The paper's box: photons that land on its walls, and their density at points of these. [`on_gpu`] runs it with kernels,
-//! [`on_cpu`] with their twins.
+//! The paper's box: photons that land on its walls, and their density at points of these. `on_gpu` runs it with kernels,
+//! `on_cpu` with their twins.
 
 mod bias;
 pub(crate) mod estimate;
